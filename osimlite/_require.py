@@ -1,0 +1,36 @@
+"""Optional packages: imported where they are used, and missed in words a user can act on."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from osimlite.errors import MissingDependency
+
+
+def require(module: str, *, extra: str, purpose: str) -> ModuleType:
+    """Import an optional package, or say which extra of osimlite brings it.
+
+    Args:
+        module: name to import, e.g. ``"numpy"`` or ``"matplotlib.pyplot"``.
+        extra: the extra of osimlite that installs it, e.g. ``"sim"``.
+        purpose: what it is needed for, as the subject of a sentence: ``"the PyBullet engine"``.
+
+    Raises:
+        MissingDependency: the package is absent, or present and cannot be loaded.
+    """
+    package = module.partition(".")[0]
+    cure = f"run: pip install 'osimlite[{extra}]'"
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name == package:
+            raise MissingDependency(f"{purpose} needs {package}, which is not installed; {cure}") from error
+        raise MissingDependency(
+            f"{purpose} needs {package}, which is installed without its own dependency {error.name}; {cure}"
+        ) from error
+    except ImportError as error:
+        raise MissingDependency(
+            f"{purpose} needs {package}, which is installed but cannot be loaded ({error}); "
+            f"reinstall it, or {cure}"
+        ) from error

@@ -1,0 +1,83 @@
+"""Fixtures shared by all tests: the repository, its inputs, the shared reference data and the real files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from hypothesis import settings
+
+ROOT = Path(__file__).resolve().parent.parent
+# Reference data too large to commit. It stands beside the repository; tests that need it skip without it.
+SHARED = ROOT.parent / "shared"
+NO_SHARED = "needs the shared reference folder, which is not beside this repository"
+
+# A busy machine must not fail a property, and CI must fail the same way twice.
+settings.register_profile("osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True)
+settings.load_profile("osimlite")
+
+
+class CorpusModel(NamedTuple):
+    """One real model file, with what OpenSim 4.6 makes of it."""
+
+    id: str
+    path: Path  # as published
+    truth: Path  # OpenSim's components, poses and energies: gzipped JSON
+    converted: Path | None  # OpenSim's own print of it, gzipped; None where OpenSim cannot load the file
+
+
+def corpus_models() -> list[CorpusModel]:
+    """Every model of the shared corpus in the order of its id; empty where the folder is absent."""
+    found = []
+    for path in sorted(SHARED.glob("corpus/models/*/*.osim")):
+        name = path.parent.name
+        converted = SHARED / "corpus" / "converted" / f"{name}.osim.gz"
+        truth = SHARED / "corpus" / "truth" / f"{name}.json.gz"
+        found.append(CorpusModel(name, path, truth, converted if converted.exists() else None))
+    return found
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a test that asks for `corpus_model` once per real file."""
+    if "corpus_model" in metafunc.fixturenames:
+        models: list[object] = [pytest.param(model, id=model.id) for model in corpus_models()]
+        absent = pytest.param(None, id="absent", marks=pytest.mark.skip(reason=NO_SHARED))
+        metafunc.parametrize("corpus_model", models or [absent])
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what reads real files, so that `-m "not corpus"` leaves it out."""
+    for item in items:
+        if {"corpus", "corpus_model"} & set(getattr(item, "fixturenames", ())):
+            item.add_marker("corpus")
+
+
+@pytest.fixture(scope="session")
+def repo() -> Path:
+    """The root of the repository."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def fixtures() -> Path:
+    """The small inputs that are committed with the tests."""
+    return ROOT / "fixtures"
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The shared reference folder."""
+    if not SHARED.is_dir():
+        pytest.skip(NO_SHARED)
+    return SHARED
+
+
+@pytest.fixture(scope="session")
+def corpus(shared: Path) -> list[CorpusModel]:
+    """All real files at once; ask for `corpus_model` instead to run a test once per file."""
+    models = corpus_models()
+    if not models:
+        pytest.skip("needs the folder of real models (corpus) in the shared reference folder")
+    return models
