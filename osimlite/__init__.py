@@ -1,3 +1,54 @@
-"""osimlite: build, check, translate and simulate OpenSim models without OpenSim."""
+"""osimlite: build, check, translate and simulate OpenSim models without OpenSim.
+
+Everything public is here: ``read``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``to_urdf``, ``simulate``,
+the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first
+used, so that importing osimlite costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from osimlite.document.printer import to_text as to_text
+    from osimlite.document.printer import write as write
+    from osimlite.document.reader import read as read
+    from osimlite.document.reader import read_text as read_text
+    from osimlite.errors import OsimliteError as OsimliteError
+    from osimlite.lint import validate as validate
+    from osimlite.multibody import mechanism as mechanism
+    from osimlite.schema.model import Model as Model
+    from osimlite.simulate import simulate as simulate
+    from osimlite.translate import to_urdf as to_urdf
+
+_FUNCTIONS = {
+    "read": "osimlite.document.reader",
+    "read_text": "osimlite.document.reader",
+    "write": "osimlite.document.printer",
+    "to_text": "osimlite.document.printer",
+    "validate": "osimlite.lint",
+    "mechanism": "osimlite.multibody",
+    "to_urdf": "osimlite.translate",
+    "simulate": "osimlite.simulate",
+    "OsimliteError": "osimlite.errors",
+}
+
+
+def __getattr__(name: str) -> Any:
+    module = _FUNCTIONS.get(name)
+    if module is None and not name.startswith("_"):
+        from osimlite.schema.registry import MODULES
+
+        module = MODULES.get(name)
+    if module is None:
+        raise AttributeError(f"module 'osimlite' has no attribute '{name}'")
+    return getattr(import_module(module), name)
+
+
+def __dir__() -> list[str]:
+    from osimlite.schema.registry import MODULES
+
+    return sorted({*globals(), *_FUNCTIONS, *MODULES})

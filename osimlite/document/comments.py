@@ -1,0 +1,32 @@
+"""Which comments OpenSim wrote itself.
+
+OpenSim prints the description of a property before each property, and drops every comment it reads. We keep what a
+person wrote and drop what OpenSim would print anyway. Its sentences are known by their digests only.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from hashlib import blake2b
+from importlib.resources import files
+
+DIGEST_SIZE = 6
+
+
+@cache
+def is_generated(text: str) -> bool:
+    """Whether a comment is one that some version of OpenSim prints by itself."""
+    return digest(text) in _known()
+
+
+def digest(text: str) -> bytes:
+    """Digest of a comment, white space and digits aside."""
+    plain = re.sub(r"[\s\d]+", " ", text).strip()
+    return blake2b(plain.encode(), digest_size=DIGEST_SIZE).digest()
+
+
+@cache
+def _known() -> frozenset[bytes]:
+    data = files("osimlite.document").joinpath("generated_comments.bin").read_bytes()
+    return frozenset(data[i : i + DIGEST_SIZE] for i in range(0, len(data), DIGEST_SIZE))

@@ -1,0 +1,239 @@
+"""Text to value and back, by the lexical rules of OpenSim 4.6's reader and printer.
+
+OpenSim takes the longest part of a text that is a number (``1,5`` is 1) and drops what it cannot read without failing.
+The functions here read the same value, and raise :class:`Unclean` with it, so that the reader can note what was lost.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Literal
+
+from osimlite.schema.fields import Kind, Reference, Value
+
+Trouble = Literal["unreadable", "cut", "too-many", "too-few", "empty", "ignored"]
+
+ABSENT: Any = object()
+"""Stands for "OpenSim keeps the default"."""
+
+_PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_SPECIAL = {"nan": math.nan, "inf": math.inf, "infinity": math.inf, "+inf": math.inf, "+infinity": math.inf}
+_SPECIAL |= {"-inf": -math.inf, "-infinity": -math.inf}
+
+
+class Unclean(Exception):
+    """The text does not say what was meant, or says it in a way OpenSim cuts.
+
+    Attributes:
+        value: what OpenSim reads; ABSENT if it keeps the default.
+        trouble: what is wrong.
+        word: the part of the text concerned.
+    """
+
+    def __init__(self, trouble: Trouble, word: str, value: Any = ABSENT) -> None:
+        super().__init__(trouble)
+        self.trouble: Trouble = trouble
+        self.word = word
+        self.value = value
+
+
+def real(word: str) -> float:
+    """One number as OpenSim reads it; Unclean if only a part of the word, or nothing, is a number."""
+    try:
+        value = float(word)
+        if -math.inf < value < math.inf and "_" not in word:
+            return value
+    except ValueError:
+        pass
+    special = _SPECIAL.get(word.lower())
+    if special is not None:
+        return special
+    prefix = _PREFIX.match(word)
+    if prefix is None or math.isinf(float(prefix[0])):
+        raise Unclean("unreadable", word)
+    raise Unclean("cut", word, float(prefix[0]))
+
+
+def whole(word: str) -> int:
+    """One whole number; nothing may follow it."""
+    if re.fullmatch(r"[+-]?\d+", word) is None:
+        raise Unclean("unreadable", word)
+    return int(word)
+
+
+def flag(word: str) -> bool:
+    """A switch: true or false in any case, 1 or 0."""
+    lowered = word.lower()
+    if lowered in ("true", "1"):
+        return True
+    if lowered in ("false", "0"):
+        return False
+    raise Unclean("unreadable", word)
+
+
+def legacy_flag(word: str) -> bool:
+    """A switch of the first property system, where everything but ``true`` is false."""
+    lowered = word.lower()
+    if lowered not in ("true", "false"):
+        raise Unclean("ignored", word, False)
+    return lowered == "true"
+
+
+def text(raw: str) -> str:
+    """A text: white space trimmed, inner runs of it collapsed to one space."""
+    return " ".join(raw.split())
+
+
+_WORDS: dict[str, Callable[[str], Any]] = {"double": real, "int": whole, "bool": flag, "string": str}
+
+
+@cache
+def converter(kind: Kind) -> Callable[[str], Any]:
+    """The function that reads the text of a property of this kind; it raises Unclean where OpenSim would not object."""
+    if isinstance(kind, Reference):
+        return _words(str, 0, None) if kind.shape == "list" else text
+    assert isinstance(kind, Value)
+    word = legacy_flag if kind.legacy and kind.scalar == "bool" else _WORDS[kind.scalar]
+    if kind.shape in ("single", "optional"):
+        return text if kind.scalar == "string" else _one(word)
+    if kind.size is not None:
+        return _exactly(kind.size)
+    if kind.shape == "vector":
+        return _words(word, 0, None)
+    if kind.legacy and kind.scalar != "string":
+        return _legacy_list(word)
+    return _words(word, kind.least, kind.most)
+
+
+def _one(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    def convert(raw: str) -> Any:
+        words = raw.split()
+        if not words:
+            raise Unclean("empty", "")
+        if len(words) == 1:
+            return read(words[0])
+        raise Unclean("too-many", raw.strip(), read(words[0]))
+
+    return convert
+
+
+def _exactly(size: int) -> Callable[[str], Any]:
+    def convert(raw: str) -> Any:
+        words = raw.split()
+        try:
+            values = tuple([float(word) for word in words])
+            if len(values) == size and all(-math.inf < value < math.inf for value in values) and "_" not in raw:
+                return values
+        except ValueError:
+            pass
+        if not words:
+            raise Unclean("empty", "")
+        if len(words) < size:
+            raise Unclean("too-few", raw.strip())
+        if len(words) % size:
+            raise Unclean("too-many", raw.strip())
+        cleanly = []
+        for word in words:
+            try:
+                cleanly.append(real(word))
+            except Unclean:
+                raise Unclean("unreadable", word) from None
+        if len(words) > size:
+            raise Unclean("too-many", raw.strip(), tuple(cleanly[:size]))
+        return tuple(cleanly)
+
+    return convert
+
+
+def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable[[str], Any]:
+    def convert(raw: str) -> Any:
+        words = raw.split()
+        if read is str:
+            values: list[Any] = list(words)
+        else:
+            values = []
+            for word in words:
+                try:
+                    values.append(read(word))
+                except Unclean as unclean:
+                    if unclean.value is ABSENT:
+                        raise
+                    # A stream of numbers ends at the first word that is not one to its last character.
+                    raise Unclean("cut", word, (*values, unclean.value)) from None
+        if len(values) < least:
+            raise Unclean("too-few" if values else "empty", raw.strip())
+        if most is not None and len(values) > most:
+            raise Unclean("too-many", raw.strip(), tuple(values[:most]))
+        return tuple(values)
+
+    return convert
+
+
+def _legacy_list(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Lists of the first property system: commas count as white space, one pair of brackets may surround."""
+    plain = _words(read, 0, None)
+
+    def convert(raw: str) -> Any:
+        if "," not in raw and not raw.lstrip()[:1] in ("(", "[", "{"):
+            return plain(raw)
+        stripped = raw.strip()
+        if stripped[:1] + stripped[-1:] in ("()", "[]", "{}"):
+            stripped = stripped[1:-1]
+        return plain(stripped.replace(",", " "))
+
+    return convert
+
+
+def shortest(value: float) -> str:
+    """The shortest decimal that reads back equal, in OpenSim's spelling of what is not finite."""
+    if value == value and value not in (math.inf, -math.inf):
+        words = repr(value)
+        return words[:-2] if words.endswith(".0") else words
+    return "NaN" if value != value else "Inf" if value > 0 else "-Inf"
+
+
+def seventeen(value: float) -> str:
+    """Seventeen significant digits, as OpenSim prints every number outside lists of the first property system."""
+    if value == value and value not in (math.inf, -math.inf):
+        return f"{value:.17g}"
+    return shortest(value)
+
+
+def six_if_enough(value: float) -> str:
+    """OpenSim's six digits where they read back equal, all digits where they would not."""
+    words = f"{value:g}"
+    return words if float(words) == value else seventeen(value)
+
+
+def formatter(kind: Kind, numbers: str) -> Callable[[Any], str]:
+    """The function that prints a value of this kind; `numbers` is ``"shortest"`` or ``"opensim"``."""
+    return _formatter(kind, numbers == "opensim")
+
+
+@cache
+def _formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
+    if isinstance(kind, Reference):
+        if kind.shape == "list":
+            lead = " " if kind.legacy else ""
+            return lambda words: lead + " ".join(words) if words else ""
+        return str
+    assert isinstance(kind, Value)
+    if kind.scalar == "double":
+        word: Callable[[Any], str] = seventeen if like_opensim else shortest
+        if like_opensim and kind.legacy and kind.shape == "list":
+            word = six_if_enough
+    elif kind.scalar == "bool":
+        word = _flag_word
+    else:
+        word = str
+    if kind.shape in ("single", "optional"):
+        return lambda value: "" if value is None else word(value)
+    lead = " " if kind.legacy else ""
+    return lambda values: lead + " ".join(map(word, values)) if values else ""
+
+
+def _flag_word(value: bool) -> str:
+    return "true" if value else "false"

@@ -1,0 +1,51 @@
+"""Errors a user can cause. Each is one plain sentence that names the thing and the next step."""
+
+from __future__ import annotations
+
+
+class OsimliteError(Exception):
+    """Base of every error osimlite raises on purpose.
+
+    Args:
+        message: one plain sentence that says what is wrong and what to do.
+        file: the file concerned, if any.
+        line: 1-based line in that file.
+        column: 1-based column, counted in characters.
+    """
+
+    def __init__(
+        self, message: str, *, file: str | None = None, line: int | None = None, column: int | None = None
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = file
+        self.line = line
+        self.column = column
+
+    def __str__(self) -> str:
+        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return f"{place}: {self.message}" if place else self.message
+
+
+class DocumentError(OsimliteError):
+    """The text cannot be read as an OpenSim document."""
+
+
+class ModelError(OsimliteError):
+    """The model says something that cannot be, or names something that is not there."""
+
+
+class MissingNameError(ModelError, AttributeError):
+    """A component has no property or member of that name."""
+
+
+class SimulationError(OsimliteError):
+    """The motion cannot be computed any further."""
+
+
+class UnsupportedError(OsimliteError):
+    """The model uses something this version cannot do; the message names it."""
+
+
+class MissingDependency(OsimliteError):
+    """An optional package is not installed; the message says which extra brings it."""

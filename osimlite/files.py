@@ -1,0 +1,41 @@
+"""Writing files so that they appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from osimlite.errors import OsimliteError
+
+
+def write_atomically(path: str | Path, content: str | bytes) -> None:
+    """Write a file beside its place and move it there.
+
+    Raises:
+        OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
+    """
+    target = Path(path)
+    data = content.encode() if isinstance(content, str) else content
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    except OSError as error:
+        raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
+        Path(name).chmod(mode)
+        Path(name).replace(target)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,262 @@
+"""Field kinds: what the text of one property may hold, written as annotation markers on the component classes.
+
+A field of a component class is declared once, ``radius: Annotated[float, real("m", ">= 0")] = 0.0``; the reader, the
+printer, the linter and the catalogue test all work from the marker. Markers hold facts only: how text becomes a value
+is the business of :mod:`osimlite.document.lexical`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+
+from pydantic_core import core_schema
+
+if TYPE_CHECKING:
+    from osimlite.schema.base import Object
+
+T = TypeVar("T")
+
+Scalar = Literal["double", "int", "bool", "string"]
+Shape = Literal["single", "optional", "list", "vector", "Vec3", "Vec6", "Transform"]
+Form = Literal["single", "unnamed", "optional", "list"]
+
+UNBOUNDED: Final = None
+_FIXED_SIZE: Final = {"Vec3": 3, "Vec6": 6, "Transform": 6}
+
+
+class Kind:
+    """Base of all markers; gives pydantic a validator that never looks into the classes of other components."""
+
+    __slots__ = ()
+
+    def check(self, value: Any, accepts: type | None) -> Any:
+        """Return `value` in the form the model stores, or raise ValueError."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        accepts = class_in(source)
+        return core_schema.no_info_plain_validator_function(lambda value: self.check(value, accepts))
+
+
+@dataclass(frozen=True, slots=True)
+class Value(Kind):
+    """Words of one scalar type: a number, a switch, a text, a vector, a list.
+
+    `least` and `most` bound the number of words of a list (`most` None: no bound). `domain` is a condition on every
+    number such as ``"> 0"``; it is what a sane model satisfies, not something the reader enforces. `choices` lists
+    the words or numbers that have a meaning. `legacy` marks properties of OpenSim's first property system, which are
+    printed after the others and read by stricter rules.
+    """
+
+    scalar: Scalar
+    shape: Shape = "single"
+    unit: str | None = None
+    domain: str = ""
+    least: int = 0
+    most: int | None = UNBOUNDED
+    legacy: bool = False
+    choices: tuple[str | int, ...] = ()
+
+    @property
+    def size(self) -> int | None:
+        """Number of words if it is fixed (1 for single values, 3 for Vec3 ...), else None."""
+        if self.shape in ("single", "optional"):
+            return 1
+        return _FIXED_SIZE.get(self.shape)
+
+    def check(self, value: Any, accepts: type | None) -> Any:
+        if self.shape == "single":
+            return _scalar(self.scalar, value)
+        if self.shape == "optional":
+            return None if value is None else _scalar(self.scalar, value)
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            raise ValueError(f"expected {self.words()}, got {value!r}")
+        items = tuple(_scalar(self.scalar, item) for item in value)
+        size = _FIXED_SIZE.get(self.shape)
+        least, most = (size, size) if size is not None else (self.least, self.most)
+        if len(items) < least or (most is not None and len(items) > most):
+            raise ValueError(f"expected {self.words()}, got {len(items)}")
+        return items
+
+    def words(self) -> str:
+        """What the text must hold, in words: ``"3 numbers"``, ``"true or false"``."""
+        noun = {"double": "number", "int": "whole number", "bool": "true/false", "string": "word"}[self.scalar]
+        if self.size == 1:
+            return {"bool": "true or false", "string": "a text"}.get(self.scalar, f"one {noun}")
+        if self.size is not None:
+            return f"{self.size} {noun}s"
+        if self.most is not None and self.most == self.least:
+            return f"{self.most} {noun}s"
+        return f"a list of {noun}s" if not self.least else f"at least {self.least} {noun}s"
+
+
+@dataclass(frozen=True, slots=True)
+class Reference(Kind):
+    """A text, or a list of words, by which one component names another.
+
+    `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim class that the
+    named component must be. In Python the component itself may be given; the printer turns it into the right text.
+    """
+
+    rule: str
+    target: str
+    shape: Literal["single", "optional", "list"] = "single"
+    required: bool = True
+    legacy: bool = False
+
+    def check(self, value: Any, accepts: type | None) -> Any:
+        if self.shape == "list":
+            if isinstance(value, str) or not isinstance(value, Iterable):
+                raise ValueError(f"expected a list of {self.target} components or their names, got {value!r}")
+            return tuple(self._one(item) for item in value)
+        if value is None and self.shape == "optional":
+            return None
+        return self._one(value)
+
+    def _one(self, value: Any) -> Any:
+        if isinstance(value, str):
+            return value
+        names = {base.__name__ for base in type(value).__mro__}
+        if "Component" in names and (self.target in names or "Unknown" in names):
+            return value
+        raise ValueError(f"expected a {self.target} or the text that names one, got {type(value).__name__}")
+
+
+@dataclass(frozen=True, slots=True)
+class Held(Kind):
+    """One or several objects that belong to this one; `form` is how the file holds them.
+
+    ``single`` prints ``<Class name="property">``, ``unnamed`` prints ``<Class>``, ``optional`` and ``list`` print
+    ``<property><Class/>...</property>``.
+    """
+
+    form: Form
+    legacy: bool = False
+
+    def check(self, value: Any, accepts: type | None) -> Any:
+        assert accepts is not None
+        if self.form == "list":
+            if isinstance(value, str) or not isinstance(value, Iterable):
+                raise ValueError(f"expected a list of {accepts.__name__}, got {value!r}")
+            return ObjectList(_instance(item, accepts) for item in value)
+        if value is None and self.form == "optional":
+            return None
+        return _instance(value, accepts)
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """Gives the XML tag of a property whose tag cannot be the name of the Python attribute."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Legacy:
+    """Marks a property of OpenSim's first property system where the kind of the field is shared with others."""
+
+
+LEGACY: Final = Legacy()
+
+
+class Epoch:
+    """Counts changes of any model, so that an index of a model knows when it is out of date."""
+
+    __slots__ = ("count",)
+
+    def __init__(self) -> None:
+        self.count = 0
+
+
+epoch = Epoch()
+
+
+class ObjectList(list[T]):
+    """A list of objects that notes every change, so that paths and look-ups stay right."""
+
+    __slots__ = ()
+
+
+def _noting(name: str) -> Callable[..., Any]:
+    plain = getattr(list, name)
+
+    def method(self: Any, *args: Any, **kwargs: Any) -> Any:
+        epoch.count += 1
+        return plain(self, *args, **kwargs)
+
+    method.__name__ = name
+    method.__doc__ = plain.__doc__
+    return method
+
+
+for _name in ("append", "extend", "insert", "remove", "pop", "clear", "sort", "reverse", "__setitem__", "__delitem__"):
+    setattr(ObjectList, _name, _noting(_name))
+for _name in ("__iadd__", "__imul__"):
+    setattr(ObjectList, _name, _noting(_name))
+
+
+def class_in(annotation: Any) -> type[Object] | None:
+    """The component class inside an annotation such as ``list[Body]`` or ``Function | None``."""
+    if isinstance(annotation, type) and hasattr(annotation, "field_specs"):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = class_in(argument)
+        if found is not None:
+            return found
+    return None
+
+
+def _instance(value: Any, accepts: type) -> Any:
+    if isinstance(value, accepts) or type(value).__name__ == "Unknown":
+        return value
+    raise ValueError(f"expected a {accepts.__name__}, got {type(value).__name__}")
+
+
+def _scalar(scalar: Scalar, value: Any) -> Any:
+    if scalar == "string":
+        if isinstance(value, str):
+            return value
+    elif scalar == "bool":
+        if isinstance(value, bool):
+            return value
+    elif not isinstance(value, (bool, str, bytes)):
+        if scalar == "double" and hasattr(value, "__float__"):
+            return float(value)
+        if scalar == "int" and hasattr(value, "__index__"):
+            return int(value)
+    noun = {"double": "a number", "int": "a whole number", "bool": "True or False", "string": "a text"}[scalar]
+    raise ValueError(f"expected {noun}, got {value!r}")
+
+
+def real(unit: str | None = None, domain: str = "", *, legacy: bool = False) -> Value:
+    """Marker of one number with its unit and the domain a sane model keeps to."""
+    return Value("double", unit=unit, domain=domain, legacy=legacy)
+
+
+def vec3(unit: str | None = None, domain: str = "") -> Value:
+    """Marker of three numbers, a station or direction in the frame that the class names."""
+    return Value("double", "Vec3", unit=unit, domain=domain)
+
+
+def reals(unit: str | None = None, *, least: int = 0, most: int | None = None, legacy: bool = False) -> Value:
+    """Marker of a list of numbers."""
+    return Value("double", "list", unit=unit, least=least, most=most, legacy=legacy)
+
+
+Vec3 = tuple[float, float, float]
+Vec6 = tuple[float, float, float, float, float, float]
+Reals = tuple[float, ...]
+
+Flag = Annotated[bool, Value("bool")]
+Text = Annotated[str, Value("string")]
+Number = Annotated[float, Value("double")]
+Integer = Annotated[int, Value("int")]
+
+Single = Annotated[T, Held("single")]
+Unnamed = Annotated[T, Held("unnamed")]
+Optional = Annotated[T | None, Held("optional")]
+Many = Annotated[list[T], Held("list")]
+LegacyMany = Annotated[list[T], Held("list", legacy=True)]
+LegacyOptional = Annotated[T | None, Held("optional", legacy=True)]

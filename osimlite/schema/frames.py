@@ -1,0 +1,59 @@
+"""Frames and bodies: what can be attached to."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3
+from osimlite.schema.geometry import FrameGeometry, Geometry
+from osimlite.schema.references import PhysicalFrameSocket
+from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.wrapping import WrapObjectSet
+
+
+class Frame(ModelComponent, abstract=True):
+    """An orthogonal set of axes with an origin."""
+
+    frame_geometry: Single[FrameGeometry] = made(FrameGeometry, name="frame_geometry")
+    attached_geometry: Many[Geometry] = none()
+
+
+class PhysicalFrame(Frame, abstract=True):
+    """A frame fixed to a body or to ground."""
+
+    wrap_object_set: Unnamed[WrapObjectSet] = made(WrapObjectSet)
+
+
+class Ground(PhysicalFrame):
+    """The inertial frame, root of every multibody tree."""
+
+
+class Body(PhysicalFrame):
+    """A rigid body: mass, mass centre and inertia, in its own frame.
+
+    `inertia` is about the mass centre, in body axes, in the order xx yy zz xy xz yz.
+    """
+
+    mass: Annotated[float, real("kg", ">= 0")] = math.nan
+    mass_center: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    inertia: Annotated[Vec6, Value("double", "Vec6", "kg*m^2")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class PhysicalOffsetFrame(PhysicalFrame):
+    """A frame fixed in another physical frame, displaced by `translation` and turned by `orientation`.
+
+    `orientation` holds body-fixed X-Y-Z angles.
+    """
+
+    socket_parent: PhysicalFrameSocket = ""
+    translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+
+
+class BodySet(ModelComponentSet):
+    """The bodies of a model."""
+
+    objects: LegacyMany[Body] = none()
+    groups: LegacyMany[ObjectGroup] = none()

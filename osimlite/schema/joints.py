@@ -1,0 +1,140 @@
+"""Joints: how the child frame may move in the parent frame.
+
+The transform of M (child frame) in F (parent frame) is written X_FM; every class says what its coordinates are.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal, Self
+
+from pydantic import Field
+
+from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.fields import LegacyMany, Many, ObjectList, Vec3
+from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
+from osimlite.schema.references import PhysicalFrameSocket
+from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+
+MotionType = Literal["rotational", "translational", "coupled"]
+
+_ORIGIN: Vec3 = (0.0, 0.0, 0.0)
+
+
+class Joint(ModelComponent, abstract=True):
+    """Connects a child frame to a parent frame; `frames` holds the offset frames made for it."""
+
+    motion_types: ClassVar[tuple[MotionType, ...] | None] = None
+    """The motion of each coordinate in order, or None if the joint's own properties decide it."""
+
+    socket_parent_frame: PhysicalFrameSocket = ""
+    socket_child_frame: PhysicalFrameSocket = ""
+    coordinates: Many[Coordinate] = none()
+    frames: Many[PhysicalOffsetFrame] = none()
+
+    def between(
+        self,
+        parent: PhysicalFrame,
+        child: PhysicalFrame,
+        *,
+        at: Vec3 = _ORIGIN,
+        turned: Vec3 = _ORIGIN,
+        child_at: Vec3 = _ORIGIN,
+        child_turned: Vec3 = _ORIGIN,
+    ) -> Self:
+        """Connect `child` to `parent` through offset frames named ``<frame>_offset``, and return the joint.
+
+        Args:
+            parent: the frame the joint starts from.
+            child: the frame the joint moves.
+            at: where the joint is in the parent frame (m).
+            turned: how the joint is turned in the parent frame (body-fixed X-Y-Z angles, rad).
+            child_at: where the joint is in the child frame (m).
+            child_turned: how the joint is turned in the child frame (rad).
+        """
+        inner = PhysicalOffsetFrame(
+            name=f"{parent.name}_offset", socket_parent=parent, translation=at, orientation=turned
+        )
+        outer = PhysicalOffsetFrame(
+            name=f"{child.name}_offset", socket_parent=child, translation=child_at, orientation=child_turned
+        )
+        self.frames = [inner, outer]
+        self.socket_parent_frame = inner
+        self.socket_child_frame = outer
+        return self
+
+
+def _coordinates(count: int) -> Any:
+    """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out."""
+    return Field(
+        default_factory=lambda: ObjectList(Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count))
+    )
+
+
+class WeldJoint(Joint):
+    """No motion."""
+
+    motion_types = ()
+
+
+class PinJoint(Joint):
+    """Rotation about the common Z axis; coordinate rz."""
+
+    motion_types = ("rotational",)
+
+    coordinates: Many[Coordinate] = _coordinates(1)
+
+
+class SliderJoint(Joint):
+    """Translation along the common X axis; coordinate tx."""
+
+    motion_types = ("translational",)
+
+    coordinates: Many[Coordinate] = _coordinates(1)
+
+
+class PlanarJoint(Joint):
+    """Motion in the parent's XY plane; coordinates rz, tx, ty, the translation along the parent's axes."""
+
+    motion_types = ("rotational", "translational", "translational")
+
+    coordinates: Many[Coordinate] = _coordinates(3)
+
+
+class UniversalJoint(Joint):
+    """Body-fixed rotations about X, then Y; coordinates rx, ry."""
+
+    motion_types = ("rotational", "rotational")
+
+    coordinates: Many[Coordinate] = _coordinates(2)
+
+
+class GimbalJoint(Joint):
+    """Body-fixed rotations about X, Y, Z; the generalized speeds are the rates of the angles."""
+
+    motion_types = ("rotational", "rotational", "rotational")
+
+    coordinates: Many[Coordinate] = _coordinates(3)
+
+
+class BallJoint(Joint):
+    """Body-fixed rotations about X, Y, Z; the generalized speeds are the angular velocity of M in F, along F."""
+
+    motion_types = ("rotational", "rotational", "rotational")
+
+    coordinates: Many[Coordinate] = _coordinates(3)
+
+
+class FreeJoint(Joint):
+    """Six degrees of freedom: rx, ry, rz as a BallJoint, then tx, ty, tz along the parent's axes."""
+
+    motion_types = ("rotational", "rotational", "rotational", "translational", "translational", "translational")
+
+    coordinates: Many[Coordinate] = _coordinates(6)
+
+
+class JointSet(ModelComponentSet):
+    """The joints of a model."""
+
+    objects: LegacyMany[Joint] = none()
+    groups: LegacyMany[ObjectGroup] = none()

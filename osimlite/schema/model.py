@@ -1,0 +1,104 @@
+"""Model: the root of the component tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
+
+from osimlite.errors import ModelError
+from osimlite.schema.base import Component, ModelComponent, made
+from osimlite.schema.constraints import ConstraintSet
+from osimlite.schema.contact import ContactGeometrySet
+from osimlite.schema.controllers import ControllerSet
+from osimlite.schema.fields import Single, Text, Unnamed, Vec3, epoch, real, vec3
+from osimlite.schema.forces import ForceSet
+from osimlite.schema.frames import BodySet, Ground
+from osimlite.schema.geometry import ModelVisualPreferences
+from osimlite.schema.joints import JointSet
+from osimlite.schema.markers import MarkerSet
+from osimlite.schema.probes import ProbeSet
+from osimlite.schema.sets import ComponentSet
+from osimlite.schema.wrapping import WrapObjectSet
+
+if TYPE_CHECKING:
+    from osimlite.schema.tree import Tree
+
+C = TypeVar("C", bound=Component)
+
+CURRENT_VERSION = 40600
+"""The document version that OpenSim 4.6 writes, and so do we."""
+
+
+class Model(ModelComponent):
+    """A musculoskeletal or mechanical model. `gravity` is in ground; the units texts are words for people."""
+
+    __slots__ = ("_tree",)
+
+    assembly_accuracy: Annotated[float, real(domain="> 0")] = 1e-9
+    ground: Single[Ground] = made(
+        Ground, name="ground", wrap_object_set=lambda: WrapObjectSet.build({"name": "wrapobjectset"}, set())
+    )
+    gravity: Annotated[Vec3, vec3("m/s^2")] = (0.0, -9.80665, 0.0)
+    credits: Text = "Frank Anderson, Peter Loan, Ayman Habib, Ajay Seth, Michael Sherman"
+    publications: Text = "List of publications related to model..."
+    length_units: Text = "meters"
+    force_units: Text = "N"
+    body_set: Unnamed[BodySet] = made(BodySet, name="bodyset")
+    joint_set: Unnamed[JointSet] = made(JointSet, name="jointset")
+    controller_set: Unnamed[ControllerSet] = made(ControllerSet, name="controllerset")
+    constraint_set: Unnamed[ConstraintSet] = made(ConstraintSet, name="constraintset")
+    force_set: Unnamed[ForceSet] = made(ForceSet, name="forceset")
+    marker_set: Unnamed[MarkerSet] = made(MarkerSet, name="markerset")
+    contact_geometry_set: Unnamed[ContactGeometrySet] = made(ContactGeometrySet, name="contactgeometryset")
+    probe_set: Unnamed[ProbeSet] = made(ProbeSet, name="probeset")
+    component_set: Unnamed[ComponentSet] = made(ComponentSet, name="componentset")
+    model_visual_preferences: Unnamed[ModelVisualPreferences] = made(
+        ModelVisualPreferences, name="modelvisualpreferences"
+    )
+
+    @property
+    def document_version(self) -> int:
+        """The version of the document the model was read from; the current one for a model made in Python."""
+        version = self.layout.version if self.layout is not None else None
+        return CURRENT_VERSION if version is None else version
+
+    def tree(self) -> Tree:
+        """The index of all components by path, made anew whenever any model has changed."""
+        from osimlite.schema.tree import Tree
+
+        known = getattr(self, "_tree", None)
+        if known is None or known.epoch != epoch.count:
+            known = Tree(self)
+            object.__setattr__(self, "_tree", known)
+        return cast("Tree", known)
+
+    def components(self) -> Iterator[Component]:
+        """Yield every component of the tree in OpenSim's order, parents first; the model itself comes first."""
+        return iter(self.tree().components)
+
+    def find(self, path: str) -> Component:
+        """The component at an absolute path, or at a path from the model.
+
+        Raises:
+            ModelError: nothing is there; the message names the nearest path.
+        """
+        return self.tree().at(path)
+
+    def add(self, *components: C) -> C:
+        """Add components to the sets they belong in, in order, and return the first of them.
+
+        Raises:
+            ModelError: the component is of a kind that no set of a model takes.
+        """
+        for component in components:
+            for spec, holder in self.objects_held():
+                members = type(holder).field_specs().get("objects")
+                if members is not None and spec.name != "component_set" and isinstance(component, members.accepts):  # type: ignore[arg-type]
+                    cast("Any", holder).objects.append(component)
+                    break
+            else:
+                if not isinstance(component, ModelComponent):
+                    raise ModelError(f"a model has no place for a {type(component).__name__}")
+                self.component_set.objects.append(component)
+            object.__setattr__(component, "_model", self)
+        return components[0]

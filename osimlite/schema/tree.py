@@ -1,0 +1,360 @@
+"""The component tree of a model: paths, and the rules by which a text resolves to a component.
+
+Every rule is OpenSim 4.6's (``schemas/references.json`` names the source of each): sockets walk exactly, other
+properties look a bare name up in one set, and nothing searches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from osimlite.errors import ModelError
+from osimlite.schema.base import Component, FieldSpec, Object, field_specs
+from osimlite.schema.fields import Held, Reference, epoch
+from osimlite.schema.sets import ModelComponentSet
+from osimlite.text import did_you_mean
+
+if TYPE_CHECKING:
+    from osimlite.schema.model import Model
+
+Failure = Literal["missing", "wrong-type", "empty", "illegal"]
+
+ILLEGAL_CHARACTERS = "\\*+ \t\n/"
+"""Characters OpenSim refuses in the name of a component."""
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """What a reference leads to.
+
+    `target` is the component, or None with the `failure`: nothing there, a component of another class (`found`), no
+    text, or a text that is not a path.
+    """
+
+    target: Component | None
+    failure: Failure | None = None
+    found: Component | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Renamed:
+    """A component that OpenSim renames because a sibling has the same name."""
+
+    component: Component
+    name: str
+    first: Component
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """One reference in a model: `holder` has the property, `owner` is the component that holds `holder`.
+
+    `position` is the index of the word in a list, else None.
+    """
+
+    holder: Object
+    owner: Component
+    spec: FieldSpec
+    value: str | Component
+    position: int | None = None
+
+    @property
+    def reference(self) -> Reference:
+        """The kind of the reference."""
+        assert isinstance(self.spec.kind, Reference)
+        return self.spec.kind
+
+
+class Tree:
+    """Index of one model: component by path, path by component, children, and the names each rule looks up."""
+
+    def __init__(self, model: Model) -> None:
+        self.epoch = epoch.count
+        self.model = model
+        self.components: list[Component] = []
+        self.by_path: dict[str, Component] = {}
+        self.renamed: list[Renamed] = []
+        self._paths: dict[int, str] = {}
+        self._parents: dict[int, Component] = {}
+        self._owners: dict[int, Component] = {}
+        self._names: dict[str, dict[str, Component]] = {}
+        self._place(model, "", None)
+
+    def path_of(self, component: Object) -> str | None:
+        """The absolute path of a component, None if it is not in this tree."""
+        return self._paths.get(id(component))
+
+    def parent_of(self, component: Component) -> Component | None:
+        """The component above, None for the model."""
+        return self._parents.get(id(component))
+
+    def owner_of(self, item: Object) -> Component:
+        """The component that an object without a path belongs to; a component owns itself."""
+        return item if isinstance(item, Component) else self._owners[id(item)]
+
+    def at(self, path: str) -> Component:
+        """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
+        found = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
+        if found is None:
+            raise ModelError(f"no component at '{path}'{did_you_mean(path, self.by_path)}")
+        return found
+
+    def uses(self) -> Iterator[Use]:
+        """Yield every reference of the model that has a text or a component, in tree order."""
+        for owner in self.components:
+            for holder in self._objects_of(owner):
+                for spec in field_specs(type(holder)).values():
+                    if not isinstance(spec.kind, Reference):
+                        continue
+                    value = getattr(holder, spec.name)
+                    if isinstance(value, tuple):
+                        for position, word in enumerate(value):
+                            yield Use(holder, owner, spec, word, position)
+                    elif value is not None:
+                        yield Use(holder, owner, spec, value)
+
+    def resolve(self, use: Use) -> Resolution:
+        """Follow one reference by OpenSim's rule for its property."""
+        if isinstance(use.value, Component):
+            known = self.path_of(use.value) is not None
+            return self._typed(use.value if known else None, use.reference.target)
+        return self.lookup(use.reference, use.value, use.owner)
+
+    def lookup(self, reference: Reference, text: str, owner: Component) -> Resolution:
+        """Follow `text` as the value of a property of `owner` with this kind of reference."""
+        return _RULES[reference.rule](self, text.strip(), owner, reference.target)
+
+    def target(self, owner: Component, name: str, value: str | Component) -> Component:
+        """The component that property `name` of `owner` leads to, for code that needs it to be there.
+
+        Raises:
+            ModelError: it leads nowhere.
+        """
+        spec = field_specs(type(owner))[name]
+        use = Use(owner, owner, spec, value)
+        found = self.resolve(use).target
+        if found is None:
+            text = value if isinstance(value, str) else value.name
+            raise ModelError(
+                f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} names '{text}', "
+                f"but the model has no such {use.reference.target}{did_you_mean(text, self.spellings(use))}"
+            )
+        return found
+
+    def text_for(self, owner: Component, reference: Reference, component: Component) -> str:
+        """The text by which a property of `owner` names `component`, as OpenSim writes it."""
+        path = self.path_of(component)
+        if path is None:
+            raise ModelError(
+                f"'{owner.name}' names {type(component).__name__} '{component.name}', which is not in the model; "
+                "add it to the model first"
+            )
+        if reference.rule in ("socket", "owner-path"):
+            base = self.path_of(owner) or "/"
+            return path[len(base) + 1 :] if path.startswith(base + "/") and base != "/" else path
+        if reference.rule in ("model-path", "file", "input"):
+            return path
+        parent = self.parent_of(component)
+        bare = path.rsplit("/", 1)[1]
+        wanted = {"contactgeometry-path-or-name": "contactgeometryset", "frame-path-or-body-name": "bodyset"}
+        if reference.rule in wanted and (parent is None or self.path_of(parent) != "/" + wanted[reference.rule]):
+            return path
+        return bare
+
+    def spellings(self, use: Use) -> list[str]:
+        """Every text that would be right in this place, the shortest form of each component."""
+        reference = use.reference
+        names = set()
+        for component in self.components:
+            if reference.rule == "own-joint-coordinate" and self._parents.get(id(component)) is not use.owner:
+                continue
+            if is_a(component, reference.target):
+                text = self.text_for(use.owner, reference, component)
+                if self.lookup(reference, text, use.owner).target is component:
+                    names.add(text)
+        return sorted(names)
+
+    def _place(self, component: Component, path: str, parent: Component | None) -> None:
+        self.components.append(component)
+        self.by_path[path or "/"] = component
+        self._paths[id(component)] = path or "/"
+        object.__setattr__(component, "_model", self.model)
+        if parent is not None:
+            self._parents[id(component)] = parent
+        taken: dict[str, Component] = {}
+        for name, child in self._children(component, component):
+            unique = self._unique(name, taken)
+            if unique != name:
+                self.renamed.append(Renamed(child, unique, taken[name]))
+            taken[unique] = child
+            self._place(child, f"{path}/{unique}", component)
+
+    @staticmethod
+    def _unique(name: str, taken: dict[str, Component]) -> str:
+        unique, count = name, 0
+        while unique in taken:
+            unique, count = f"{name}_{count}", count + 1
+        return unique
+
+    def _children(self, holder: Object, owner: Component) -> Iterator[tuple[str, Component]]:
+        """Yield name and component of the children; objects without a path add no level."""
+        for spec, item in holder.objects_held():
+            if isinstance(item, Component):
+                yield _name_in_tree(spec, item), item
+            else:
+                self._owners[id(item)] = owner
+                yield from self._children(item, owner)
+
+    def _objects_of(self, owner: Component) -> Iterator[Object]:
+        """Yield a component and the objects without a path that belong to it."""
+        pending: list[Object] = [owner]
+        while pending:
+            holder = pending.pop(0)
+            yield holder
+            pending.extend(item for _, item in holder.objects_held() if not isinstance(item, Component))
+
+    def _typed(self, found: Component | None, target: str) -> Resolution:
+        if found is None:
+            return Resolution(None, "missing")
+        if not is_a(found, target) and type(found).__name__ != "Unknown":
+            return Resolution(None, "wrong-type", found)
+        return Resolution(found)
+
+    def _walk(self, text: str, base: str, target: str) -> Resolution:
+        path = normalised(text if text.startswith("/") else f"{base}/{text}")
+        if path is None:
+            return Resolution(None, "illegal")
+        return self._typed(self.by_path.get(path), target)
+
+    def _named(self, key: str, members: Callable[[], Iterator[tuple[str, Component]]]) -> dict[str, Component]:
+        if key not in self._names:
+            names: dict[str, Component] = {}
+            for name, component in members():
+                names.setdefault(name, component)
+            self._names[key] = names
+        return self._names[key]
+
+    def _of_class(self, target: str) -> dict[str, Component]:
+        return self._named(
+            target, lambda: ((_last(self._paths[id(c)]), c) for c in self.components if is_a(c, target))
+        )
+
+    def _members(self, path: str, target: str) -> dict[str, Component]:
+        holder = self.by_path.get(path)
+
+        def members() -> Iterator[tuple[str, Component]]:
+            for component in self.components:
+                if self._parents.get(id(component)) is holder and is_a(component, target):
+                    yield _last(self._paths[id(component)]), component
+
+        return self._named(f"{path}:{target}", members)
+
+    def _wrap_objects(self) -> dict[str, Component]:
+        return self._of_class("WrapObject")
+
+
+def is_a(component: Object, target: str) -> bool:
+    """Whether the component's class is `target` or derives from it."""
+    return any(base.__name__ == target for base in type(component).__mro__)
+
+
+def normalised(path: str) -> str | None:
+    """An absolute path without doubled slashes, ``.`` and ``..``; None if it climbs above the root."""
+    parts: list[str] = []
+    for part in path.split("/"):
+        if part in ("", "."):
+            continue
+        if part == "..":
+            if not parts:
+                return None
+            parts.pop()
+        else:
+            parts.append(part)
+    return "/" + "/".join(parts)
+
+
+def _last(path: str) -> str:
+    return path.rsplit("/", 1)[1] or "/"
+
+
+def _name_in_tree(spec: FieldSpec, item: Component) -> str:
+    form = spec.kind.form if isinstance(spec.kind, Held) else ""
+    if isinstance(item, ModelComponentSet) and form == "unnamed":
+        return type(item).__name__.lower()
+    if form == "single":
+        return spec.tag
+    return item.name or str(getattr(item, "class_name", "") or type(item).tag).lower()
+
+
+def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    if not text:
+        return Resolution(None, "empty")
+    if any(character in text for character in ILLEGAL_CHARACTERS[:-1]):
+        return Resolution(None, "illegal")
+    base = tree.path_of(owner) or "/"
+    return tree._walk(text, "" if base == "/" else base, target)
+
+
+def _model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    return tree._walk(text, "", target) if text else Resolution(None, "empty")
+
+
+def _path_or_member(set_path: str) -> Callable[[Tree, str, Component, str], Resolution]:
+    """First a path from the model, then OpenSim appends the text to the path of the set."""
+
+    def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+        if not text:
+            return Resolution(None, "empty")
+        first = tree._walk(text, "", target)
+        if first.target is not None:
+            return first
+        second = tree._walk(f"{set_path}/{text}", "", target)
+        return second if second.target is not None or second.failure == "wrong-type" else first
+
+    return rule
+
+
+def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Callable[..., Resolution]:
+    """A bare name among `members`; a path is no name."""
+
+    def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+        if not text:
+            return Resolution(None, "empty")
+        found = members(tree, owner, target).get(text)
+        if found is None:
+            other = next((c for c in tree.components if _last(tree.path_of(c) or "/") == text), None)
+            return Resolution(None, "missing" if other is None else "wrong-type", other)
+        return Resolution(found)
+
+    return rule
+
+
+def _nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    """Files, columns and positions name nothing in the component tree."""
+    return Resolution(owner)
+
+
+_RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
+    "socket": _socket,
+    "owner-path": _socket,
+    "model-path": _model_path,
+    "coordinate-name": _bare(lambda tree, owner, target: tree._of_class("Coordinate")),
+    "body-name": _bare(lambda tree, owner, target: tree._members("/bodyset", "Body")),
+    "joint-name": _bare(lambda tree, owner, target: tree._members("/jointset", "Joint")),
+    "actuator-name": _bare(lambda tree, owner, target: tree._members("/forceset", "Actuator")),
+    "muscle-name": _bare(lambda tree, owner, target: tree._members("/forceset", "Muscle")),
+    "wrap-object-name": _bare(lambda tree, owner, target: tree._wrap_objects()),
+    "own-joint-coordinate": _bare(
+        lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Coordinate")
+    ),
+    "set-member": _bare(lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Component")),
+    "frame-path-or-body-name": _path_or_member("/bodyset"),
+    "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),
+    "input": _nothing_to_resolve,
+    "file": _nothing_to_resolve,
+    "column": _nothing_to_resolve,
+    "positional": _nothing_to_resolve,
+    "point-index": _nothing_to_resolve,
+}

@@ -1,0 +1,33 @@
+"""Sentences for people: nearest names and short lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | None:
+    """The known name most like `word` (rapidfuzz's weighted ratio, case ignored), or None if none is near."""
+    from rapidfuzz import fuzz, process
+
+    choices = list(known)
+    exact_but_case = [choice for choice in choices if choice.lower() == word.lower()]
+    if exact_but_case:
+        return exact_but_case[0]
+    found = process.extractOne(word, choices, scorer=fuzz.ratio, processor=str.lower, score_cutoff=cutoff)
+    return found[0] if found else None
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """``"; did you mean 'x'?"``, or an empty text if nothing is near."""
+    found = nearest(word, known)
+    return f"; did you mean '{found}'?" if found else ""
+
+
+def listed(words: Iterable[str], *, most: int = 8) -> str:
+    """``"a, b and c"``, cut after `most` words."""
+    items = list(words)
+    if len(items) > most:
+        items = [*items[:most], f"{len(items) - most} more"]
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} and {items[-1]}"
