@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 
 class OsimliteError(Exception):
     """Base of every error osimlite raises on purpose.
@@ -12,6 +14,9 @@ class OsimliteError(Exception):
         line: 1-based line in that file.
         column: 1-based column, counted in characters.
     """
+
+    exit_code: ClassVar[int] = 2
+    """What the command line exits with: 1 if the answer is no, 2 if the command could not be carried out."""
 
     def __init__(
         self, message: str, *, file: str | None = None, line: int | None = None, column: int | None = None
@@ -30,9 +35,19 @@ class OsimliteError(Exception):
 class DocumentError(OsimliteError):
     """The text cannot be read as an OpenSim document."""
 
+    exit_code = 1
+
+
+class MissingFileError(DocumentError):
+    """A file is not there or may not be read."""
+
+    exit_code = 2
+
 
 class ModelError(OsimliteError):
     """The model says something that cannot be, or names something that is not there."""
+
+    exit_code = 1
 
 
 class MissingNameError(ModelError, AttributeError):
@@ -42,9 +57,13 @@ class MissingNameError(ModelError, AttributeError):
 class SimulationError(OsimliteError):
     """The motion cannot be computed any further."""
 
+    exit_code = 1
+
 
 class UnsupportedError(OsimliteError):
     """The model uses something this version cannot do; the message names it."""
+
+    exit_code = 1
 
 
 class MissingDependency(OsimliteError):

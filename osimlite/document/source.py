@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.errors import DocumentError
+from osimlite.errors import MissingFileError
 
 
 class Position(NamedTuple):
@@ -57,13 +57,13 @@ class Source:
         """Read a file.
 
         Raises:
-            DocumentError: it is missing or cannot be read.
+            MissingFileError: it is missing or cannot be read.
         """
         try:
             return cls(Path(path).read_bytes(), str(path))
         except OSError as error:
             reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-            raise DocumentError(f"cannot read the file: {reason}", file=str(path)) from None
+            raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
 
     @cached_property
     def spans(self) -> list[Span]:

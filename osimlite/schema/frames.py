@@ -19,6 +19,13 @@ class Frame(ModelComponent, abstract=True):
     frame_geometry: Single[FrameGeometry] = made(FrameGeometry, name="frame_geometry")
     attached_geometry: Many[Geometry] = none()
 
+    def attach(self, *shapes: Geometry) -> None:
+        """Draw shapes in this frame; one without a name is called ``<frame>_geom_<number>`` as OpenSim does."""
+        for shape in shapes:
+            self.attached_geometry.append(shape)
+            if not shape.name:
+                shape.name = f"{self.name}_geom_{len(self.attached_geometry)}"
+
 
 class PhysicalFrame(Frame, abstract=True):
     """A frame fixed to a body or to ground."""

@@ -1,0 +1,8 @@
+"""Models written in the library's own words, ready to build."""
+
+from __future__ import annotations
+
+BUILT_IN = {
+    "dynamic-walker": "osimlite.models.dynamic_walker:dynamic_walker",
+}
+"""Name on the command line, and where the function is that makes the model."""
