@@ -177,7 +177,7 @@ def _legacy_list(read: Callable[[str], Any]) -> Callable[[str], Any]:
     plain = _words(read, 0, None)
 
     def convert(raw: str) -> Any:
-        if "," not in raw and not raw.lstrip()[:1] in ("(", "[", "{"):
+        if "," not in raw and raw.lstrip()[:1] not in ("(", "[", "{"):
             return plain(raw)
         stripped = raw.strip()
         if stripped[:1] + stripped[-1:] in ("()", "[]", "{}"):

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from lxml import etree
 
@@ -131,6 +131,8 @@ class Step(NamedTuple):
     spec: FieldSpec
 
 
+Read = TypeVar("Read", bound=Object)
+
 _TEXT, _ONE, _WRAPPED, _LIST = range(4)
 
 
@@ -171,7 +173,7 @@ class _Reader:
         model: Model | None = None
         pending: list[Remark] = []
         for child in root:
-            if not isinstance(child.tag, str):
+            if not _is_element(child):
                 self._comment(child, pending)
             elif model is not None:
                 self.notes.append(Note("second-object", self.count, child.tag))
@@ -192,7 +194,7 @@ class _Reader:
             _layout_of(model).before.setdefault(None, []).extend(pending)
         return model
 
-    def object(self, element: etree._Element, cls: type[Any], name: str | None = None) -> Any:
+    def object(self, element: etree._Element, cls: type[Read], name: str | None = None) -> Read:
         """Read one element as an instance of `cls`; `name` overrides the attribute."""
         number = self.count
         self.count = number + 1
@@ -206,7 +208,7 @@ class _Reader:
         for child in element:
             step = steps.get(child.tag)
             if step is None:
-                if isinstance(child.tag, str):
+                if _is_element(child):
                     spec = self._indirect(child, cls, values, present, pending, late)
                     if spec is not None and pending:
                         before[spec.tag] = pending
@@ -257,7 +259,7 @@ class _Reader:
             present.add("name")
         built = cls.build(values, present, number)
         if len(attributes) > 1 or (attributes and not given and "name" not in attributes):
-            for key, text in attributes.items():
+            for key, text in ((str(key), str(text)) for key, text in attributes.items()):
                 if key != "name":
                     _layout_of(built).attributes[key] = text
                     kind = "include" if key == "file" else "unknown-attribute"
@@ -267,7 +269,9 @@ class _Reader:
         if before:
             _layout_of(built).before = before
         if raw:
-            defaults = {key: (getattr(built, key) if value is None else value, text) for key, (value, text) in raw.items()}
+            defaults = {
+                key: (getattr(built, key) if value is None else value, text) for key, (value, text) in raw.items()
+            }
             _layout_of(built).raw = defaults
         for kind, where, word, spec, value in late:
             self.notes.append(Note(kind, where, word, built, spec, value))
@@ -280,7 +284,7 @@ class _Reader:
         assert spec.accepts is not None
         for child in wrapper:
             tag = child.tag
-            if not isinstance(tag, str):
+            if not _is_element(child):
                 self._comment(child, pending)
                 continue
             cls = class_for(tag.replace(_STAND_IN, "::"))
@@ -341,7 +345,7 @@ class _Reader:
 
     def _text_of(self, element: etree._Element, number: int, spec: FieldSpec, late: list[tuple[Any, ...]]) -> str:
         """The text of a value element that has comments or, wrongly, elements inside."""
-        inner = [node for node in element if isinstance(node.tag, str)]
+        inner = [node for node in element if _is_element(node)]
         if inner:
             late.append(("child-in-value", number, inner[0].tag, spec, None))
             self.count += sum(_size(node) for node in inner)
@@ -352,6 +356,11 @@ class _Reader:
         text = node.text or ""
         if isinstance(node, etree._Comment) and not is_generated(text):
             pending.append(Remark(text, False))
+
+
+def _is_element(node: etree._Element) -> bool:
+    """Whether a node is an element, and no comment or processing instruction (whose tag is a function)."""
+    return type(node.tag) is str
 
 
 def _layout_of(item: Object) -> Layout:

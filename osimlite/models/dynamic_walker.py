@@ -1,7 +1,7 @@
 """The exercise "Building a Dynamic Walker": a passive walker with knees on a slope.
 
-Six rigid bodies: the platform, and on it a pelvis that carries two legs of thigh and shank, hinged in the sagittal plane.
-Nothing drives it but gravity; it stands on its feet, knees and hips through Hunt-Crossley contact, and coordinate
+Six rigid bodies: the platform, and on it a pelvis that carries two legs of thigh and shank, hinged in the sagittal
+plane. Nothing drives it but gravity; it stands on its feet, knees and hips through Hunt-Crossley contact, and coordinate
 limit forces stop hips and knees.
 """
 
@@ -65,18 +65,14 @@ def dynamic_walker(
     )
     hips, knees = [], []
     for (side, z, angle), thigh in zip(SIDES, thighs, strict=True):
-        hip = Coordinate(
-            name=f"{side[0]}Hip_rz", range=(radians(-100), radians(100)), default_value=radians(angle)
-        )
+        hip = Coordinate(name=f"{side[0]}Hip_rz", range=(radians(-100), radians(100)), default_value=radians(angle))
         joint = PinJoint(name=f"{side}ThighToPelvis", coordinates=[hip])
         model.add(joint.between(pelvis, thigh, at=(0.0, 0.0, z * pelvis_width), child_at=(0.0, thigh_length / 2, 0.0)))
         hips.append(hip)
     for (side, _, _), thigh, shank in zip(SIDES, thighs, shanks, strict=True):
         knee = Coordinate(name=f"{side[0]}Knee_rz", range=(radians(-100), 0.0), default_value=radians(-30))
         joint = PinJoint(name=f"{side}ShankToThigh", coordinates=[knee])
-        model.add(
-            joint.between(thigh, shank, at=(0.0, -thigh_length / 2, 0.0), child_at=(0.0, shank_length / 2, 0.0))
-        )
+        model.add(joint.between(thigh, shank, at=(0.0, -thigh_length / 2, 0.0), child_at=(0.0, shank_length / 2, 0.0)))
         knees.append(knee)
 
     # The exercise turns the plane by -1.57, not by a right angle, and lays it at half the brick's height.

@@ -68,11 +68,13 @@ def _function(source: str) -> Callable[..., Any]:
 def _module_of_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise MissingFileError("cannot read the file: no such file", file=str(path))
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    # A name of our own, so that a model in json.py does not take the place of a module that others import.
+    name = f"_osimlite_source_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.path.insert(0, str(path.resolve().parent))
-    sys.modules[path.stem] = module
+    sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
     except OsimliteError:
@@ -137,13 +139,13 @@ def _arguments(function: Callable[..., Any], parameters: Mapping[str, str], sour
 
 def _value(name: str, text: str, parameter: inspect.Parameter) -> Any:
     default = parameter.default
-    kind = type(default) if default not in (inspect.Parameter.empty, None) else None
+    kind: type | None = None if default in (inspect.Parameter.empty, None) else type(default)
     try:
         if kind is bool:
             return _WORDS[text.lower()]
-        if kind in (int, str):
-            return kind(text)
-        return float(text)
+        if kind is int:
+            return int(text)
+        return text if kind is str else float(text)
     except (KeyError, ValueError):
         if kind is None:
             return text

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -168,7 +168,7 @@ class Object(BaseModel):
     @property
     def layout(self) -> Layout | None:
         """What the file said about this object beyond its properties."""
-        return self._layout  # type: ignore[no-any-return, attr-defined]
+        return cast("Layout | None", self._layout)
 
     @property
     def is_component(self) -> bool:
@@ -224,13 +224,13 @@ class Object(BaseModel):
     __hash__ = None  # type: ignore[assignment]
 
     def __copy__(self) -> Self:
-        return _carry(self, super().__copy__(), self._layout)
+        return cast("Self", _carry(self, super().__copy__(), self._layout))
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         memo = {} if memo is None else memo
         clone = _carry(self, super().__deepcopy__(memo), copy.deepcopy(self._layout, memo))
         memo[id(self)] = clone
-        return clone
+        return cast("Self", clone)
 
     def __getstate__(self) -> dict[Any, Any]:
         return {**super().__getstate__(), "layout": self._layout, "index": self._index}
@@ -259,12 +259,13 @@ class Component(Object, abstract=True):
 
     @property
     def is_component(self) -> bool:
+        """True: a component has a path."""
         return True
 
     @property
     def model(self) -> Model | None:
         """The model this component was last seen in."""
-        return self._model  # type: ignore[no-any-return, attr-defined]
+        return cast("Model | None", self._model)
 
     @property
     def path(self) -> str:
@@ -288,10 +289,6 @@ class Unknown(ModelComponent):
 
     class_name: str = ""
     content: str = ""
-
-    @property
-    def is_component(self) -> bool:
-        return True
 
 
 _set = object.__setattr__

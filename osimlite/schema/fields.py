@@ -67,6 +67,7 @@ class Value(Kind):
         return _FIXED_SIZE.get(self.shape)
 
     def check(self, value: Any, accepts: type | None) -> Any:
+        """Return the number, switch or text, or a tuple of them; ValueError if it is none."""
         if self.shape == "single":
             return _scalar(self.scalar, value)
         if self.shape == "optional":
@@ -107,6 +108,7 @@ class Reference(Kind):
     legacy: bool = False
 
     def check(self, value: Any, accepts: type | None) -> Any:
+        """Return the text or the component, or a tuple of them; ValueError if a component is of another class."""
         if self.shape == "list":
             if isinstance(value, str) or not isinstance(value, Iterable):
                 raise ValueError(f"expected a list of {self.target} components or their names, got {value!r}")
@@ -136,6 +138,7 @@ class Held(Kind):
     legacy: bool = False
 
     def check(self, value: Any, accepts: type | None) -> Any:
+        """Return the object, or a list that notes its changes; ValueError if an object is of another class."""
         assert accepts is not None
         if self.form == "list":
             if isinstance(value, str) or not isinstance(value, Iterable):
@@ -174,9 +177,20 @@ epoch = Epoch()
 
 
 class ObjectList(list[T]):
-    """A list of objects that notes every change, so that paths and look-ups stay right."""
+    """A list of objects that notes every change, so that paths and look-ups stay right.
+
+    Two objects with the same properties are equal but not the same: `index` and `remove` go by identity.
+    """
 
     __slots__ = ()
+
+    def index(self, value: T, *limits: Any) -> int:
+        """Position of this very object; ValueError if it is not here."""
+        return [id(item) for item in self].index(id(value), *limits)
+
+    def remove(self, value: T) -> None:
+        """Take this very object out; ValueError if it is not here."""
+        del self[self.index(value)]
 
 
 def _noting(name: str) -> Callable[..., Any]:
@@ -191,7 +205,7 @@ def _noting(name: str) -> Callable[..., Any]:
     return method
 
 
-for _name in ("append", "extend", "insert", "remove", "pop", "clear", "sort", "reverse", "__setitem__", "__delitem__"):
+for _name in ("append", "extend", "insert", "pop", "clear", "sort", "reverse", "__setitem__", "__delitem__"):
     setattr(ObjectList, _name, _noting(_name))
 for _name in ("__iadd__", "__imul__"):
     setattr(ObjectList, _name, _noting(_name))
@@ -245,6 +259,16 @@ def reals(unit: str | None = None, *, least: int = 0, most: int | None = None, l
     return Value("double", "list", unit=unit, least=least, most=most, legacy=legacy)
 
 
+def maybe(unit: str | None = None, domain: str = "") -> Value:
+    """Marker of a number that may be left out."""
+    return Value("double", "optional", unit=unit, domain=domain)
+
+
+def word(*choices: str) -> Value:
+    """Marker of a text of which only some words have a meaning."""
+    return Value("string", choices=choices)
+
+
 Vec3 = tuple[float, float, float]
 Vec6 = tuple[float, float, float, float, float, float]
 Reals = tuple[float, ...]
@@ -253,6 +277,9 @@ Flag = Annotated[bool, Value("bool")]
 Text = Annotated[str, Value("string")]
 Number = Annotated[float, Value("double")]
 Integer = Annotated[int, Value("int")]
+Vector = Annotated[Reals, Value("double", "vector")]
+LegacyReals = Annotated[Reals, reals(legacy=True)]
+MaybeFlag = Annotated[bool | None, Value("bool", "optional")]
 
 Single = Annotated[T, Held("single")]
 Unnamed = Annotated[T, Held("unnamed")]

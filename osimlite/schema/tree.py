@@ -237,9 +237,7 @@ class Tree:
         return self._names[key]
 
     def _of_class(self, target: str) -> dict[str, Component]:
-        return self._named(
-            target, lambda: ((_last(self._paths[id(c)]), c) for c in self.components if is_a(c, target))
-        )
+        return self._named(target, lambda: ((_last(self._paths[id(c)]), c) for c in self.components if is_a(c, target)))
 
     def _members(self, path: str, target: str) -> dict[str, Component]:
         holder = self.by_path.get(path)
@@ -346,9 +344,7 @@ _RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "actuator-name": _bare(lambda tree, owner, target: tree._members("/forceset", "Actuator")),
     "muscle-name": _bare(lambda tree, owner, target: tree._members("/forceset", "Muscle")),
     "wrap-object-name": _bare(lambda tree, owner, target: tree._wrap_objects()),
-    "own-joint-coordinate": _bare(
-        lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Coordinate")
-    ),
+    "own-joint-coordinate": _bare(lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Coordinate")),
     "set-member": _bare(lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Component")),
     "frame-path-or-body-name": _path_or_member("/bodyset"),
     "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),

@@ -1,0 +1,89 @@
+"""Model to text."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import re
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.errors import ModelError, OsimliteError
+from osimlite.schema.contact import ContactSphere
+from osimlite.schema.frames import Body
+from osimlite.schema.joints import PinJoint
+from osimlite.schema.model import Model
+
+
+def without_comments(text: str) -> str:
+    return re.sub(r"[ \t]*<!--.*?-->\n", "", text, flags=re.DOTALL)
+
+
+def test_the_reference_file_comes_back_byte_for_byte(fixtures: Path, tmp_path: Path) -> None:
+    reference = fixtures / "walker" / "DynamicWalkerModel.osim"
+    osimlite.write(osimlite.read(reference), tmp_path / "out.osim", numbers="opensim")
+    assert (tmp_path / "out.osim").read_bytes().decode() == without_comments(reference.read_text())
+
+
+def test_shortest_numbers_read_back_equal(fixtures: Path) -> None:
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    text = osimlite.to_text(model)
+    assert "<radius>0.05</radius>" in text
+    assert osimlite.read_text(text) == model
+    assert osimlite.to_text(osimlite.read_text(text)) == text
+
+
+def test_copies_print_the_same(fixtures: Path) -> None:
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    text = osimlite.to_text(model)
+    assert osimlite.to_text(copy.deepcopy(model)) == text
+    assert osimlite.to_text(pickle.loads(pickle.dumps(model))) == text
+
+
+def test_components_given_as_references_become_the_right_text() -> None:
+    model = Model(name="m")
+    a, b = model.add(Body(name="a", mass=1.0), Body(name="b", mass=1.0)), model.find("/bodyset/b")
+    assert isinstance(b, Body)
+    model.add(PinJoint(name="j").between(a, b, at=(1.0, 0.0, 0.0)))
+    model.add(PinJoint(name="root", socket_parent_frame=model.ground, socket_child_frame=a))
+    text = osimlite.to_text(model)
+    assert "<socket_parent_frame>a_offset</socket_parent_frame>" in text
+    assert "<socket_parent>/bodyset/a</socket_parent>" in text
+    assert "<socket_parent_frame>/ground</socket_parent_frame>" in text
+
+
+def test_a_reference_out_of_the_model_is_refused() -> None:
+    model = Model(name="m")
+    stranger = Body(name="stranger", mass=1.0)
+    model.add(ContactSphere(name="s", socket_frame=stranger))
+    with pytest.raises(ModelError, match=r"stranger.*not in the model"):
+        osimlite.to_text(model)
+
+
+def test_markup_in_texts_is_escaped() -> None:
+    model = Model(name='a"<&>', credits="Tom & <Jerry>")
+    assert osimlite.read_text(osimlite.to_text(model)) == model
+
+
+def test_what_was_never_set_is_not_printed() -> None:
+    model = Model(name="m")
+    model.add(Body(name="b"))
+    text = osimlite.to_text(model)
+    assert "mass" not in text and "FrameGeometry" not in text and "gravity" not in text
+    model.body_set.objects[0].frame_geometry.display_radius = 0.01
+    assert "<display_radius>0.01</display_radius>" in osimlite.to_text(model)
+
+
+def test_writing_is_whole_or_not_at_all(tmp_path: Path) -> None:
+    target = tmp_path / "m.osim"
+    target.write_text("before")
+    model = Model(name="m")
+    model.add(ContactSphere(name="s", socket_frame=Body(name="x")))
+    with pytest.raises(ModelError):
+        osimlite.write(model, target)
+    assert target.read_text() == "before"
+    assert [path.name for path in tmp_path.iterdir()] == ["m.osim"]
+    with pytest.raises(OsimliteError, match="cannot write here"):
+        osimlite.write(Model(name="m"), tmp_path / "no" / "m.osim")

@@ -1,0 +1,177 @@
+"""Text to model, and what the reader notices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.document.reader import Document, read_document
+from osimlite.document.source import Source
+from osimlite.errors import DocumentError, MissingFileError
+from osimlite.schema.base import Unknown
+from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.schema.model import Model
+
+
+def document(inside: str, head: str = '<Model name="m">') -> Document:
+    text = f'<?xml version="1.0"?>\n<OpenSimDocument Version="40600">\n{head}\n{inside}\n</Model>\n</OpenSimDocument>'
+    return read_document(Source(text.encode()))
+
+
+def body(inside: str) -> Document:
+    return document(f'<BodySet><objects><Body name="b">\n{inside}\n</Body></objects></BodySet>')
+
+
+def kinds(found: Document) -> list[tuple[str, str]]:
+    return [(note.kind, note.word) for note in found.notes]
+
+
+def test_the_walker(fixtures: Path) -> None:
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    assert isinstance(model, Model)
+    assert model.name == "DynamicWalkerModel"
+    assert [b.name for b in model.body_set.objects] == [
+        "Platform", "Pelvis", "RightThigh", "LeftThigh", "RightShank", "LeftShank",
+    ]  # fmt: skip
+    force = model.find("/forceset/RFootForce")
+    assert isinstance(force, HuntCrossleyForce)
+    assert force.contact_parameters.objects[0].geometry == ("RFootContact", "PlatformContact")
+    assert force.transition_velocity == 0.2
+    assert model.document_version == 40600
+
+
+def test_every_element_keeps_its_number(fixtures: Path) -> None:
+    source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
+    model = read_document(source).model
+    for component in model.walk():
+        assert source.spans[component._index].tag == component.tag if component._index is not None else True
+    knee = model.find("/jointset/RightShankToThigh/RKnee_rz")
+    assert source.text[source.spans[knee._index].start :].startswith('<Coordinate name="RKnee_rz">')
+
+
+def test_properties_in_any_order_and_only_what_is_there() -> None:
+    found = body("<inertia>1 1 1 0 0 0</inertia><mass> 2 </mass>").model.body_set.objects[0]
+    assert found.mass == 2.0
+    assert found.model_fields_set == {"name", "mass", "inertia"}
+
+
+def test_unclean_values_are_read_as_opensim_reads_them_and_noted() -> None:
+    found = body("<mass>1,5</mass><mass_center>0 1</mass_center>")
+    assert found.model.body_set.objects[0].mass == 1.0
+    assert kinds(found) == [("cut", "1,5"), ("too-few", "0 1")]
+    assert "<mass>1,5</mass>" in osimlite.to_text(found.model)
+    found.model.body_set.objects[0].mass = 3.0
+    assert "<mass>3</mass>" in osimlite.to_text(found.model)
+
+
+def test_unknown_elements_are_noted_kept_and_written_back() -> None:
+    found = body("<mas>5</mas><mass>1</mass>")
+    assert kinds(found) == [("unknown-tag", "mas")]
+    text = osimlite.to_text(found.model)
+    assert "<mas>5</mas>" in text
+    assert osimlite.read_text(text) == found.model
+
+
+def test_unknown_classes_in_a_set_keep_their_place_and_name() -> None:
+    found = document(
+        "<ForceSet><objects><CoordinateLimitForce name='a'/><PlugIn name='p'><x>1</x></PlugIn>"
+        "<CoordinateLimitForce name='c'/></objects></ForceSet>"
+    )
+    assert kinds(found) == [("unknown-class", "PlugIn")]
+    plug_in = found.model.find("/forceset/p")
+    assert isinstance(plug_in, Unknown) and plug_in.class_name == "PlugIn"
+    text = osimlite.to_text(found.model)
+    assert text.index('name="a"') < text.index("<x>1</x>") < text.index('name="c"')
+    assert osimlite.read_text(text) == found.model
+
+
+def test_wrong_class_duplicates_attributes() -> None:
+    found = document(
+        '<ForceSet><objects><Body name="b"/></objects></ForceSet><gravity>0 -1 0</gravity><gravity>0 -2 0</gravity>'
+        '<BodySet colour="red"/>'
+    )
+    assert kinds(found) == [("wrong-class", "Body"), ("unknown-attribute", "colour"), ("duplicate-tag", "gravity")]
+    assert found.model.gravity == (0.0, -1.0, 0.0)
+
+
+def test_named_objects_in_all_three_spellings() -> None:
+    short = '<FrameGeometry name="frame_geometry"><display_radius>1</display_radius></FrameGeometry>'
+    long = "<frame_geometry><FrameGeometry><display_radius>1</display_radius></FrameGeometry></frame_geometry>"
+    bare = "<FrameGeometry><display_radius>1</display_radius></FrameGeometry>"
+    for spelling in (short, long, bare):
+        found = body(spelling)
+        assert found.model.body_set.objects[0].frame_geometry.display_radius == 1.0, spelling
+        assert not found.notes
+
+
+def test_comments_of_people_stay_where_they_were() -> None:
+    inside = """<!--Measured by Ada.-->
+<BodySet><objects><!-- heavy --><Body name="b"><!--The mass of the body (kg)--><mass>1</mass><!-- checked -->
+<inertia>1 1 1 0 0 0</inertia><!-- last --></Body></objects></BodySet>"""
+    text = osimlite.to_text(document(inside).model)
+    order = [
+        "Measured by Ada.",
+        "<BodySet>",
+        " heavy ",
+        '<Body name="b">',
+        "<mass>",
+        " checked ",
+        "<inertia>",
+        " last ",
+    ]
+    places = [text.index(word) for word in order]
+    assert places == sorted(places)
+    assert "The mass of the body" not in text
+    assert osimlite.to_text(osimlite.read_text(text)) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("", 1, "empty"),
+        ("hello", 1, "not well-formed"),
+        ("<Foo/>", 1, "<Foo>"),
+        ("<OpenSimDocument/>", 1, "no Version"),
+        ('<OpenSimDocument Version="abc"/>', 1, "abc"),
+        ('<OpenSimDocument Version="40600">\n<BodySet/></OpenSimDocument>', 2, "<BodySet>"),
+        ('<OpenSimDocument Version="40600"/>', 1, "no <Model>"),
+        ('<OpenSimDocument Version="40600">\n<Model>\n<mass></Model></OpenSimDocument>', 3, "not well-formed"),
+        ('<!DOCTYPE a [\n<!ENTITY x "y">]>\n<OpenSimDocument Version="40600"/>', 1, "DOCTYPE"),
+    ],
+)
+def test_what_is_no_document_is_refused_with_its_place(text: str, line: int, words: str) -> None:
+    with pytest.raises(DocumentError, match=words) as caught:
+        osimlite.read_text(text)
+    assert caught.value.line == line
+    assert caught.value.column is not None and caught.value.column >= 1
+
+
+def test_entities_and_files_of_others_are_not_followed(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("do not read")
+    bomb = '<!DOCTYPE a [<!ENTITY a "x"><!ENTITY b "&a;&a;&a;&a;">]><a>&b;</a>'
+    outside = f'<!DOCTYPE a SYSTEM "{secret}"><OpenSimDocument Version="40600"><Model/></OpenSimDocument>'
+    with pytest.raises(DocumentError):
+        osimlite.read_text(bomb)
+    assert "do not read" not in osimlite.to_text(osimlite.read_text(outside))
+
+
+def test_deep_nesting_is_an_error_not_a_crash() -> None:
+    text = '<OpenSimDocument Version="40600"><Model>' + "<a>" * 100_000
+    with pytest.raises(DocumentError):
+        osimlite.read_text(text)
+
+
+def test_a_missing_file() -> None:
+    with pytest.raises(MissingFileError, match="no such file") as caught:
+        osimlite.read("nowhere.osim")
+    assert caught.value.file == "nowhere.osim"
+
+
+def test_positions_survive_the_double_colon() -> None:
+    text = '<OpenSimDocument Version="40600"><Model><HuntCrossleyForce::ContactParameters></Model></OpenSimDocument>'
+    with pytest.raises(DocumentError, match="HuntCrossleyForce::ContactParameters") as caught:
+        osimlite.read_text(text)
+    assert caught.value.line == 1
