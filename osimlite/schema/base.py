@@ -115,6 +115,8 @@ class Object(BaseModel):
 
     tag: ClassVar[str] = ""
     abstract: ClassVar[bool] = True
+    name_reference: ClassVar[Reference | None] = None
+    """The rule by which the object's own name names a component, for the few classes where it does."""
 
     name: str = ""
 
@@ -228,6 +230,14 @@ class Object(BaseModel):
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         memo = {} if memo is None else memo
+        if _COPYING not in memo:
+            # Components that are only named, not owned, are not part of the copy.
+            memo[_COPYING] = self
+            owned = {id(item) for item in self.walk()}
+            for item in self.walk():
+                for named in _named_components(item):
+                    if id(named) not in owned:
+                        memo[id(named)] = named
         clone = _carry(self, super().__deepcopy__(memo), copy.deepcopy(self._layout, memo))
         memo[id(self)] = clone
         return cast("Self", clone)
@@ -255,6 +265,9 @@ class Object(BaseModel):
 class Component(Object, abstract=True):
     """An object with a place in the component tree, which other components can name by its path."""
 
+    internal: ClassVar[tuple[tuple[str, type[Component]], ...]] = ()
+    """Names and classes of the parts that OpenSim makes for itself: they have a path and stand in no file."""
+
     subcomponents: Annotated[Many[Component], Tag("components")] = none()
 
     @property
@@ -266,6 +279,11 @@ class Component(Object, abstract=True):
     def model(self) -> Model | None:
         """The model this component was last seen in."""
         return cast("Model | None", self._model)
+
+    @property
+    def parent(self) -> Component | None:
+        """The component above in the tree; None for the model, or while the component is in no model."""
+        return None if self._model is None else self._model.tree().parent_of(self)
 
     @property
     def path(self) -> str:
@@ -345,6 +363,18 @@ def defaults(cls: type[Object]) -> tuple[dict[str, Any], tuple[tuple[str, Any], 
         else:
             factories.append((name, info.default_factory))
     return plain, tuple(factories)
+
+
+_COPYING = -1
+"""Key in the memo of a deep copy that tells the outermost object has been entered; no object has this identity."""
+
+
+def _named_components(item: Object) -> Iterator[Component]:
+    for spec in reference_specs(type(item)):
+        value = getattr(item, spec.name)
+        for word in value if isinstance(value, tuple) else (value,):
+            if isinstance(word, Component):
+                yield word
 
 
 def _same(left: Any, right: Any) -> bool:

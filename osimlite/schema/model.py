@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, overload
 
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, ModelComponent, made
@@ -72,9 +72,20 @@ class Model(ModelComponent):
             object.__setattr__(self, "_tree", known)
         return cast("Tree", known)
 
-    def components(self) -> Iterator[Component]:
-        """Yield every component of the tree in OpenSim's order, parents first; the model itself comes first."""
-        return iter(self.tree().components)
+    @overload
+    def components(self) -> Iterator[Component]: ...
+    @overload
+    def components(self, cls: type[C]) -> Iterator[C]: ...
+    def components(self, cls: type[Component] = Component) -> Iterator[Component]:
+        """Yield the components of the tree in OpenSim's order, parents first, from the model itself on.
+
+        Args:
+            cls: only components of this class and the classes derived from it.
+        """
+        return (component for component in self.tree().components if isinstance(component, cls))
+
+    def __getitem__(self, path: str) -> Component:
+        return self.find(path)
 
     def find(self, path: str) -> Component:
         """The component at an absolute path, or at a path from the model.
@@ -83,6 +94,26 @@ class Model(ModelComponent):
             ModelError: nothing is there; the message names the nearest path.
         """
         return self.tree().at(path)
+
+    def rename(self, component: Component, name: str) -> None:
+        """Give a component another name; every reference to it, or to what is below it, follows.
+
+        Raises:
+            ModelError: the component is not in the model, the name is illegal, or a sibling has it.
+        """
+        from osimlite.schema.editing import rename
+
+        rename(self, component, name)
+
+    def remove(self, component: Component) -> None:
+        """Take a component, and all below it, out of the model.
+
+        Raises:
+            ModelError: it is not in the model, has a fixed place, or other components name it.
+        """
+        from osimlite.schema.editing import remove
+
+        remove(self, component)
 
     def add(self, *components: C) -> C:
         """Add components to the sets they belong in, in order, and return the first of them.

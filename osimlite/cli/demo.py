@@ -1,0 +1,167 @@
+"""``osimlite demo``: the whole tour on the dynamic walker."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from osimlite.schema.model import Model
+    from osimlite.simulation.trajectory import Trajectory
+
+MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
+
+
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for everything the tour makes.")] = Path(
+        "osimlite-demo"
+    ),
+    pictures: Annotated[bool, typer.Option(help="Draw the plots and the animation.")] = True,
+) -> None:
+    """Build, check, translate and simulate the dynamic walker, and leave the results in a folder.
+
+    The walker is the model of the OpenSim exercise "Building a Dynamic Walker". The tour takes about half a minute,
+    nearly all of it for the animation.
+    """
+    from rich.console import Console
+
+    from osimlite._require import require
+
+    require("pybullet", extra="sim", purpose="the simulation")
+    if pictures:
+        require("matplotlib", extra="plot", purpose="drawing")
+    output.mkdir(parents=True, exist_ok=True)
+    tour = _Tour(Console(), output)
+    model, trajectory = _work(tour)
+    if pictures:
+        _pictures(tour, model, trajectory)
+    tour.table()
+
+
+@dataclass
+class _Tour:
+    """What has been done so far, for the closing table."""
+
+    console: Console
+    folder: Path
+    rows: list[tuple[str, str, str, float]] = field(default_factory=list)
+
+    @contextmanager
+    def step(self, title: str) -> Iterator[Callable[[str, str], None]]:
+        """Announce a step; the caller says what came out and which file holds it."""
+        self.console.print(f"[bold]{len(self.rows) + 1}. {title}[/bold]")
+        start = time.perf_counter()
+        said = ["", ""]
+
+        def say(result: str, file: str = "") -> None:
+            said[:] = [result, file]
+
+        yield say
+        self.rows.append((title, said[0], said[1], time.perf_counter() - start))
+        self.console.print(f"   {said[0]}\n", highlight=False)
+
+    @contextmanager
+    def progress(self, title: str, total: float) -> Iterator[Callable[[float], None]]:
+        """A progress bar; the caller says how far it is."""
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        bar = Progress(
+            TextColumn("   {task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
+            TimeRemainingColumn(), console=self.console, transient=True,
+        )  # fmt: skip
+        with bar:
+            task = bar.add_task(title, total=total)
+            yield lambda done: bar.update(task, completed=done)
+
+    def table(self) -> None:
+        """Print everything that was done."""
+        from rich.table import Table
+
+        table = Table(title=f"Everything is in {self.folder}/", title_justify="left")
+        table.add_column("step")
+        table.add_column("result", overflow="fold")
+        table.add_column("file", overflow="fold")
+        table.add_column("s", justify="right")
+        for title, result, file, seconds in self.rows:
+            table.add_row(title, result, file, f"{seconds:.2f}")
+        self.console.print(table)
+
+
+def _work(tour: _Tour) -> tuple[Model, Trajectory]:
+    from osimlite.document.printer import write
+    from osimlite.lint import validate
+    from osimlite.lint.reporters import render
+    from osimlite.models.dynamic_walker import dynamic_walker
+    from osimlite.simulation import simulate
+    from osimlite.translate import to_urdf
+
+    folder = tour.folder
+    with tour.step("Build the model in Python") as say:
+        model = dynamic_walker()
+        file = folder / f"{model.name}.osim"
+        write(model, file)
+        say(f"{sum(1 for _ in model.components())} components written", file.name)
+
+    with tour.step("Validate the file") as say:
+        report = validate(file)
+        say(f"{len(report.errors)} errors, {len(report.warnings)} warnings", file.name)
+
+    with tour.step("Validate a copy with a misspelt contact name") as say:
+        text = file.read_text()
+        assert text.count(MISSPELT[0]) == 1
+        broken = folder / f"{model.name}-misspelt.osim"
+        broken.write_text(text.replace(*MISSPELT))
+        found = validate(broken)
+        tour.console.print(render(found, "full"), highlight=False, markup=False)
+        say(f"{len(found.errors)} error on line {found.errors[0].line}: {found.errors[0].name}", broken.name)
+
+    with tour.step("Translate to URDF") as say:
+        urdf = to_urdf(model)
+        urdf.write(folder / "urdf")
+        say(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
+
+    with tour.step("Simulate two seconds in PyBullet") as say, tour.progress("simulating", 2.0) as progress:
+        trajectory = simulate(model, to=2.0, report_interval=0.01, progress=progress)
+        trajectory.write(folder)
+        difference = distance_to_opensim(trajectory)
+        say(
+            f"{trajectory.summary['steps']} steps; at most {difference:.1e} from OpenSim's converged motion",
+            "states.sto",
+        )
+    return model, trajectory
+
+
+def _pictures(tour: _Tour, model: Model, trajectory: Trajectory) -> None:
+    from osimlite.view.animation import animate
+    from osimlite.view.plots import plot_simulation
+
+    with tour.step("Plot coordinates, contact forces and energy") as say:
+        files = plot_simulation(trajectory, tour.folder)
+        say(f"{len(files)} pictures", ", ".join(file.name for file in files))
+    with tour.step("Animate the walker") as say, tour.progress("drawing", 1.0) as progress:
+        target = tour.folder / "animation.gif"
+        animate(model, trajectory, target, progress=progress)
+        say(f"{target.stat().st_size / 1e6:.1f} MB", target.name)
+
+
+def distance_to_opensim(trajectory: Trajectory) -> float:
+    """Largest difference of any coordinate (rad or m) to OpenSim 4.6's converged motion, every 50 ms of 0-2 s."""
+    import csv
+    from importlib.resources import files
+
+    text = files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text()
+    largest = 0.0
+    times = [round(float(t), 6) for t in trajectory.times]
+    for row in csv.DictReader(text.splitlines()):
+        place = times.index(round(float(row["time"]), 6))
+        for number, name in enumerate(trajectory.coordinates):
+            largest = max(largest, abs(float(trajectory.values[place][number]) - float(row[name])))
+    return largest

@@ -1,0 +1,87 @@
+"""Changes of a model that concern more than one component: renaming and removing, with references kept right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from osimlite.errors import ModelError
+from osimlite.schema.base import Component, Object
+from osimlite.schema.model import Model
+from osimlite.schema.tree import ILLEGAL_CHARACTERS, Use
+from osimlite.text import listed
+
+
+def rename(model: Model, component: Component, name: str) -> None:
+    """Give a component another name and rewrite every reference that leads to it, or through it.
+
+    A reference keeps its form (relative stays relative) where the new text still leads to the same component.
+
+    Raises:
+        ModelError: the component is not in the model, the name is illegal, or a sibling has it.
+    """
+    tree = model.tree()
+    path = _path_in(model, component)
+    if not name or any(character in name for character in ILLEGAL_CHARACTERS):
+        raise ModelError(f"'{name}' is no name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'")
+    parent = tree.parent_of(component)
+    wanted = f"{'' if parent is None else path.rsplit('/', 1)[0]}/{name}"
+    taken = tree.by_path.get(wanted)
+    if parent is not None and taken is not None and taken is not component:
+        raise ModelError(f"cannot rename '{path}': its parent has a '{name}' already")
+    texts = [(use, tree.resolve(use).target) for use in tree.uses() if isinstance(use.value, str)]
+    component.name = name
+    tree = model.tree()
+    for use, target in texts:
+        if target is None or not isinstance(use.value, str) or use.reference.rule in _NAME_NOTHING:
+            continue
+        if tree.lookup(use.reference, use.value, use.owner).target is not target:
+            _assign(use, tree.text_for(use.owner, use.reference, target))
+
+
+def remove(model: Model, component: Component) -> None:
+    """Take a component, and all below it, out of the model.
+
+    Raises:
+        ModelError: it is not in the model, has a fixed place (the ground, a set), or others name it; the message
+            lists them.
+    """
+    tree = model.tree()
+    path = _path_in(model, component)
+    doomed = {id(item) for item in component.walk()}
+    users = sorted(
+        {
+            tree.path_of(use.owner) or use.owner.name
+            for use in tree.uses()
+            if id(use.holder) not in doomed
+            and use.reference.rule not in _NAME_NOTHING
+            and id(tree.resolve(use).target) in doomed
+        }
+    )
+    if users:
+        raise ModelError(f"cannot remove '{path}': {listed(users)} {'names' if len(users) == 1 else 'name'} it")
+    for holder in model.walk():
+        for spec, item in holder.objects_held():
+            members = getattr(holder, spec.name)
+            if item is component and isinstance(members, list):
+                members.remove(component)
+                return
+    raise ModelError(f"cannot remove '{path}': every model has one")
+
+
+_NAME_NOTHING = ("input", "file", "column", "positional", "point-index")
+
+
+def _path_in(model: Model, component: Object) -> str:
+    path = model.tree().path_of(component)
+    if path is None:
+        raise ModelError(f"'{component.name}' is not in the model")
+    return path
+
+
+def _assign(use: Use, text: str) -> None:
+    value: Any = text
+    if use.position is not None:
+        words = list(getattr(use.holder, use.spec.name))
+        words[use.position] = text
+        value = tuple(words)
+    setattr(use.holder, use.spec.name, value)

@@ -1,0 +1,104 @@
+"""Changing a model with references kept right."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.errors import ModelError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
+from osimlite.schema.frames import Body
+from osimlite.schema.joints import Joint, PinJoint
+from osimlite.schema.model import Model
+
+
+@pytest.fixture
+def walker(fixtures: Path) -> Model:
+    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+
+
+def targets(model: Model) -> list[str]:
+    """What every reference leads to, as the place of the component in the tree."""
+    place = {id(component): number for number, component in enumerate(model.components())}
+    return [f"{use.spec.tag} {place[id(model.tree().resolve(use).target)]}" for use in model.tree().uses() if use.value]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/bodyset/RightShank",
+        "/bodyset/Pelvis",
+        "/jointset/RightThighToPelvis/RHip_rz",
+        "/jointset/RightThighToPelvis/Pelvis_offset",
+        "/jointset/RightThighToPelvis",
+        "/contactgeometryset/PlatformContact",
+        "/forceset/RFootForce",
+    ],
+)
+def test_references_follow_a_new_name(walker: Model, path: str) -> None:
+    before = targets(walker)
+    walker.rename(walker[path], "renamed")
+    assert walker[path.rsplit("/", 1)[0] + "/renamed"].name == "renamed"
+    assert targets(walker) == before
+    again = osimlite.read_text(osimlite.to_text(walker))
+    assert targets(again) == before
+
+
+def test_names_that_cannot_be(walker: Model) -> None:
+    body = walker["/bodyset/Pelvis"]
+    for name in ("", "a b", "a/b", "a*b"):
+        with pytest.raises(ModelError, match="is no name"):
+            walker.rename(body, name)
+    with pytest.raises(ModelError, match="has a 'RightThigh' already"):
+        walker.rename(body, "RightThigh")
+    with pytest.raises(ModelError, match="not in the model"):
+        walker.rename(Body(name="stranger"), "x")
+    assert body.name == "Pelvis"
+
+
+def test_what_others_name_is_not_removed(walker: Model) -> None:
+    with pytest.raises(ModelError, match="/forceset/RFootForce names it"):
+        walker.remove(walker["/contactgeometryset/RFootContact"])
+    walker.remove(walker["/forceset/RFootForce"])
+    walker.remove(walker["/contactgeometryset/RFootContact"])
+    assert "RFoot" not in osimlite.to_text(walker)
+    with pytest.raises(ModelError, match="every model has one"):
+        walker.remove(walker["/probeset"])
+
+
+def test_iteration_by_class_and_parents(walker: Model) -> None:
+    assert [c.name for c in walker.components(Coordinate)][:2] == ["platform_rz", "Pelvis_rz"]
+    assert all(isinstance(joint, Joint) for joint in walker.components(Joint))
+    hip = walker["/jointset/RightThighToPelvis/RHip_rz"]
+    assert hip.parent is walker["/jointset/RightThighToPelvis"]
+    assert walker.parent is None
+
+
+def test_a_copy_of_a_component_names_the_same_others() -> None:
+    model = dynamic_walker()
+    joint = model["/jointset/RightThighToPelvis"]
+    twin = copy.deepcopy(joint)
+    assert isinstance(twin, PinJoint) and isinstance(joint, PinJoint)
+    assert twin.socket_child_frame is twin.frames[1] and twin.frames[1] is not joint.frames[1]
+    assert twin.frames[0].socket_parent is model["/bodyset/Pelvis"]
+
+
+def test_a_copy_of_a_model_stands_alone() -> None:
+    model = dynamic_walker()
+    twin = copy.deepcopy(model)
+    assert twin == model
+    originals = {id(item) for item in model.walk()}
+    assert not originals & {id(item) for item in twin.walk()}
+    force = twin["/forceset/RHipLimitTorque"]
+    assert isinstance(force, CoordinateLimitForce)
+    assert force.coordinate is twin["/jointset/RightThighToPelvis/RHip_rz"]
+    contact = twin["/forceset/RFootForce"]
+    assert isinstance(contact, HuntCrossleyForce)
+    twin.rename(twin["/bodyset/Pelvis"], "hips")
+    assert model["/bodyset/Pelvis"].name == "Pelvis"
+    assert twin != model
