@@ -1,0 +1,179 @@
+"""Forces and accelerations of a mechanism.
+
+The equation of motion reads M udot + C = gravity + applied forces, where the generalized forces belong to the
+generalized speeds. With the Jacobians of all mass centres at hand it is Newton's and Euler's equation of every body,
+projected on the speeds (Kane's form); nothing is factored out of the tree, which suits arrays better than recursion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from osimlite.errors import SimulationError
+from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.spatial import Array
+
+if TYPE_CHECKING:
+    from osimlite.multibody.constraints import Constraint
+    from osimlite.multibody.mechanism import Mechanism
+
+
+class Wrench(NamedTuple):
+    """A force (N) on a body at its origin and a torque (N·m) about it, both (3,) along ground's axes."""
+
+    force: Sequence[float] | Array
+    torque: Sequence[float] | Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MassCentres:
+    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes.
+
+    Attributes:
+        masses: (b,), kg.
+        inertias: about the mass centres (b, 3, 3), kg·m².
+        arms: from the body origins to the mass centres (b, 3), m.
+        turning: from the n speeds to the angular velocities (b, 3, n).
+        moving: from the n speeds to the velocities of the mass centres (b, 3, n).
+    """
+
+    state: Kinematics
+    masses: Array
+    inertias: Array
+    arms: Array
+    turning: Array
+    moving: Array
+
+    @classmethod
+    def of(cls, state: Kinematics) -> MassCentres:
+        """See a mechanism at `state` from its mass centres."""
+        masses, centres, inertias = state.mechanism.inertial
+        rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
+        arms = (rotations @ centres[:, :, None])[:, :, 0]
+        turning = jacobians[:, :3]
+        moving = jacobians[:, 3:] - _skews(arms) @ turning
+        return cls(state, masses, rotations @ inertias @ rotations.transpose(0, 2, 1), arms, turning, moving)
+
+    def mass_matrix(self) -> Array:
+        """M (n, n) of the kinetic energy ½ uᵀ M u."""
+        matrix = _projected(self.turning, self.inertias @ self.turning)
+        matrix += _projected(self.moving, self.masses[:, None, None] * self.moving)
+        return 0.5 * (matrix + matrix.T)
+
+    def inertia_forces(self, body_accelerations: Array) -> Array:
+        """Generalized forces (n,) that give the bodies these spatial accelerations (b + 1, 6)."""
+        w = self.state.velocities[:-1, :3]
+        alpha, a = body_accelerations[:-1, :3], body_accelerations[:-1, 3:]
+        a_centre = a + np.cross(alpha, self.arms) + np.cross(w, np.cross(w, self.arms))
+        torques = _times(self.inertias, alpha) + np.cross(w, _times(self.inertias, w))
+        return _projected(self.turning, torques) + _projected(self.moving, self.masses[:, None] * a_centre)
+
+    def gravity_forces(self) -> Array:
+        """Generalized forces of gravity (n,)."""
+        weights = self.masses[:, None] * self.state.mechanism.gravity
+        return _projected(self.moving, weights)
+
+    def velocities(self) -> Array:
+        """The velocities of the mass centres in ground (b, 3)."""
+        result: Array = self.moving @ self.state.u
+        return result
+
+    def positions(self) -> Array:
+        """The mass centres in ground (b, 3)."""
+        result: Array = self.state.origins[:-1] + self.arms
+        return result
+
+    def kinetic_energy(self) -> float:
+        """Kinetic energy (J)."""
+        w, v = self.turning @ self.state.u, self.velocities()
+        return 0.5 * float(np.sum(w * _times(self.inertias, w)) + np.sum(self.masses[:, None] * v * v))
+
+    def momentum(self) -> tuple[Array, Array]:
+        """Linear momentum (3,) in kg·m/s, and angular momentum (3,) about ground's origin in kg·m²/s."""
+        linear = self.masses[:, None] * self.velocities()
+        own = _times(self.inertias, self.turning @ self.state.u)
+        return linear.sum(axis=0), (own + np.cross(self.positions(), linear)).sum(axis=0)
+
+
+def accelerations(state: Kinematics, applied: Array, constraints: Sequence[Constraint]) -> Array:
+    """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and constraints.
+
+    With constraint equations G udot = b the motion is solved for in the null space of G, so an acceleration that
+    the constraints leave no choice for is exact.
+
+    Raises:
+        SimulationError: a motion that nothing forbids moves no mass.
+    """
+    bodies = MassCentres.of(state)
+    matrix = bodies.mass_matrix()
+    right = applied + bodies.gravity_forces() - bodies.inertia_forces(state.biases)
+    if not constraints:
+        return _solve(state.mechanism, matrix, right, np.eye(len(right)))
+    rows, values = stacked([constraint.acceleration_equations(state) for constraint in constraints])
+    basis, triangle = np.linalg.qr(rows.T, mode="complete")
+    rank = len(values)
+    particular = basis[:, :rank] @ np.linalg.solve(triangle[:rank].T, values)
+    free = basis[:, rank:]
+    reduced = _solve(state.mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free)
+    udot: Array = particular + free @ reduced
+    return udot
+
+
+def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """G (m, n) and b (m,) of several constraints in one."""
+    return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
+
+
+def _skews(vectors: Array) -> Array:
+    """The matrices [v] with [v] a = v × a of many vectors: (b, 3) to (b, 3, 3)."""
+    result = np.zeros((len(vectors), 3, 3))
+    for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
+        result[:, row, column] = sign * vectors[:, place]
+        result[:, column, row] = -sign * vectors[:, place]
+    return result
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Each matrix (b, 3, 3) times its vector (b, 3)."""
+    result: Array = (matrices @ vectors[:, :, None])[:, :, 0]
+    return result
+
+
+def _projected(jacobians: Array, loads: Array) -> Array:
+    """Sum over the bodies of each Jacobian (b, 3, n), transposed, times its load (b, 3) or loads (b, 3, m)."""
+    flat = jacobians.reshape(-1, jacobians.shape[2])
+    result: Array = flat.T @ loads.reshape(len(flat), *loads.shape[2:])
+    return result
+
+
+def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array) -> Array:
+    """Solve with a positive definite matrix whose unknowns are motions along `directions` (n, f)."""
+    if not len(right):
+        return right
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        raise SimulationError(
+            f"the equations of motion of '{mechanism.name}' are not finite; "
+            "check the coordinate values and speeds, the applied forces, and the masses of the bodies"
+        )
+    try:
+        pivots = np.linalg.cholesky(matrix).diagonal() ** 2
+    except np.linalg.LinAlgError:
+        raise SimulationError(_massless(mechanism, matrix, directions)) from None
+    if np.min(pivots / matrix.diagonal()) < 1e-13:
+        raise SimulationError(_massless(mechanism, matrix, directions))
+    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+
+
+def _massless(mechanism: Mechanism, matrix: Array, directions: Array) -> str:
+    scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
+    _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    motion = directions @ (vectors[:, 0] / scale)
+    name = mechanism.coordinates[int(np.argmax(np.abs(motion)))].name
+    return (
+        f"coordinate '{name}' moves no mass, or a negative inertia; "
+        "give the bodies beyond its joint mass and inertia, or lock it"
+    )

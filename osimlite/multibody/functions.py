@@ -1,0 +1,194 @@
+"""Functions of coordinates with first and second derivatives, as joints and constraints need them.
+
+The formulas are those of OpenSim's functions of the same names.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+
+
+class Function(ABC):
+    """A twice differentiable function of one or several numbers."""
+
+    @abstractmethod
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """Return the value, the gradient (k,) and the Hessian (k, k) at `arguments` (k,)."""
+
+    @property
+    def slope(self) -> float | None:
+        """The constant slope of a linear function of one argument, None for every other function."""
+        return None
+
+
+class Univariate(Function):
+    """A function of one number."""
+
+    @abstractmethod
+    def _at(self, x: float) -> tuple[float, float, float]:
+        """Return the value and the first two derivatives at `x`."""
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """Value, first and second derivative at the one argument."""
+        value, first, second = self._at(float(arguments[0]))
+        return value, np.array((first,)), np.array(((second,),))
+
+
+@dataclass(frozen=True)
+class Constant(Function):
+    """The same value for any number of arguments."""
+
+    value: float
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """The value, and zeros for the derivatives."""
+        size = len(arguments)
+        return self.value, np.zeros(size), np.zeros((size, size))
+
+
+@dataclass(frozen=True)
+class Linear(Univariate):
+    """``rate * x + start``."""
+
+    rate: float = 1.0
+    start: float = 0.0
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        return self.rate * x + self.start, self.rate, 0.0
+
+    @property
+    def slope(self) -> float | None:
+        """The rate."""
+        return self.rate
+
+
+IDENTITY = Linear()
+
+
+@dataclass(frozen=True)
+class Polynomial(Univariate):
+    """Polynomial with `coefficients` from the highest power to the constant."""
+
+    coefficients: tuple[float, ...]
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        value = first = half_second = 0.0
+        for coefficient in self.coefficients:
+            half_second = half_second * x + first
+            first = first * x + value
+            value = value * x + coefficient
+        return value, first, 2.0 * half_second
+
+
+@dataclass(frozen=True)
+class Sine(Univariate):
+    """``amplitude * sin(omega * x + phase) + offset``."""
+
+    amplitude: float
+    omega: float
+    phase: float
+    offset: float
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        angle = self.omega * x + self.phase
+        wave = self.amplitude * math.sin(angle)
+        return wave + self.offset, self.amplitude * self.omega * math.cos(angle), -(self.omega**2) * wave
+
+
+@dataclass(frozen=True)
+class Scaled(Function):
+    """``scale`` times another function."""
+
+    scale: float
+    function: Function
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """`scale` times value, gradient and Hessian of the function."""
+        value, gradient, hessian = self.function.evaluate(arguments)
+        return self.scale * value, self.scale * gradient, self.scale * hessian
+
+
+@dataclass(frozen=True)
+class PiecewiseLinear(Univariate):
+    """Straight lines between the points (`x`, `y`); the first and the last line go on outside."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        k = min(max(bisect_right(self.x, x) - 1, 0), len(self.x) - 2)
+        slope = (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
+        return self.y[k] + slope * (x - self.x[k]), slope, 0.0
+
+
+@dataclass(frozen=True)
+class PiecewiseConstant(Univariate):
+    """Steps: ``y[k]`` from ``x[k]`` up to the next abscissa, the end values outside."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        return self.y[max(bisect_right(self.x, x) - 1, 0)], 0.0, 0.0
+
+
+class SimmSpline(Univariate):
+    """Cubic spline through (`x`, `y`) with straight lines, of the end slopes, outside.
+
+    The ends have the third derivative of the cubic through the first (last) four points (Forsythe, Malcolm
+    and Moler, Computer Methods for Mathematical Computations, 1977, chapter 4); three points give a parabola,
+    two a line. Intervals narrower than 1e-7 count as 1e-7 wide, as in OpenSim.
+    """
+
+    def __init__(self, x: Sequence[float], y: Sequence[float]) -> None:
+        self.x = tuple(float(value) for value in x)
+        self.y = tuple(float(value) for value in y)
+        points = np.array(self.x)
+        widths = np.maximum(np.diff(points), 1e-7)
+        slopes = np.diff(self.y) / widths
+        # sigma: a sixth of the second derivative at every point.
+        sigma = _spline_curvature(points, widths, slopes)
+        left = slopes - widths * (sigma[1:] + 2.0 * sigma[:-1])
+        last = slopes[-1] + widths[-1] * (sigma[-2] + 2.0 * sigma[-1])
+        cubic = np.append(np.diff(sigma) / widths, 0.0)
+        self._pieces = list(
+            zip(self.y, np.append(left, last).tolist(), (3.0 * sigma).tolist(), cubic.tolist(), strict=True)
+        )
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        last = len(self.x) - 1
+        if x < self.x[0] or x > self.x[last]:
+            k = 0 if x < self.x[0] else last
+            y, slope, _, _ = self._pieces[k]
+            return y + slope * (x - self.x[k]), slope, 0.0
+        k = min(max(bisect_right(self.x, x) - 1, 0), max(last - 1, 0))
+        y, b, c, d = self._pieces[k]
+        t = x - self.x[k]
+        return y + t * (b + t * (c + t * d)), b + t * (2.0 * c + 3.0 * t * d), 2.0 * c + 6.0 * t * d
+
+
+def _spline_curvature(points: Array, widths: Array, slopes: Array) -> Array:
+    """A sixth of the second derivative at each of n points (n,): smooth inside, end conditions as above."""
+    n = len(points)
+    if n == 2:
+        return np.zeros(2)
+    matrix = np.zeros((n, n))
+    right = np.zeros(n)
+    for k in range(1, n - 1):
+        matrix[k, k - 1 : k + 2] = widths[k - 1], 2.0 * (widths[k - 1] + widths[k]), widths[k]
+        right[k] = slopes[k] - slopes[k - 1]
+    matrix[0, :2] = -widths[0], widths[0]
+    matrix[-1, -2:] = widths[-1], -widths[-1]
+    if n > 3:
+        second = np.diff(slopes) / (points[2:] - points[:-2])
+        right[0] = widths[0] ** 2 * (second[1] - second[0]) / (points[3] - points[0])
+        right[-1] = -(widths[-1] ** 2) * (second[-1] - second[-2]) / (points[-1] - points[-4])
+    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)

@@ -1,0 +1,214 @@
+"""Mobilizers: the joints of a model as products of elementary motions.
+
+Every OpenSim joint type is one line (or one short function) that lists its motions; nothing else in the
+package knows joint types. The conventions (order of coordinates, meaning of speeds) are OpenSim's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from osimlite.errors import ModelError, SimulationError
+from osimlite.multibody.functions import Function
+from osimlite.multibody.motions import (
+    AxisMotion,
+    Fixed,
+    Motion,
+    SphericalMotion,
+    X,
+    Y,
+    Z,
+    place,
+    rotate,
+    translate,
+)
+from osimlite.multibody.spatial import Array, RelativeMotion, inverse, rotation_about, transform
+
+MotionType = Literal["rotational", "translational", "coupled"]
+
+# Coordinates in OpenSim's order: planar rz, tx, ty; free rx, ry, rz, tx, ty, tz.
+MOTIONS: dict[str, tuple[Motion, ...]] = {
+    "WeldJoint": (),
+    "PinJoint": (rotate(Z, 0),),
+    "SliderJoint": (translate(X, 0),),
+    "PlanarJoint": (translate(X, 1), translate(Y, 2), rotate(Z, 0)),
+    "UniversalJoint": (rotate(X, 0), rotate(Y, 1)),
+    "GimbalJoint": (rotate(X, 0), rotate(Y, 1), rotate(Z, 2)),
+    "BallJoint": (SphericalMotion((0, 1, 2)),),
+    "FreeJoint": (translate(X, 3), translate(Y, 4), translate(Z, 5), SphericalMotion((0, 1, 2))),
+}
+"""X_FM of the joint types that have no properties of their own."""
+
+
+def ellipsoid(radii: Sequence[float]) -> tuple[Motion, ...]:
+    """Motions of an EllipsoidJoint: rx, ry, rz on the ellipsoid with `radii` (m) along F."""
+    return (SphericalMotion((0, 1, 2), np.array(radii, dtype=float)),)
+
+
+def scapulothoracic(
+    radii: Sequence[float], winging_origin: Sequence[float], winging_direction: float
+) -> tuple[Motion, ...]:
+    """Motions of a ScapulothoracicJoint.
+
+    Args:
+        radii: of the thoracic ellipsoid along F (m).
+        winging_origin: x, y of a point of the winging axis (m).
+        winging_direction: angle of the winging axis (rad).
+    """
+    quarter = rotation_about(np.array(Z), math.pi / 2)
+    x, y = winging_origin
+    axis = (-math.sin(winging_direction), math.cos(winging_direction), 0.0)
+    return (
+        place(quarter),
+        SphericalMotion((0, 1, 2), np.array((radii[1], radii[0], radii[2]), dtype=float)),
+        place(quarter.T),
+        place(None, (x, y, 0.0)),
+        rotate(axis, 3),
+        place(None, (-x, -y, 0.0)),
+    )
+
+
+class TransformAxis(NamedTuple):
+    """One axis of a CustomJoint: `function` of `coordinates` (places in the joint) along or about `axis`."""
+
+    coordinates: tuple[int, ...]
+    axis: Sequence[float]
+    function: Function
+
+
+def custom(rotations: Sequence[TransformAxis], translations: Sequence[TransformAxis]) -> tuple[Motion, ...]:
+    """Motions of a CustomJoint: three translations along axes of F, then three body-fixed rotations.
+
+    Raises:
+        ModelError: an axis has no direction.
+    """
+    return tuple(_along("translate", axis) for axis in translations) + tuple(
+        _along("rotate", axis) for axis in rotations
+    )
+
+
+def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
+    direction = np.array(axis.axis, dtype=float)
+    length = float(np.linalg.norm(direction))
+    if not length > 0.0:
+        raise ModelError(f"the axis {tuple(axis.axis)} of a transform has no direction; give one that is not zero")
+    return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
+
+
+def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...]:
+    """What each of `count` coordinates of a joint does.
+
+    A coordinate that drives an axis with slope exactly 1 or -1 has the motion of that axis (of the last such
+    axis, translations counting after rotations); any other is coupled.
+    """
+    types: list[MotionType] = ["coupled"] * count
+    axes = [axis for motion in motions for axis in motion.elementary() if isinstance(axis, AxisMotion)]
+    for axis in sorted(axes, key=lambda axis: axis.kind):
+        if axis.function.slope in (1.0, -1.0):
+            types[axis.coordinates[0]] = "rotational" if axis.kind == "rotate" else "translational"
+    return tuple(types)
+
+
+@dataclass(frozen=True, eq=False)
+class Mobilizer:
+    """How a body moves in the body (or ground) that carries it.
+
+    The joint says T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions` are the factors of X_FM.
+    `reversed` tells that the joint's child carries its parent in the tree: nothing else changes, the speeds
+    still are those of M in F.
+
+    Attributes:
+        joint: absolute path of the joint.
+        joint_type: OpenSim's class name of the joint, for messages.
+        motions: factors of X_FM.
+        coordinates: index in the mechanism of each of the joint's coordinates.
+        parent_frame: X_PF (4, 4), the joint's parent frame in its body (or ground).
+        child_frame: X_CM (4, 4), the joint's child frame in its body (or ground).
+    """
+
+    joint: str
+    joint_type: str
+    motions: tuple[Motion, ...]
+    coordinates: tuple[int, ...] = ()
+    parent_frame: Array = field(default_factory=transform)
+    child_frame: Array = field(default_factory=transform)
+    reversed: bool = False
+
+    def across(self, q: Array) -> Array:
+        """X_FM (4, 4) at the joint's own coordinates `q` (k,)."""
+        return self.across_motion(q, np.zeros(len(q))).matrix
+
+    def across_motion(self, q: Array, u: Array) -> RelativeMotion:
+        """Motion of M in F: transform, hinge matrix H_FM, velocity H u and Hdot u, all in F; q and u (k,)."""
+        motion = RelativeMotion.fixed(np.eye(4), len(q))
+        for part in self.motions:
+            motion = motion.then(part.relative(q, u))
+        return motion
+
+    def relative(self, q: Array, u: Array) -> RelativeMotion:
+        """Motion of the carried body in the carrying body, at the joint's own `q` and `u` (k,)."""
+        motion, outer = self._ends
+        for part in self.motions:
+            motion = motion.then(part.relative(q, u))
+        motion = motion.then(outer)
+        return motion.inverse() if self.reversed else motion
+
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """The way from the carrying to the carried body as fixed transforms and one-axis motions, in order.
+
+        Its product equals the transform of :meth:`relative`; the numbers in ``coordinates`` of each motion
+        are places among `coordinates` of this mobilizer. This is all that a program with one-axis joints
+        needs to know.
+        """
+        motions = (Fixed(self.parent_frame), *self.motions, Fixed(inverse(self.child_frame)))
+        chain = [part for motion in motions for part in motion.elementary()]
+        return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
+
+    def rate_matrix(self, q: Array) -> Array:
+        """N (k, k) with qdot = N u."""
+        matrix = np.eye(len(q))
+        with _named(self.joint):
+            for motion in self.motions:
+                part = motion.rates(q)
+                if part is not None:
+                    matrix[np.ix_(motion.coordinates, motion.coordinates)] = part
+        return matrix
+
+    def rate_bias(self, q: Array, u: Array) -> Array:
+        """Ndot u (k,), so that qddot = N udot + Ndot u."""
+        bias = np.zeros(len(q))
+        with _named(self.joint):
+            for motion in self.motions:
+                part = motion.rate_bias(q, u)
+                if part is not None:
+                    bias[list(motion.coordinates)] = part
+        return bias
+
+    @cached_property
+    def speeds_are_rates(self) -> bool:
+        """Whether qdot = u for every coordinate of the joint."""
+        return all(type(motion).rates is Motion.rates for motion in self.motions)
+
+    @cached_property
+    def _ends(self) -> tuple[RelativeMotion, RelativeMotion]:
+        count = len(self.coordinates)
+        return (
+            RelativeMotion.fixed(self.parent_frame, count),
+            RelativeMotion.fixed(inverse(self.child_frame), count),
+        )
+
+
+@contextmanager
+def _named(joint: str) -> Iterator[None]:
+    """Puts the joint's path in front of what a motion has to complain about."""
+    try:
+        yield
+    except SimulationError as error:
+        raise SimulationError(f"{joint}: {error.message}") from None

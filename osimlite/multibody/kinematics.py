@@ -1,0 +1,88 @@
+"""Where every body of a mechanism is and how it moves, in one pass from the root outwards.
+
+Arrays over bodies have one row more than there are bodies: the last is ground, which -1, the parent index of a
+body that ground carries, picks out. All vectors are along the axes of ground; spatial velocities and accelerations
+stack the angular part over the linear part of the body's origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array, carried, cross, skew, transform, turned
+
+if TYPE_CHECKING:
+    from osimlite.multibody.mechanism import Mechanism
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kinematics:
+    """A mechanism of b bodies and n coordinates at one state.
+
+    Attributes:
+        q: coordinate values (n,).
+        u: generalized speeds (n,).
+        rotations: of each body in ground (b + 1, 3, 3).
+        origins: of each body in ground (b + 1, 3), m.
+        jacobians: from the n speeds to the velocity of each body (b + 1, 6, n).
+        velocities: of each body in ground (b + 1, 6).
+        biases: the accelerations (b + 1, 6) that the bodies have while all udot are zero.
+    """
+
+    mechanism: Mechanism
+    q: Array
+    u: Array
+    rotations: Array
+    origins: Array
+    jacobians: Array
+    velocities: Array
+    biases: Array
+
+    def transform(self, body: int) -> Array:
+        """The body in ground (4, 4)."""
+        return transform(self.rotations[body], self.origins[body])
+
+    def point(self, body: int, station: Array) -> Array:
+        """Position in ground (3,) of a `station` (3,) given in the body's frame."""
+        position: Array = self.origins[body] + self.rotations[body] @ station
+        return position
+
+    def point_velocity(self, body: int, station: Array) -> Array:
+        """Velocity in ground (3,) of a `station` (3,) given in the body's frame."""
+        velocity: Array = self.velocities[body]
+        return velocity[3:] + cross(velocity[:3], self.rotations[body] @ station)
+
+    def point_jacobian(self, body: int, station: Array) -> Array:
+        """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
+        matrix: Array = self.jacobians[body].copy()
+        matrix[3:] -= skew(self.rotations[body] @ station) @ matrix[:3]
+        return matrix
+
+    def accelerations(self, udot: Array) -> Array:
+        """Spatial accelerations of all bodies (b + 1, 6) for the derivatives `udot` (n,) of the speeds."""
+        result: Array = self.biases + self.jacobians @ udot
+        return result
+
+
+def kinematics(mechanism: Mechanism, q: Array, u: Array) -> Kinematics:
+    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,)."""
+    count, size = len(mechanism.bodies), len(q)
+    rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
+    # The columns of RelativeMotion, for each body in ground.
+    blocks = np.zeros((count + 1, 6, size + 2))
+    rotations[-1] = np.eye(3)
+    for index, body in enumerate(mechanism.bodies):
+        parent, own = body.parent, list(body.mobilizer.coordinates)
+        motion = body.mobilizer.relative(q[own], u[own])
+        arm = rotations[parent] @ motion.translation
+        moved = turned(rotations[parent], motion.block)
+        rotations[index] = rotations[parent] @ motion.rotation
+        origins[index] = origins[parent] + arm
+        blocks[index] = carried(blocks[parent], arm, moved[:, -2])
+        blocks[index][:, [*own, size, size + 1]] += moved
+    return Kinematics(
+        mechanism, q, u, rotations, origins, blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1]
+    )

@@ -1,0 +1,355 @@
+"""The mechanism: a flat tree of bodies and mobilizers, and what can be asked of it.
+
+Bodies stand in an order in which every body follows the one that carries it; -1 stands for ground. Coordinates stand
+in the order of OpenSim's CoordinateSet, and values q, generalized speeds u, their derivatives udot and generalized
+forces all use that order. The speeds are the rates of the coordinates except for ball, free, ellipsoid and
+scapulothoracic joints, whose rotational speeds are the angular velocity of the joint's child frame in its parent frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.errors import ModelError
+from osimlite.multibody import dynamics
+from osimlite.multibody.constraints import Constraint, Lock
+from osimlite.multibody.dynamics import MassCentres, Wrench
+from osimlite.multibody.joints import Mobilizer, MotionType
+from osimlite.multibody.kinematics import Kinematics, kinematics
+from osimlite.multibody.spatial import Array
+from osimlite.text import did_you_mean
+
+GROUND = -1
+
+Values = ArrayLike | Mapping[str, float]
+"""One number per coordinate: an array in coordinate order, or numbers by coordinate name."""
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Mass (kg), mass centre (3,) in the body frame (m), inertia (3, 3) about it along body axes (kg·m²)."""
+
+    mass: float
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+
+@dataclass(frozen=True)
+class CoordinateInfo:
+    """What the model says of one coordinate (rad or m, and per second). `joint` is the path of its joint."""
+
+    name: str
+    path: str
+    joint: str
+    motion_type: MotionType
+    default_value: float = 0.0
+    default_speed: float = 0.0
+    range: tuple[float, float] = (-10.0, 10.0)
+    clamped: bool = False
+    locked: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class MobileBody:
+    """A body, the index of the body that carries it (-1: ground), and the mobilizer between them."""
+
+    name: str
+    path: str
+    parent: int
+    mass_properties: MassProperties
+    mobilizer: Mobilizer
+
+
+class FramePlacement(NamedTuple):
+    """A frame fixed to a body (index, -1 for ground); `transform` (4, 4) is the frame in the body."""
+
+    body: int
+    transform: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A tree of bodies under gravity.
+
+    Wherever a method takes q or u, an array (n,) in the order of `coordinates` or a mapping by coordinate name will
+    do; names left out take their default. A body or frame is named by its absolute path, a body also by its name.
+    Every method raises ModelError for a name that does not exist and for values of the wrong number.
+
+    Attributes:
+        bodies: carriers before the carried.
+        coordinates: in the order of all arrays.
+        gravity: acceleration (3,) in ground (m/s²).
+        frames: every frame fixed to a body or to ground, by absolute path.
+        constraints: what holds besides the joints; the locks of locked coordinates are put before them.
+    """
+
+    name: str
+    bodies: tuple[MobileBody, ...]
+    coordinates: tuple[CoordinateInfo, ...]
+    gravity: Array = field(default_factory=lambda: np.array((0.0, -9.80665, 0.0)))
+    frames: Mapping[str, FramePlacement] = field(default_factory=dict)
+    constraints: tuple[Constraint, ...] = ()
+
+    def __post_init__(self) -> None:
+        for index, body in enumerate(self.bodies):
+            if not GROUND <= body.parent < index:
+                raise ModelError(
+                    f"body '{body.name}' stands before the body that carries it; sort the bodies from ground outwards"
+                )
+        places = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
+        if places != list(range(len(self.coordinates))):
+            raise ModelError(f"the joints of '{self.name}' do not share out its coordinates one by one")
+        locks = tuple(Lock(index) for index, info in enumerate(self.coordinates) if info.locked)
+        object.__setattr__(self, "constraints", (*locks, *self.constraints))
+
+    # ------------------------------------------------------------------------------------ names and states
+    @cached_property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names in the order of all arrays."""
+        return tuple(info.name for info in self.coordinates)
+
+    def coordinate_index(self, name: str) -> int:
+        """Place of a coordinate, by its name or absolute path; of several with one name, that of the first."""
+        try:
+            return self._coordinate_places[name]
+        except KeyError:
+            near = did_you_mean(name, self.coordinate_names)
+            raise ModelError(f"'{self.name}' has no coordinate '{name}'{near}") from None
+
+    def placement(self, name: str) -> FramePlacement:
+        """Body index and transform of a frame by absolute path, of a body (or ground) also by name."""
+        try:
+            return self._placements[name]
+        except KeyError:
+            near = did_you_mean(name, self._placements)
+            raise ModelError(f"'{self.name}' has no body or frame '{name}'{near}") from None
+
+    def default_state(self) -> tuple[Array, Array]:
+        """Default values (n,) and speeds (n,), these changed as little as the constraints demand."""
+        q, u = self.values({}), self.speeds({})
+        if self.constraints:
+            state = kinematics(self, q, u)
+            rows, wanted = dynamics.stacked([item.velocity_equations(state) for item in self.constraints])
+            u = u + np.linalg.pinv(rows) @ (wanted - rows @ u)
+        return q, u
+
+    def values(self, q: Values) -> Array:
+        """Coordinate values as an array (n,)."""
+        return self._array(q, "value", [info.default_value for info in self.coordinates])
+
+    def speeds(self, u: Values) -> Array:
+        """Generalized speeds as an array (n,)."""
+        return self._array(u, "speed", [info.default_speed for info in self.coordinates])
+
+    def at(self, q: Values, u: Values | None = None) -> Kinematics:
+        """Poses and velocities of all bodies (u None: at rest), from which everything else follows."""
+        values = self.values(q)
+        return kinematics(self, values, np.zeros(len(values)) if u is None else self.speeds(u))
+
+    # ------------------------------------------------------------------------------------------ kinematics
+    def body_transforms(self, q: Values) -> dict[str, Array]:
+        """Transform (4, 4) in ground of every body, by name."""
+        state = self.at(q)
+        return {body.name: state.transform(index) for index, body in enumerate(self.bodies)}
+
+    def body_velocities(self, q: Values, u: Values) -> dict[str, Array]:
+        """Velocity (6,) in ground of every body, by name: angular, then that of the origin."""
+        velocities = self.at(q, u).velocities
+        return {body.name: velocities[index] for index, body in enumerate(self.bodies)}
+
+    def body_accelerations(self, q: Values, u: Values, udot: Values) -> dict[str, Array]:
+        """Acceleration (6,) in ground of every body, by name: angular, then that of the origin."""
+        accelerations = self.at(q, u).accelerations(self._array(udot, "acceleration"))
+        return {body.name: accelerations[index] for index, body in enumerate(self.bodies)}
+
+    def frame_transform(self, frame: str, q: Values) -> Array:
+        """Transform (4, 4) in ground of a frame."""
+        body, placed = self.placement(frame)
+        result: Array = self.at(q).transform(body) @ placed
+        return result
+
+    def station_position(self, frame: str, station: ArrayLike, q: Values) -> Array:
+        """Position (3,) in ground of a point given in a frame (m)."""
+        return self.at(q).point(*self._station(frame, station))
+
+    def station_velocity(self, frame: str, station: ArrayLike, q: Values, u: Values) -> Array:
+        """Velocity (3,) in ground of a point fixed in a frame (m/s)."""
+        return self.at(q, u).point_velocity(*self._station(frame, station))
+
+    def jacobian(self, frame: str, q: Values, station: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """Matrix (6, n) from u to a frame's angular velocity and a station's velocity, in ground."""
+        return self.at(q).point_jacobian(*self._station(frame, station))
+
+    def rate_matrix(self, q: Values) -> Array:
+        """N (n, n) with qdot = N u.
+
+        Raises:
+            SimulationError: a ball, free or ellipsoid joint stands where N is singular.
+        """
+        values, matrix = self.values(q), np.eye(len(self.coordinates))
+        for mobilizer in self._turning:
+            own = list(mobilizer.coordinates)
+            matrix[np.ix_(own, own)] = mobilizer.rate_matrix(values[own])
+        return matrix
+
+    def rate_bias(self, q: Values, u: Values) -> Array:
+        """Ndot u (n,), so that qddot = N udot + Ndot u; raises as :meth:`rate_matrix`."""
+        values, speeds, bias = self.values(q), self.speeds(u), np.zeros(len(self.coordinates))
+        for mobilizer in self._turning:
+            own = list(mobilizer.coordinates)
+            bias[own] = mobilizer.rate_bias(values[own], speeds[own])
+        return bias
+
+    def coordinate_rates(self, q: Values, u: Values) -> Array:
+        """Rates of the coordinates (n,) for given generalized speeds; raises as :meth:`rate_matrix`."""
+        speeds = self.speeds(u)
+        return self.rate_matrix(q) @ speeds if self._turning else speeds.copy()
+
+    def speeds_from_rates(self, q: Values, qdot: Values) -> Array:
+        """Generalized speeds (n,) for given rates of the coordinates; raises as :meth:`rate_matrix`."""
+        rates = self._array(qdot, "rate")
+        return np.asarray(np.linalg.solve(self.rate_matrix(q), rates), dtype=np.float64)
+
+    # -------------------------------------------------------------------------------------------- dynamics
+    @cached_property
+    def inertial(self) -> tuple[Array, Array, Array]:
+        """Masses (b,), mass centres (b, 3) and inertias (b, 3, 3) of all bodies, as in `MassProperties`."""
+        properties = [body.mass_properties for body in self.bodies]
+        return (
+            np.array([item.mass for item in properties], dtype=float),
+            np.array([item.center for item in properties], dtype=float).reshape(-1, 3),
+            np.array([item.inertia for item in properties], dtype=float).reshape(-1, 3, 3),
+        )
+
+    def mass_matrix(self, q: Values) -> Array:
+        """M (n, n) for the generalized speeds."""
+        return MassCentres.of(self.at(q)).mass_matrix()
+
+    def bias(self, q: Values, u: Values) -> Array:
+        """C (n,), the velocity-dependent part of M udot + C = gravity + applied forces."""
+        state = self.at(q, u)
+        return MassCentres.of(state).inertia_forces(state.biases)
+
+    def gravity_forces(self, q: Values) -> Array:
+        """Generalized forces of gravity (n,)."""
+        return MassCentres.of(self.at(q)).gravity_forces()
+
+    def generalized_forces(self, q: Values, body_wrenches: Mapping[str, Wrench]) -> Array:
+        """Generalized forces (n,) of wrenches at the origins of bodies or frames, along ground's axes."""
+        return self._applied(self.at(q), {}, body_wrenches)
+
+    def acceleration(
+        self,
+        q: Values,
+        u: Values,
+        generalized_forces: Values | None = None,
+        body_wrenches: Mapping[str, Wrench] | None = None,
+    ) -> Array:
+        """Derivatives of the generalized speeds (n,) under gravity, the given forces and the constraints.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds, which must obey the constraints already (that of a locked coordinate is zero).
+            generalized_forces: conjugate to the generalized speeds (N, N·m); zero for names left out.
+            body_wrenches: by body or frame, applied at its origin, along ground's axes.
+
+        Raises:
+            SimulationError: a coordinate moves no mass, or a number is not finite.
+        """
+        state = self.at(q, u)
+        applied = self._applied(state, {} if generalized_forces is None else generalized_forces, body_wrenches or {})
+        return dynamics.accelerations(state, applied, self.constraints)
+
+    def inverse_dynamics(
+        self, q: Values, u: Values, udot: Values, body_wrenches: Mapping[str, Wrench] | None = None
+    ) -> Array:
+        """Generalized forces (n,) that give `udot` against gravity and the wrenches, constraints left aside."""
+        state = self.at(q, u)
+        bodies = MassCentres.of(state)
+        needed = bodies.inertia_forces(state.accelerations(self._array(udot, "acceleration")))
+        return needed - bodies.gravity_forces() - self._applied(state, {}, body_wrenches or {})
+
+    @cached_property
+    def total_mass(self) -> float:
+        """Mass of all bodies (kg)."""
+        return float(self.inertial[0].sum())
+
+    def center_of_mass(self, q: Values) -> Array:
+        """Mass centre (3,) in ground (m)."""
+        return self._mean(MassCentres.of(self.at(q)).positions())
+
+    def center_of_mass_velocity(self, q: Values, u: Values) -> Array:
+        """Velocity (3,) of the mass centre in ground (m/s)."""
+        return self._mean(MassCentres.of(self.at(q, u)).velocities())
+
+    def kinetic_energy(self, q: Values, u: Values) -> float:
+        """Kinetic energy (J)."""
+        return MassCentres.of(self.at(q, u)).kinetic_energy()
+
+    def potential_energy(self, q: Values) -> float:
+        """Potential energy of gravity (J), zero with the mass centre at ground's origin."""
+        return -self.total_mass * float(self.gravity @ self.center_of_mass(q))
+
+    def momentum(self, q: Values, u: Values) -> tuple[Array, Array]:
+        """Linear momentum (3,) in kg·m/s, and angular momentum (3,) about ground's origin in kg·m²/s."""
+        return MassCentres.of(self.at(q, u)).momentum()
+
+    # --------------------------------------------------------------------------------------------- helpers
+    @cached_property
+    def _coordinate_places(self) -> dict[str, int]:
+        places = {info.path: index for index, info in enumerate(self.coordinates)}
+        for index, info in enumerate(self.coordinates):
+            places.setdefault(info.name, index)
+        return places
+
+    @cached_property
+    def _placements(self) -> dict[str, FramePlacement]:
+        still = np.eye(4)
+        places = {name: FramePlacement(GROUND, still) for name in ("ground", "/ground")}
+        for index, body in enumerate(self.bodies):
+            places[body.name] = places[body.path] = FramePlacement(index, still)
+        return places | dict(self.frames)
+
+    @cached_property
+    def _turning(self) -> tuple[Mobilizer, ...]:
+        """The mobilizers whose speeds are not the rates of their coordinates."""
+        return tuple(body.mobilizer for body in self.bodies if not body.mobilizer.speeds_are_rates)
+
+    def _mean(self, vectors: Array) -> Array:
+        """Mean of one vector per body (b, 3), weighted by mass; zero where nothing has mass."""
+        mean: Array = self.inertial[0] @ vectors / (self.total_mass or 1.0)
+        return mean
+
+    def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
+        body, placed = self.placement(frame)
+        point: Array = placed[:3, :3] @ np.asarray(station, dtype=float) + placed[:3, 3]
+        return body, point
+
+    def _applied(self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]) -> Array:
+        total = self._array(forces, "force")
+        for name, (force, torque) in wrenches.items():
+            body, placed = self.placement(name)
+            load = np.concatenate((np.asarray(torque, dtype=float), np.asarray(force, dtype=float)))
+            total = total + load @ state.point_jacobian(body, placed[:3, 3])
+        return total
+
+    def _array(self, values: Values, what: str, defaults: Sequence[float] = ()) -> Array:
+        count = len(self.coordinates)
+        if isinstance(values, Mapping):
+            result = np.array(defaults, dtype=float) if defaults else np.zeros(count)
+            for name, value in values.items():
+                result[self.coordinate_index(name)] = value
+            return result
+        result = np.asarray(values, dtype=float)
+        if result.shape != (count,):
+            given = " × ".join(str(size) for size in result.shape) or "a single one"
+            raise ModelError(
+                f"'{self.name}' takes one {what} for each of its {count} coordinates, in their order; got {given}"
+            )
+        return result

@@ -1,0 +1,224 @@
+"""Elementary motions: what the transform of every joint is a product of.
+
+A motion carries its outgoing frame in its incoming frame as its own few generalized coordinates q and speeds
+u say. The numbers in `coordinates` are places among the coordinates of the joint; `q` and `u` are all those
+of the joint.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from osimlite.errors import SimulationError
+from osimlite.multibody.functions import IDENTITY, Function
+from osimlite.multibody.spatial import (
+    Array,
+    RelativeMotion,
+    cross,
+    rotation_about,
+    rotation_xyz,
+    skew,
+    transform,
+)
+from osimlite.multibody.spatial import inverse as inverse_transform
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class Motion(ABC):
+    """One factor of a joint's transform."""
+
+    coordinates: tuple[int, ...]
+
+    @abstractmethod
+    def relative(self, q: Array, u: Array) -> RelativeMotion:
+        """Motion of the outgoing frame in the incoming frame."""
+
+    @abstractmethod
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """The same transform as a product of fixed transforms and motions about or along one axis."""
+
+    def rates(self, q: Array) -> Array | None:
+        """N (k, k) with qdot = N u for these `coordinates`; None if the speeds are the rates."""
+        return None
+
+    def rate_bias(self, q: Array, u: Array) -> Array | None:
+        """Ndot u (k,), so that qddot = N udot + Ndot u; None if it is zero."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed(Motion):
+    """A transform that never changes; `matrix` (4, 4) is the outgoing frame in the incoming frame."""
+
+    matrix: Array
+    coordinates: tuple[int, ...] = ()
+
+    def relative(self, q: Array, u: Array) -> RelativeMotion:
+        """A frame at rest."""
+        return RelativeMotion.fixed(self.matrix, len(q))
+
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """Itself."""
+        return (self,)
+
+    def inverse(self) -> Fixed:
+        """The motion of the incoming frame in the outgoing frame."""
+        return Fixed(inverse_transform(self.matrix))
+
+
+@dataclass(frozen=True, eq=False)
+class AxisMotion(Motion):
+    """Rotation about (rad) or translation along (m) a fixed unit axis, by a function of coordinates."""
+
+    kind: Literal["rotate", "translate"]
+    axis: Array
+    coordinates: tuple[int, ...]
+    function: Function = IDENTITY
+
+    @property
+    def coordinate(self) -> int | None:
+        """The coordinate that *is* the amount, or None if the amount is any other function."""
+        return self.coordinates[0] if self.function == IDENTITY else None
+
+    def amount(self, q: Array) -> float:
+        """How far the motion goes (rad or m)."""
+        return self.function.evaluate(q[list(self.coordinates)])[0]
+
+    def relative(self, q: Array, u: Array) -> RelativeMotion:
+        """The outgoing frame turned about or moved along the axis."""
+        own = list(self.coordinates)
+        amount, gradient, hessian = self.function.evaluate(q[own])
+        rows = slice(0, 3) if self.kind == "rotate" else slice(3, 6)
+        speeds, along = u[own], np.zeros(len(q) + 2)
+        along[own] = gradient
+        along[-2:] = gradient @ speeds, speeds @ hessian @ speeds
+        block = np.zeros((6, len(q) + 2))
+        block[rows] = np.outer(self.axis, along)
+        if self.kind == "rotate":
+            return RelativeMotion(rotation_about(self.axis, amount), np.zeros(3), block)
+        return RelativeMotion(np.eye(3), self.axis * amount, block)
+
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """Itself."""
+        return (self,)
+
+    def inverse(self) -> AxisMotion:
+        """The motion of the incoming frame in the outgoing frame: the same about the opposite axis."""
+        return AxisMotion(self.kind, -self.axis, self.coordinates, self.function)
+
+
+@dataclass(frozen=True, eq=False)
+class SphericalMotion(Motion):
+    """Rotation by three body-fixed X-Y-Z angles, whose generalized speeds are the angular velocity.
+
+    The angular velocity is that of the outgoing frame in the incoming frame F, expressed in F, so the speeds
+    are not the rates of the angles. With `radii` (m) the origin moves on an ellipsoid: it lies where the
+    outgoing Z axis, stretched by the radii along F, ends.
+    """
+
+    coordinates: tuple[int, ...]
+    radii: Array = field(default_factory=lambda: np.zeros(3))
+
+    def relative(self, q: Array, u: Array) -> RelativeMotion:
+        """The outgoing frame turned by the angles, its origin on the ellipsoid."""
+        own = list(self.coordinates)
+        rotation = rotation_xyz(q[own])
+        normal, w = rotation[:, 2], u[own]
+        drift = cross(w, normal)
+        block = np.zeros((6, len(q) + 2))
+        block[:3, own] = np.eye(3)
+        block[3:, own] = -self.radii[:, None] * skew(normal)
+        block[:3, -2] = w
+        block[3:, -2] = self.radii * drift
+        block[3:, -1] = self.radii * cross(w, drift)
+        return RelativeMotion(rotation, self.radii * normal, block)
+
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """The three translations to the ellipsoid, if it has a size, and the three rotations."""
+        turns = tuple(
+            AxisMotion("rotate", np.array(axis), (place,))
+            for axis, place in zip((X, Y, Z), self.coordinates, strict=True)
+        )
+        slides = tuple(
+            AxisMotion("translate", np.array(axis), self.coordinates, EllipsoidPoint(component, float(radius)))
+            for component, (axis, radius) in enumerate(zip((X, Y, Z), self.radii, strict=True))
+            if radius != 0.0
+        )
+        return slides + turns
+
+    def rates(self, q: Array) -> Array:
+        """N (3, 3); SimulationError where the second angle makes it singular."""
+        s1, s2, c1, c2 = self._angles(q)
+        return np.array(
+            ((1.0, s1 * s2 / c2, -c1 * s2 / c2), (0.0, c1, s1), (0.0, -s1 / c2, c1 / c2)),
+        )
+
+    def rate_bias(self, q: Array, u: Array) -> Array:
+        """Ndot u (3,); SimulationError where the second angle makes N singular."""
+        s1, s2, c1, c2 = self._angles(q)
+        rates = self.rates(q)
+        r1, r2, r3 = (rates @ u[list(self.coordinates)]).tolist()
+        # w = B qdot with columns x, Rx(q1) y, Rx(q1) Ry(q2) z; hence Ndot u = -N Bdot qdot.
+        drift = (
+            c2 * r2 * r3,
+            -s1 * r1 * r2 + (s1 * s2 * r2 - c1 * c2 * r1) * r3,
+            c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3,
+        )
+        bias: Array = -rates @ np.array(drift)
+        return bias
+
+    def _angles(self, q: Array) -> tuple[float, float, float, float]:
+        first, second = q[self.coordinates[0]], q[self.coordinates[1]]
+        s1, s2, c1, c2 = math.sin(first), math.sin(second), math.cos(first), math.cos(second)
+        if abs(c2) < 1e-12:
+            raise SimulationError(
+                "the second of three angles stands at ±90 degrees, where their rates are not defined; "
+                "choose another pose, or turn the frames of the joint"
+            )
+        return s1, s2, c1, c2
+
+
+@dataclass(frozen=True)
+class EllipsoidPoint(Function):
+    """One component of the point that `SphericalMotion` reaches, as a function of its three angles."""
+
+    component: int
+    radius: float
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """Value, gradient (3,) and Hessian (3, 3) at the three angles."""
+        a, b = float(arguments[0]), float(arguments[1])
+        sa, ca, sb, cb = math.sin(a), math.cos(a), math.sin(b), math.cos(b)
+        gradient, hessian = np.zeros(3), np.zeros((3, 3))
+        if self.component == 0:
+            value = sb
+            gradient[1], hessian[1, 1] = cb, -sb
+        else:
+            # -sin a cos b, and its derivative with respect to -a: cos a cos b.
+            f, df = (-sa, -ca) if self.component == 1 else (ca, -sa)
+            value = f * cb
+            gradient[:2] = df * cb, -f * sb
+            hessian[:2, :2] = (-f * cb, -df * sb), (-df * sb, -f * cb)
+        return self.radius * value, self.radius * gradient, self.radius * hessian
+
+
+def rotate(axis: Sequence[float], coordinate: int) -> AxisMotion:
+    """Rotation about a unit `axis` by a coordinate."""
+    return AxisMotion("rotate", np.array(axis), (coordinate,))
+
+
+def translate(axis: Sequence[float], coordinate: int) -> AxisMotion:
+    """Translation along a unit `axis` by a coordinate."""
+    return AxisMotion("translate", np.array(axis), (coordinate,))
+
+
+def place(rotation: Array | None = None, translation: Sequence[float] | None = None) -> Fixed:
+    """A fixed rotation and translation."""
+    return Fixed(transform(rotation, translation))

@@ -1,0 +1,153 @@
+"""Rotations, rigid transforms, and the algebra of one frame's motion in another.
+
+Spatial vectors stack the angular part over the linear part; the linear part belongs to the origin of the
+moving frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of two 3-vectors (numpy's general one takes ten times as long)."""
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
+
+
+def skew(v: Array) -> Array:
+    """The matrix [v] with [v] a = v × a."""
+    x, y, z = v.tolist()
+    return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (Rodrigues' formula)."""
+    x, y, z = axis.tolist()
+    s, c = float(np.sin(angle)), float(np.cos(angle))
+    d = 1.0 - c
+    return np.array(
+        (
+            (x * x * d + c, x * y * d - z * s, x * z * d + y * s),
+            (x * y * d + z * s, y * y * d + c, y * z * d - x * s),
+            (x * z * d - y * s, y * z * d + x * s, z * z * d + c),
+        )
+    )
+
+
+def rotation_xyz(angles: Array) -> Array:
+    """Rotation matrix Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z `angles` (rad)."""
+    (s1, s2, s3), (c1, c2, c3) = np.sin(angles).tolist(), np.cos(angles).tolist()
+    return np.array(
+        (
+            (c2 * c3, -c2 * s3, s2),
+            (c1 * s3 + s1 * s2 * c3, c1 * c3 - s1 * s2 * s3, -s1 * c2),
+            (s1 * s3 - c1 * s2 * c3, s1 * c3 + c1 * s2 * s3, c1 * c2),
+        )
+    )
+
+
+def transform(rotation: Any = None, translation: Any = None) -> Array:
+    """Homogeneous matrix (4, 4) of a rotation matrix and a translation (m); identity for what is left out."""
+    matrix = np.eye(4)
+    if rotation is not None:
+        matrix[:3, :3] = rotation
+    if translation is not None:
+        matrix[:3, 3] = translation
+    return matrix
+
+
+def offset(translation: Any, orientation: Any) -> Array:
+    """Homogeneous matrix of a frame at `translation` (m), turned by body-fixed X-Y-Z `orientation` (rad)."""
+    return transform(rotation_xyz(np.asarray(orientation, dtype=float)), translation)
+
+
+def inverse(matrix: Array) -> Array:
+    """Inverse of a homogeneous matrix."""
+    rotation = matrix[:3, :3].T
+    return transform(rotation, -rotation @ matrix[:3, 3])
+
+
+def turned(rotation: Array, block: Array) -> Array:
+    """Spatial vectors, the columns of `block` (6, c), turned by `rotation` (3, 3)."""
+    return (rotation @ block.reshape(2, 3, -1)).reshape(6, -1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RelativeMotion:
+    """Where frame B is in frame A, and how k generalized speeds move it there. Everything is expressed in A.
+
+    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, then the velocity, then the
+    part of the acceleration that does not depend on the derivatives of the speeds. They stand together because
+    composing motions does nearly the same to all of them.
+    """
+
+    rotation: Array
+    translation: Array
+    block: Array
+
+    @classmethod
+    def fixed(cls, matrix: Array, speeds: int) -> RelativeMotion:
+        """A frame that does not move, seen among `speeds` generalized speeds."""
+        return cls(matrix[:3, :3], matrix[:3, 3], np.zeros((6, speeds + 2)))
+
+    @property
+    def matrix(self) -> Array:
+        """The homogeneous matrix (4, 4) of B in A."""
+        return transform(self.rotation, self.translation)
+
+    @property
+    def jacobian(self) -> Array:
+        """The matrix (6, k) from the speeds to the velocity of B in A."""
+        return self.block[:, :-2]
+
+    @property
+    def velocity(self) -> Array:
+        """Spatial velocity (6,) of B in A."""
+        return self.block[:, -2]
+
+    @property
+    def bias(self) -> Array:
+        """Spatial acceleration (6,) of B in A, as seen in A, while the derivatives of the speeds are zero."""
+        return self.block[:, -1]
+
+    def then(self, other: RelativeMotion) -> RelativeMotion:
+        """Motion of C in A, if `self` is that of B in A and `other` that of C in B."""
+        arm = self.rotation @ other.translation
+        moved = turned(self.rotation, other.block)
+        block = carried(self.block, arm, moved[:, -2])
+        block += moved
+        return RelativeMotion(self.rotation @ other.rotation, self.translation + arm, block)
+
+    def inverse(self) -> RelativeMotion:
+        """Motion of A in B, for the same generalized speeds."""
+        back, p = self.rotation.T, self.translation
+        w, v = self.block[:3, -2], self.block[3:, -2]
+        block = self.block.copy()
+        block[3:] += skew(p) @ self.block[:3]
+        block[3:, -1] += cross(w, cross(w, p) - 2.0 * v)
+        return RelativeMotion(back, -back @ p, -turned(back, block))
+
+
+def carried(block: Array, arm: Array, relative_velocity: Array) -> Array:
+    """What a frame C that moves in B has from the motion of B in A; add its own motion in B, turned into A.
+
+    Args:
+        block: columns of :class:`RelativeMotion` of B in A (6, c).
+        arm: from B's origin to C's origin, in A (3,).
+        relative_velocity: spatial velocity of C in B, in A (6,); it makes the Coriolis acceleration.
+    """
+    result = block.copy()
+    result[3:] -= skew(arm) @ block[:3]
+    w = block[:3, -2]
+    if w.any():
+        result[:3, -1] += cross(w, relative_velocity[:3])
+        result[3:, -1] += cross(w, cross(w, arm) + 2.0 * relative_velocity[3:])
+    return result
