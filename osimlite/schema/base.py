@@ -299,7 +299,7 @@ class ModelComponent(Component, abstract=True):
     """A component of a model."""
 
 
-class Unknown(ModelComponent):
+class Unknown(ModelComponent, abstract=True):
     """An object of a class osimlite does not know (a plug-in, a misspelling), kept as it was written.
 
     `class_name` is its tag in the file, `content` the XML text inside.

@@ -34,6 +34,25 @@ class ContactSphere(ContactGeometry):
     radius: Annotated[float, real("m", "> 0")] = 0.0
 
 
+class ContactCylinder(ContactGeometry):
+    """An endless cylinder along its own Z axis, for paths to wrap around."""
+
+    radius: Annotated[float, real("m", "> 0")] = 0.0
+
+
+class ContactEllipsoid(ContactGeometry):
+    """An ellipsoid with half axes `radii`."""
+
+    radii: Annotated[Vec3, vec3("m", "> 0")] = (0.0, 0.0, 0.0)
+
+
+class ContactTorus(ContactGeometry):
+    """A ring about its own Z axis: a tube whose middle line is a circle of `torus_radius`."""
+
+    torus_radius: Annotated[float, real("m", "> 0")] = 0.0
+    tube_radius: Annotated[float, real("m", "> 0")] = 0.0
+
+
 class ContactMesh(ContactGeometry):
     """A closed surface read from a file."""
 

@@ -6,9 +6,9 @@ import math
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
-from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3
+from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3, word
 from osimlite.schema.geometry import FrameGeometry, Geometry
-from osimlite.schema.references import PhysicalFrameSocket
+from osimlite.schema.references import PhysicalFrameSocket, StationSocket
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 from osimlite.schema.wrapping import WrapObjectSet
 
@@ -57,6 +57,31 @@ class PhysicalOffsetFrame(PhysicalFrame):
     socket_parent: PhysicalFrameSocket = ""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+
+
+_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+class StationDefinedFrame(PhysicalFrame):
+    """A frame laid through stations of one body: from a to b runs `ab_axis`, across a, b and c `ab_x_ac_axis`.
+
+    The second axis is the cross product of b - a and c - a. The origin is the fourth station.
+    """
+
+    socket_point_a: StationSocket = ""
+    socket_point_b: StationSocket = ""
+    socket_point_c: StationSocket = ""
+    socket_origin_point: StationSocket = ""
+    ab_axis: Annotated[str, word(*_AXES)] = "+x"
+    ab_x_ac_axis: Annotated[str, word(*_AXES)] = "+y"
+
+
+class TwoFrameLinker(ModelComponent, abstract=True):
+    """What joins two frames; `frames` holds the offset frames made for it."""
+
+    socket_frame1: PhysicalFrameSocket = ""
+    socket_frame2: PhysicalFrameSocket = ""
+    frames: Many[PhysicalFrame] = none()
 
 
 class BodySet(ModelComponentSet):

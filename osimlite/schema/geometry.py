@@ -38,17 +38,32 @@ class FrameGeometry(Geometry):
     """The three axes of a frame."""
 
     scale_factors: Annotated[Vec3, vec3()] = (0.2, 0.2, 0.2)
-    display_radius: Annotated[float, real("m", ">= 0")] = 0.004
+    display_radius: Annotated[float, real(domain=">= 0")] = 0.004
 
 
 class AnalyticGeometry(Geometry, abstract=True):
     """A shape with a formula."""
 
 
-class Brick(AnalyticGeometry):
+class Brick(Geometry):
     """A box centred on the frame origin, given by half its edge lengths."""
 
     half_lengths: Annotated[Vec3, vec3("m", ">= 0")] = (0.1, 0.2, 0.3)
+
+
+class Arrow(Geometry):
+    """An arrow from a point along a direction."""
+
+    start_point: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    direction: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
+    length: Annotated[float, real(domain=">= 0")] = 1.0
+
+
+class LineGeometry(Geometry):
+    """A straight line between two points."""
+
+    start_point: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    end_point: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
 
 
 class Sphere(AnalyticGeometry):
@@ -68,6 +83,19 @@ class Cylinder(AnalyticGeometry):
 
     radius: Annotated[float, real("m", ">= 0")] = 0.5
     half_height: Annotated[float, real("m", ">= 0")] = 0.5
+
+
+class Cone(AnalyticGeometry):
+    """A cone: where it is, which way it points, how wide and how high."""
+
+    origin: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    direction: Annotated[Vec3, vec3()] = (0.0, 1.0, 0.0)
+    base_radius: Annotated[float, real(domain=">= 0")] = 0.5
+    height: Annotated[float, real(domain=">= 0")] = 1.0
+
+
+class Torus(AnalyticGeometry):
+    """A ring; no property gives its size, only the scale factors do."""
 
 
 class Mesh(Geometry):

@@ -5,14 +5,16 @@ The transform of M (child frame) in F (parent frame) is written X_FM; every clas
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal, Self
+import math
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.fields import LegacyMany, Many, ObjectList, Vec3
+from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
+from osimlite.schema.geometry import Appearance
 from osimlite.schema.references import PhysicalFrameSocket
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
@@ -131,6 +133,37 @@ class FreeJoint(Joint):
     motion_types = ("rotational", "rotational", "rotational", "translational", "translational", "translational")
 
     coordinates: Many[Coordinate] = _coordinates(6)
+
+
+class EllipsoidJoint(Joint):
+    """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
+
+    motion_types = ("rotational", "rotational", "rotational")
+
+    coordinates: Many[Coordinate] = _coordinates(3)
+    radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
+    appearance: Unnamed[Appearance] = made(Appearance)
+
+
+class ScapulothoracicJoint(Joint):
+    """A shoulder blade that glides on an ellipsoid: abduction, elevation, upward rotation, winging."""
+
+    motion_types = ("rotational", "rotational", "rotational", "rotational")
+
+    coordinates: Many[Coordinate] = _coordinates(4)
+    thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
+    scapula_winging_axis_origin: Annotated[tuple[float, float], reals("m", least=2, most=2)] = (0.0, 0.0)
+    scapula_winging_axis_direction: Annotated[float, real("rad")] = 0.0
+
+
+class ConstantCurvatureJoint(Joint):
+    """A rod of fixed length that bends evenly, such as a spine; bends about X and Z, then twist about Y."""
+
+    motion_types = ("rotational", "rotational", "rotational")
+
+    coordinates: Many[Coordinate] = _coordinates(3)
+    neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    length: Annotated[float, real("m", "> 0")] = 1.0
 
 
 class JointSet(ModelComponentSet):

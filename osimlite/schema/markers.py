@@ -1,4 +1,4 @@
-"""Points fixed in frames."""
+"""Points fixed in frames, and the sensors fixed there."""
 
 from __future__ import annotations
 
@@ -32,3 +32,9 @@ class MarkerSet(ModelComponentSet):
 
     objects: LegacyMany[Marker] = none()
     groups: LegacyMany[ObjectGroup] = none()
+
+
+class IMU(ModelComponent):
+    """An inertial measurement unit at the origin of a frame."""
+
+    socket_frame: PhysicalFrameSocket = ""

@@ -11,15 +11,50 @@ from osimlite.schema.base import Component
 from osimlite.schema.fields import Reference
 
 Named = str | Component
+Names = tuple[Named, ...]
 
+# Sockets: a path, absolute or from the component that has the socket.
 FrameSocket = Annotated[Named, Reference("socket", "Frame")]
 PhysicalFrameSocket = Annotated[Named, Reference("socket", "PhysicalFrame")]
+BodySocket = Annotated[Named, Reference("socket", "Body")]
+StationSocket = Annotated[Named, Reference("socket", "Station")]
+CoordinateSocket = Annotated[Named, Reference("socket", "Coordinate")]
+ContactGeometrySocket = Annotated[Named, Reference("socket", "ContactGeometry")]
+ContactSphereSocket = Annotated[Named, Reference("socket", "ContactSphere")]
+ContactHalfSpaceSocket = Annotated[Named, Reference("socket", "ContactHalfSpace")]
+MuscleSocket = Annotated[Named, Reference("socket", "Muscle")]
+ScalarActuatorSocket = Annotated[Named, Reference("socket", "ScalarActuator")]
+ActuatorSockets = Annotated[Names, Reference("socket", "Actuator", "list", required=False)]
 
+# Inputs: a path, a bar and the name of an output.
 TransformInput = Annotated[str, Reference("input", "Transform", required=False)]
+NumberInput = Annotated[str, Reference("input", "double", required=False)]
+NumberInputs = Annotated[tuple[str, ...], Reference("input", "double", "list", required=False)]
+Vec3Inputs = Annotated[tuple[str, ...], Reference("input", "Vec3", "list", required=False)]
+VectorInputs = Annotated[tuple[str, ...], Reference("input", "Vector", "list", required=False)]
 
+# Names and paths that OpenSim looks up in one place each.
 CoordinateName = Annotated[Named, Reference("coordinate-name", "Coordinate")]
+MaybeCoordinateName = Annotated[Named | None, Reference("coordinate-name", "Coordinate", "optional")]
+CoordinateNames = Annotated[Names, Reference("coordinate-name", "Coordinate", "list")]
+CoordinatePaths = Annotated[Names, Reference("model-path", "Coordinate", "list")]
+OwnJointCoordinates = Annotated[Names, Reference("own-joint-coordinate", "Coordinate", "list", required=False)]
+MaybeBodyName = Annotated[Named | None, Reference("body-name", "Body", "optional")]
+FrameName = Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame")]
+MaybeFrameName = Annotated[Named | None, Reference("frame-path-or-body-name", "PhysicalFrame", "optional")]
+ExpressedInFrame = Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False)]
 ContactGeometryNames = Annotated[
-    tuple[Named, ...], Reference("contactgeometry-path-or-name", "ContactGeometry", "list", required=False)
+    Names, Reference("contactgeometry-path-or-name", "ContactGeometry", "list", required=False)
 ]
-SetMemberNames = Annotated[tuple[Named, ...], Reference("set-member", "Object", "list", required=False, legacy=True)]
+WrapObjectName = Annotated[Named, Reference("wrap-object-name", "WrapObject")]
+ActuatorNames = Annotated[Names, Reference("actuator-name", "Actuator", "list", required=False)]
+JointNames = Annotated[Names, Reference("joint-name", "Joint", "list", required=False)]
+PathActuatorPath = Annotated[Named, Reference("owner-path", "PathActuator")]
+SetMemberNames = Annotated[Names, Reference("set-member", "Object", "list", required=False, legacy=True)]
+
+# What lies outside the model: files and the columns and tables in them.
 FileName = Annotated[str, Reference("file", "file", required=False)]
+LegacyFileName = Annotated[str, Reference("file", "file", required=False, legacy=True)]
+MaybeFileName = Annotated[str | None, Reference("file", "file", "optional", required=False)]
+ColumnName = Annotated[str, Reference("column", "column", required=False)]
+MaybeColumnName = Annotated[str | None, Reference("column", "column", "optional", required=False)]

@@ -12,27 +12,99 @@ from importlib import import_module
 from osimlite.schema.base import Object
 
 _AREAS = {
+    "actuators": (
+        "ActivationCoordinateActuator Actuator BodyActuator CoordinateActuator PointActuator "
+        "PointToPointActuator ScalarActuator TorqueActuator"
+    ),
     "base": "Component ModelComponent Object Unknown",
-    "constraints": "Constraint ConstraintSet",
-    "contact": "ContactGeometry ContactGeometrySet ContactHalfSpace ContactMesh ContactSphere",
-    "controllers": "Controller ControllerSet",
+    "constraints": (
+        "ConstantDistanceConstraint Constraint ConstraintSet CoordinateCouplerConstraint PointConstraint "
+        "PointOnLineConstraint RollingOnSurfaceConstraint UnilateralConstraint WeldConstraint"
+    ),
+    "contact": (
+        "ContactCylinder ContactEllipsoid ContactGeometry ContactGeometrySet ContactHalfSpace ContactMesh "
+        "ContactSphere ContactTorus"
+    ),
+    "controllers": (
+        "CMC ControlDistributor ControlSetController Controller ControllerSet CorrectionController "
+        "InputController PrescribedController SynergyController SynergyVector TrackingController"
+    ),
     "coordinates": "Coordinate",
-    "forces": "CoordinateLimitForce Force ForceProducer ForceSet HuntCrossleyContactParameters "
-    "HuntCrossleyContactParametersSet HuntCrossleyForce",
-    "frames": "Body BodySet Frame Ground PhysicalFrame PhysicalOffsetFrame",
-    "functions": "Constant Function",
-    "geometry": "AnalyticGeometry Appearance Brick Cylinder Ellipsoid FrameGeometry Geometry Mesh ModelDisplayHints "
-    "ModelVisualPreferences Sphere SurfaceProperties",
-    "joints": "BallJoint FreeJoint GimbalJoint Joint JointSet PinJoint PlanarJoint SliderJoint UniversalJoint "
-    "WeldJoint",
-    "markers": "Marker MarkerSet Point Station",
+    "custom_joint": "CustomJoint SpatialTransform TransformAxis",
+    "examples": "HopperDevice ToyPropMyoController ToyReflexController",
+    "forces": (
+        "CoordinateLimitForce ElasticFoundationContactParameters ElasticFoundationContactParametersSet "
+        "ElasticFoundationForce ExponentialContactForce Force ForceProducer ForceSet "
+        "HuntCrossleyContactParameters HuntCrossleyContactParametersSet HuntCrossleyForce "
+        "MeyerFregly2016Force SmoothSphereHalfSpaceForce"
+    ),
+    "frames": "Body BodySet Frame Ground PhysicalFrame PhysicalOffsetFrame StationDefinedFrame TwoFrameLinker",
+    "functions": (
+        "Constant ExpressionBasedFunction Function FunctionSet GCVSpline GCVSplineSet LinearFunction "
+        "MultiplierFunction MultivariatePolynomialFunction PiecewiseConstantFunction "
+        "PiecewiseLinearFunction PolynomialFunction SimmSpline Sine StepFunction"
+    ),
+    "geometry": (
+        "AnalyticGeometry Appearance Arrow Brick Cone Cylinder Ellipsoid FrameGeometry Geometry "
+        "LineGeometry Mesh ModelDisplayHints ModelVisualPreferences Sphere SurfaceProperties Torus"
+    ),
+    "joints": (
+        "BallJoint ConstantCurvatureJoint EllipsoidJoint FreeJoint GimbalJoint Joint JointSet PinJoint "
+        "PlanarJoint ScapulothoracicJoint SliderJoint UniversalJoint WeldJoint"
+    ),
+    "markers": "IMU Marker MarkerSet Point Station",
+    "metabolics": (
+        "Bhargava2004MuscleMetabolicsProbe Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter "
+        "Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet "
+        "Bhargava2004SmoothedMuscleMetabolics Bhargava2004SmoothedMuscleMetabolics_MuscleParameters "
+        "Umberger2010MuscleMetabolicsProbe Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter "
+        "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet"
+    ),
     "model": "Model",
-    "probes": "Probe ProbeSet",
+    "motions": "AccelerationMotion DiscreteForces PositionMotion",
+    "muscle_curves": (
+        "ActiveForceLengthCurve FiberCompressiveForceCosPennationCurve FiberCompressiveForceLengthCurve "
+        "FiberForceLengthCurve ForceVelocityCurve ForceVelocityInverseCurve TendonForceLengthCurve"
+    ),
+    "muscle_parts": "MuscleFirstOrderActivationDynamicModel MuscleFixedWidthPennationModel",
+    "muscles": (
+        "ActivationFiberLengthMuscle DeGrooteFregly2016Muscle MeyerFregly2016Muscle "
+        "Millard2012AccelerationMuscle Millard2012EquilibriumMuscle Muscle RigidTendonMuscle "
+        "Thelen2003Muscle"
+    ),
+    "old_muscles": (
+        "ActivationFiberLengthMuscle_Deprecated Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated "
+        "Thelen2003Muscle_Deprecated"
+    ),
+    "path_actuators": "ClutchedPathSpring McKibbenActuator PathActuator",
+    "path_forces": "Blankevoort1991Ligament ExpressionBasedPathForce Ligament PathSpring",
+    "paths": (
+        "AbstractGeometryPath AbstractPathPoint ConditionalPathPoint FunctionBasedPath GeometryPath "
+        "MovingPathPoint PathPoint PathPointSet PathWrap PathWrapPoint PathWrapSet"
+    ),
+    "prescribed": "ExternalForce ExternalLoads PrescribedForce",
+    "probes": "ActuatorForceProbe ActuatorPowerProbe JointInternalPowerProbe Probe ProbeSet SystemEnergyProbe",
+    "reporters": (
+        "AbstractReporter ConsoleReporter__Vec3_ ConsoleReporter__double_ NumberReporter SignalGenerator "
+        "StatesTrajectoryReporter TableReporter__Vec3_ TableReporter__Vector_ TableReporter__double_ "
+        "TableSource TableSource__Vec3_ TableSource__double_ Vec3Reporter VectorReporter"
+    ),
+    "scholz_paths": (
+        "Scholz2015GeometryPath Scholz2015GeometryPathElement Scholz2015GeometryPathObstacle "
+        "Scholz2015GeometryPathPoint"
+    ),
     "sets": "ComponentSet ModelComponentSet ObjectGroup",
-    "wrapping": "WrapObject WrapObjectSet",
+    "springs": (
+        "BushingForce ExpressionBasedBushingForce ExpressionBasedCoordinateForce "
+        "ExpressionBasedPointToPointForce FunctionBasedBushingForce PointToPointSpring "
+        "SpringGeneralizedForce"
+    ),
+    "wrapping": "WrapCylinder WrapEllipsoid WrapObject WrapObjectSet WrapSphere WrapTorus",
 }
 
 _TAGS = {
+    "ElasticFoundationForce::ContactParameters": "ElasticFoundationContactParameters",
+    "ElasticFoundationForce::ContactParametersSet": "ElasticFoundationContactParametersSet",
     "HuntCrossleyForce::ContactParameters": "HuntCrossleyContactParameters",
     "HuntCrossleyForce::ContactParametersSet": "HuntCrossleyContactParametersSet",
 }

@@ -1,0 +1,42 @@
+"""The joint whose motion is made of six functions of its coordinates."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from osimlite.schema.base import Object, made
+from osimlite.schema.fields import Single, Unnamed, Vec3, vec3
+from osimlite.schema.functions import Constant, Function
+from osimlite.schema.joints import Joint
+from osimlite.schema.references import OwnJointCoordinates
+
+_X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class TransformAxis(Object):
+    """A rotation about or a translation along an axis, by a function of coordinates of the joint."""
+
+    coordinates: OwnJointCoordinates = ()
+    axis: Annotated[Vec3, vec3()] = _X
+    function: Single[Function] = made(Constant, name="function")
+
+
+def _axis(name: str, direction: Vec3) -> Any:
+    return made(TransformAxis, name=name, axis=direction)
+
+
+class SpatialTransform(Object):
+    """Three body-fixed rotations in order, then three translations along axes of the parent frame."""
+
+    rotation1: Single[TransformAxis] = _axis("rotation1", _X)
+    rotation2: Single[TransformAxis] = _axis("rotation2", _Y)
+    rotation3: Single[TransformAxis] = _axis("rotation3", _Z)
+    translation1: Single[TransformAxis] = _axis("translation1", _X)
+    translation2: Single[TransformAxis] = _axis("translation2", _Y)
+    translation3: Single[TransformAxis] = _axis("translation3", _Z)
+
+
+class CustomJoint(Joint):
+    """Any motion of up to six degrees of freedom; `spatial_transform` says how the coordinates make it."""
+
+    spatial_transform: Unnamed[SpatialTransform] = made(SpatialTransform)

@@ -1,0 +1,121 @@
+"""What differs between two models in meaning: components by path, properties by value, whatever their files look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from osimlite.schema.base import Component, FieldSpec, Object, Unknown, field_specs
+from osimlite.schema.fields import Held, Reference
+from osimlite.schema.model import Model
+from osimlite.schema.tree import Tree, Use
+
+
+class Difference(NamedTuple):
+    """One change. `what` is the property, with the way to it inside the component; empty for a whole component.
+
+    `old` is None for what was added, `new` for what was removed; a component counts as its class name.
+    """
+
+    path: str
+    what: str
+    old: Any
+    new: Any
+
+
+def differences(old: Model, new: Model) -> list[Difference]:
+    """Every change of meaning from `old` to `new`, in tree order; what only takes or loses its default is none."""
+    return list(_Comparison(old, new).run())
+
+
+class _Comparison:
+    def __init__(self, old: Model, new: Model) -> None:
+        self.old = old.tree()
+        self.new = new.tree()
+
+    def run(self) -> Iterator[Difference]:
+        gone = [path for path in self.old.by_path if path not in self.new.by_path]
+        for path in _topmost(gone):
+            yield Difference(path, "", _kind(self.old.by_path[path]), None)
+        for path, component in self.new.by_path.items():
+            before = self.old.by_path.get(path)
+            if before is not None:
+                yield from self._object(path, "", before, component)
+        came = [path for path in self.new.by_path if path not in self.old.by_path]
+        for path in _topmost(came):
+            yield Difference(path, "", None, _kind(self.new.by_path[path]))
+
+    def _object(self, path: str, way: str, old: Object, new: Object) -> Iterator[Difference]:
+        """Compare two objects that stand in the same place; `way` is the property that leads to them."""
+        if _kind(old) != _kind(new):
+            yield Difference(path, way or "class", _kind(old), _kind(new))
+            return
+        if isinstance(old, Unknown) and isinstance(new, Unknown):
+            if old.content != new.content:
+                yield Difference(path, way or "content", old.content, new.content)
+            return
+        if not isinstance(new, Component) and old.name != new.name:
+            yield Difference(path, f"{way}.name", old.name, new.name)
+        for spec in field_specs(type(new)).values():
+            place = f"{way}.{spec.tag}" if way else spec.tag
+            one, other = getattr(old, spec.name), getattr(new, spec.name)
+            if isinstance(spec.kind, Held):
+                yield from self._held(path, place, _listed(one), _listed(other))
+            elif isinstance(spec.kind, Reference):
+                names = self._names(self.old, old, spec, one), self._names(self.new, new, spec, other)
+                if names[0] != names[1]:
+                    yield Difference(path, place, *names)
+            elif not _equal(one, other):
+                yield Difference(path, place, one, other)
+
+    def _held(self, path: str, way: str, old: list[Object], new: list[Object]) -> Iterator[Difference]:
+        """Compare objects without a path; components are compared at their own path."""
+        before = [item for item in old if not isinstance(item, Component)]
+        after = [item for item in new if not isinstance(item, Component)]
+        many = max(len(before), len(after)) > 1
+        for number in range(max(len(before), len(after))):
+            place = f"{way}[{number}]" if many else way
+            if number >= len(after):
+                yield Difference(path, place, _kind(before[number]), None)
+            elif number >= len(before):
+                yield Difference(path, place, None, _kind(after[number]))
+            else:
+                yield from self._object(path, place, before[number], after[number])
+
+    def _names(self, tree: Tree, holder: Object, spec: FieldSpec, value: Any) -> Any:
+        """What a reference says, in one spelling: the path of the component where it leads to one."""
+        if isinstance(value, tuple):
+            return tuple(self._names(tree, holder, spec, word) for word in value)
+        if value is None:
+            return None
+        assert isinstance(spec.kind, Reference)
+        owner = tree.owner_of(holder)
+        if spec.kind.rule not in ("input", "file", "column", "positional", "point-index"):
+            target = tree.resolve(Use(holder, owner, spec, value)).target
+            if target is not None:
+                return tree.path_of(target)
+        return value if isinstance(value, str) else value.name
+
+
+def _listed(value: Any) -> list[Object]:
+    return value if isinstance(value, list) else [] if value is None else [value]
+
+
+def _kind(item: Object) -> str:
+    return item.class_name if isinstance(item, Unknown) else item.tag
+
+
+def _equal(one: Any, other: Any) -> bool:
+    return bool(one == other) or repr(one) == repr(other)
+
+
+def _topmost(paths: list[str]) -> Iterator[str]:
+    """Those paths that are not below another of them."""
+    given = set(paths)
+    return (path for path in paths if not any(path.startswith(above + "/") for above in _above(path) if above in given))
+
+
+def _above(path: str) -> Iterator[str]:
+    while "/" in path[1:]:
+        path = path.rsplit("/", 1)[0]
+        yield path

@@ -1,0 +1,22 @@
+"""Motions given beforehand, and forces that a program sets while it simulates."""
+
+from __future__ import annotations
+
+from osimlite.schema.base import ModelComponent, made
+from osimlite.schema.fields import Flag, Single
+from osimlite.schema.functions import FunctionSet
+
+
+class PositionMotion(ModelComponent):
+    """Moves every coordinate by a function of time, one for each."""
+
+    default_enabled: Flag = True
+    functions: Single[FunctionSet] = made(FunctionSet, name="functions")
+
+
+class AccelerationMotion(ModelComponent):
+    """Moves every coordinate by an acceleration that a program sets."""
+
+
+class DiscreteForces(ModelComponent):
+    """Generalized and body forces that a program sets."""

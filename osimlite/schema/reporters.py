@@ -1,0 +1,79 @@
+"""Reporters, which collect outputs during a simulation, and sources of data to put in."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from osimlite.schema.base import Component, made
+from osimlite.schema.fields import Single, real
+from osimlite.schema.functions import Constant, Function
+from osimlite.schema.references import ColumnName, FileName, NumberInputs, Vec3Inputs, VectorInputs
+
+
+class AbstractReporter(Component, abstract=True):
+    """Collects outputs every `report_time_interval`, or at every step if it is 0."""
+
+    report_time_interval: Annotated[float, real("s", ">= 0")] = 0.0
+
+
+class NumberReporter(AbstractReporter, abstract=True):
+    """Collects outputs that are numbers."""
+
+    input_inputs: NumberInputs = ()
+
+
+class Vec3Reporter(AbstractReporter, abstract=True):
+    """Collects outputs that are points or directions."""
+
+    input_inputs: Vec3Inputs = ()
+
+
+class VectorReporter(AbstractReporter, abstract=True):
+    """Collects outputs that are vectors of any length."""
+
+    input_inputs: VectorInputs = ()
+
+
+class ConsoleReporter__double_(NumberReporter):
+    """Prints numbers while the simulation runs."""
+
+
+class ConsoleReporter__Vec3_(Vec3Reporter):
+    """Prints points or directions while the simulation runs."""
+
+
+class TableReporter__double_(NumberReporter):
+    """Collects numbers in a table."""
+
+
+class TableReporter__Vec3_(Vec3Reporter):
+    """Collects points or directions in a table."""
+
+
+class TableReporter__Vector_(VectorReporter):
+    """Collects vectors in a table."""
+
+
+class StatesTrajectoryReporter(AbstractReporter):
+    """Collects the whole state."""
+
+
+class TableSource(Component, abstract=True):
+    """Gives the columns of a table file as outputs; `tablename` picks one table of several."""
+
+    filename: FileName = ""
+    tablename: ColumnName = ""
+
+
+class TableSource__double_(TableSource):
+    """A table of numbers."""
+
+
+class TableSource__Vec3_(TableSource):
+    """A table of points or directions."""
+
+
+class SignalGenerator(Component):
+    """Gives a function of time as an output."""
+
+    function: Single[Function] = made(Constant, name="function")

@@ -1,0 +1,34 @@
+"""Paths that run smoothly over contact surfaces (Scholz et al. 2015)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from osimlite.schema.base import Component, made, none
+from osimlite.schema.fields import Many, Unnamed, Vec3, vec3
+from osimlite.schema.paths import AbstractGeometryPath, PathPoint
+from osimlite.schema.references import ContactGeometrySocket
+
+
+class Scholz2015GeometryPathElement(Component, abstract=True):
+    """A point or an obstacle of a path."""
+
+
+class Scholz2015GeometryPathPoint(Scholz2015GeometryPathElement):
+    """A point that the path runs through."""
+
+    path_point: Unnamed[PathPoint] = made(PathPoint)
+
+
+class Scholz2015GeometryPathObstacle(Scholz2015GeometryPathElement):
+    """A surface that the path may touch; `contact_hint` is a point on it where the search for contact starts."""
+
+    socket_contact_geometry: ContactGeometrySocket = ""
+    contact_hint: Annotated[Vec3, vec3()] = (math.nan, math.nan, math.nan)
+
+
+class Scholz2015GeometryPath(AbstractGeometryPath):
+    """A path through points and over obstacles, in order; it begins and ends with a point."""
+
+    path_elements: Many[Scholz2015GeometryPathElement] = none()
