@@ -56,7 +56,8 @@ class Layout:
     `comments` stand before the object itself. `before` holds, per tag, the comments and unknown elements that stood
     before that property (key None: at the end). `raw` keeps, per field, text that reads only partly, together with
     the value it was read as: while the value is unchanged the text is written back. `attributes` are unknown ones,
-    `after` is what followed the last member of a list, `version` the version of a whole document.
+    `after` is what followed the last member of a list, `version` the version of a whole document,
+    `prolog` and `epilog` the comments before and behind its root element.
     """
 
     comments: list[str] = field(default_factory=list)
@@ -65,6 +66,8 @@ class Layout:
     attributes: dict[str, str] = field(default_factory=dict)
     after: list[Remark] = field(default_factory=list)
     version: int | None = None
+    prolog: list[str] = field(default_factory=list)
+    epilog: list[str] = field(default_factory=list)
 
     @property
     def unknown(self) -> list[str]:
@@ -161,6 +164,11 @@ class Object(BaseModel):
         _set(self, "_index", index)
         _set(self, "_layout", None)
         return self
+
+    @classmethod
+    def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:
+        """Pydantic's way to make an instance without validation; here it is `build`."""
+        return cls.build(values, set(values) if _fields_set is None else _fields_set)
 
     @classmethod
     def field_specs(cls) -> dict[str, FieldSpec]:

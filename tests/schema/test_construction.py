@@ -1,0 +1,125 @@
+"""Every class: the reader's short way in equals validated construction; copies, pickles and misspellings."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from importlib import import_module
+
+import pytest
+from pydantic import BaseModel
+
+from osimlite.errors import MissingNameError, ModelError
+from osimlite.schema.base import Object, defaults, field_specs
+from osimlite.schema.fields import Held, Reference, Value, epoch
+from osimlite.schema.registry import MODULES
+
+CLASSES = {name: getattr(import_module(module), name) for name, module in MODULES.items()}
+
+every_class = pytest.mark.parametrize("cls", CLASSES.values(), ids=CLASSES)
+
+
+def filled(cls: type[Object]) -> Object:
+    """An instance with another value than the default in every property."""
+    values: dict[str, object] = {"name": "filled"}
+    for spec in field_specs(cls).values():
+        kind = spec.kind
+        if isinstance(kind, Reference):
+            values[spec.name] = ("one", "two") if kind.shape == "list" else "one"
+        elif isinstance(kind, Value):
+            word = {"double": 0.5, "int": 7, "bool": True, "string": "word"}[kind.scalar]
+            size = kind.size or kind.most or max(kind.least, 2)
+            values[spec.name] = word if kind.shape in ("single", "optional") else (word,) * size
+        elif isinstance(kind, Held) and kind.form == "list":
+            values[spec.name] = []
+    return cls(**values)
+
+
+@every_class
+def test_the_short_way_in_equals_the_validated_one(cls: type[Object]) -> None:
+    assert cls.build({}, set()) == cls.model_construct() == cls()
+    assert cls.build({}, set()).model_fields_set == cls().model_fields_set == set()
+    full = filled(cls)
+    values = {name: getattr(full, name) for name in full.model_fields_set}
+    assert cls.build(values, set(values)) == full
+    assert cls.model_construct(**values) == full
+    for given in ({}, values):
+        plainly = BaseModel.model_construct.__func__(cls, **given)
+        assert plainly.__dict__.keys() == cls.build(given, set(given)).__dict__.keys()
+        for name, value in cls.build(given, set(given)).__dict__.items():
+            assert repr(plainly.__dict__[name]) == repr(value), name
+
+
+@every_class
+def test_defaults_pass_their_own_validation(cls: type[Object]) -> None:
+    plain, _ = defaults(cls)
+    again = cls(**plain)
+    for name, value in plain.items():
+        assert repr(getattr(again, name)) == repr(value), name
+    for spec in field_specs(cls).values():
+        value = getattr(cls(), spec.name)
+        assert repr(spec.kind.check(value, spec.accepts)) == repr(value), spec.name
+
+
+@every_class
+def test_two_instances_share_no_part(cls: type[Object]) -> None:
+    one, other = cls(), cls()
+    for spec in field_specs(cls).values():
+        value = getattr(one, spec.name)
+        if isinstance(value, (list, Object)):
+            assert value is not getattr(other, spec.name), spec.name
+
+
+@every_class
+def test_copies_and_pickles_are_equal_and_keep_what_was_set(cls: type[Object]) -> None:
+    full = filled(cls)
+    for clone in (copy.deepcopy(full), full.copy_deep(), pickle.loads(pickle.dumps(full)), copy.copy(full)):
+        assert clone == full
+        assert clone is not full
+        assert clone.model_fields_set == full.model_fields_set
+    deep = copy.deepcopy(full)
+    before = [id(item) for item in full.walk()]
+    assert not set(before) & {id(item) for item in deep.walk()}
+
+
+@every_class
+def test_a_misspelt_property_is_told(cls: type[Object]) -> None:
+    item = cls()
+    with pytest.raises(MissingNameError, match=f"{cls.__name__} has no property 'nmae'; did you mean 'name'"):
+        item.nmae = "x"
+    with pytest.raises(MissingNameError, match="no property 'nmae'"):
+        cls(nmae="x")
+    with pytest.raises(MissingNameError, match="no property 'nmae'"):
+        _ = item.nmae
+    assert not hasattr(item, "nmae")
+
+
+@every_class
+def test_a_value_of_the_wrong_kind_is_refused(cls: type[Object]) -> None:
+    for spec in field_specs(cls).values():
+        with pytest.raises(ModelError, match=spec.name):
+            cls(**{spec.name: object()})
+
+
+@every_class
+def test_every_property_can_be_given_by_its_tag(cls: type[Object]) -> None:
+    for spec in field_specs(cls).values():
+        if spec.tag == spec.name or not spec.tag.isidentifier():
+            continue
+        value = getattr(cls(), spec.name)
+        item = cls(**{spec.tag: value})
+        assert spec.name in item.model_fields_set
+        other, count = cls(), epoch.count
+        setattr(other, spec.tag, value)
+        assert spec.name in other.model_fields_set
+        assert epoch.count > count
+        if not hasattr(cls, spec.tag):
+            assert getattr(other, spec.tag) is getattr(other, spec.name)
+
+
+def test_where_a_component_stands_and_the_path_of_a_muscle_are_two_things() -> None:
+    muscle = CLASSES["Thelen2003Muscle"](name="biceps")
+    line = CLASSES["GeometryPath"](name="path")
+    muscle.path = line
+    assert muscle.path == "biceps"
+    assert muscle.geometry_path is line
