@@ -1,12 +1,30 @@
-"""Writing files so that they appear whole or not at all."""
+"""Finding model files, and writing files so that they appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import MissingFileError, OsimliteError
+
+
+def model_files(paths: Iterable[Path]) -> list[Path]:
+    """The files named, and every ``.osim`` file below the folders named, sorted within each folder.
+
+    Raises:
+        MissingFileError: a path is not there.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found.extend(sorted(file for file in path.rglob("*.osim") if file.is_file()))
+        elif path.exists():
+            found.append(path)
+        else:
+            raise MissingFileError("cannot read the file: no such file or folder", file=str(path))
+    return found
 
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from typer import Typer
 
-COMMANDS = ("build", "validate", "rule", "translate", "simulate", "demo")
+COMMANDS = ("build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "simulate", "demo")
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>`` is its function."""
 
 

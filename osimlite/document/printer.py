@@ -27,11 +27,15 @@ def to_text(model: Model, *, numbers: Numbers = "shortest", comments: bool = Tru
         ModelError: a reference leads to a component outside the model.
     """
     printer = _Printer(model, numbers, comments)
-    lines = ['<?xml version="1.0" encoding="UTF-8" ?>', f'<OpenSimDocument Version="{CURRENT_VERSION}">']
-    printer.lines = lines
+    layout = model.layout or Layout()
+    lines = printer.lines
+    lines.append('<?xml version="1.0" encoding="UTF-8" ?>')
+    printer.comment(layout.prolog, 0)
+    lines.append(f'<OpenSimDocument Version="{CURRENT_VERSION}">')
     printer.object(model, model.name, 1)
-    lines.append("</OpenSimDocument>\n")
-    return "\n".join(lines)
+    lines.append("</OpenSimDocument>")
+    printer.comment(layout.epilog, 0)
+    return "\n".join(lines) + "\n"
 
 
 def write(model: Model, path: str | Path, *, numbers: Numbers = "shortest") -> None:
@@ -51,7 +55,7 @@ class _Printer:
         indent = "\t" * depth
         layout = item.layout
         if layout is not None:
-            self._comments(layout.comments, depth)
+            self.comment(layout.comments, depth)
         if isinstance(item, Unknown):
             self._element(item.content, depth)
         else:
@@ -114,9 +118,10 @@ class _Printer:
             if remark.element:
                 self._element(remark.text, depth)
             else:
-                self._comments([remark.text], depth)
+                self.comment([remark.text], depth)
 
-    def _comments(self, texts: list[str], depth: int) -> None:
+    def comment(self, texts: list[str], depth: int) -> None:
+        """Print comments, one a line."""
         if self.comments:
             indent = "\t" * depth
             self.lines.extend(f"{indent}<!--{text}-->" for text in texts)

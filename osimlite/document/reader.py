@@ -191,7 +191,13 @@ class _Reader:
             line, column, _ = source.of_tag(0)
             raise DocumentError("the document holds no <Model>", file=source.file, line=line, column=column)
         if pending:
-            _layout_of(model).before.setdefault(None, []).extend(pending)
+            _layout_of(model).after.extend(pending)
+        for place, nodes in (("prolog", [*root.itersiblings(preceding=True)][::-1]), ("epilog", root.itersiblings())):
+            outside: list[Remark] = []
+            for node in nodes:
+                self._comment(node, outside)
+            if outside:
+                getattr(_layout_of(model), place).extend(remark.text for remark in outside)
         return model
 
     def object(self, element: etree._Element, cls: type[Read], name: str | None = None) -> Read:

@@ -1,4 +1,4 @@
-"""What differs between two models in meaning: components by path, properties by value, whatever their files look like."""
+"""What differs between two models in meaning: components by path, properties by value, whatever the layout."""
 
 from __future__ import annotations
 
@@ -54,13 +54,11 @@ class _Comparison:
             if old.content != new.content:
                 yield Difference(path, way or "content", old.content, new.content)
             return
-        if not isinstance(new, Component) and old.name != new.name:
-            yield Difference(path, f"{way}.name", old.name, new.name)
         for spec in field_specs(type(new)).values():
             place = f"{way}.{spec.tag}" if way else spec.tag
             one, other = getattr(old, spec.name), getattr(new, spec.name)
             if isinstance(spec.kind, Held):
-                yield from self._held(path, place, _listed(one), _listed(other))
+                yield from self._held(path, place, spec.kind.form == "list", _listed(one), _listed(other))
             elif isinstance(spec.kind, Reference):
                 names = self._names(self.old, old, spec, one), self._names(self.new, new, spec, other)
                 if names[0] != names[1]:
@@ -68,8 +66,8 @@ class _Comparison:
             elif not _equal(one, other):
                 yield Difference(path, place, one, other)
 
-    def _held(self, path: str, way: str, old: list[Object], new: list[Object]) -> Iterator[Difference]:
-        """Compare objects without a path; components are compared at their own path."""
+    def _held(self, path: str, way: str, named: bool, old: list[Object], new: list[Object]) -> Iterator[Difference]:
+        """Compare objects without a path; components are compared at their own path. `named`: their names count."""
         before = [item for item in old if not isinstance(item, Component)]
         after = [item for item in new if not isinstance(item, Component)]
         many = max(len(before), len(after)) > 1
@@ -80,6 +78,8 @@ class _Comparison:
             elif number >= len(before):
                 yield Difference(path, place, None, _kind(after[number]))
             else:
+                if named and before[number].name != after[number].name:
+                    yield Difference(path, f"{place}.name", before[number].name, after[number].name)
                 yield from self._object(path, place, before[number], after[number])
 
     def _names(self, tree: Tree, holder: Object, spec: FieldSpec, value: Any) -> Any:

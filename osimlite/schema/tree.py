@@ -287,6 +287,11 @@ def _name_in_tree(spec: FieldSpec, item: Component) -> str:
 
 
 def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    if target == "Frame":
+        # While connecting, a frame puts itself into the socket of every geometry it owns, whatever the file says.
+        parent = tree.parent_of(owner)
+        if parent is not None and is_a(parent, "Frame"):
+            return Resolution(parent)
     if not text:
         return Resolution(None, "empty")
     if any(character in text for character in ILLEGAL_CHARACTERS[:-1]):

@@ -1,0 +1,80 @@
+"""``osimlite diff``: what changed between two models, in meaning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from osimlite.schema.difference import Difference
+
+
+def diff(
+    files: Annotated[list[Path], typer.Argument(metavar="OLD NEW", help="The two model files.", show_default=False)],
+    git: Annotated[
+        bool, typer.Option("--git", help="Take the seven arguments that git gives an external diff program.")
+    ] = False,
+) -> None:
+    """Show what changed between two models: component, property, old and new value.
+
+    Layout, order, comments and number formats do not count, nor does writing a default down. Exits with 1 if the
+    models differ.
+
+    As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in .gitattributes the
+    line: *.osim diff=osim
+    """
+    from osimlite.document.reader import read
+    from osimlite.errors import OsimliteError
+    from osimlite.schema.difference import differences
+    from osimlite.schema.model import Model
+
+    if git:
+        # path old-file old-hex old-mode new-file new-hex new-mode; a file that is not there is /dev/null.
+        if len(files) != 7:
+            raise OsimliteError("--git takes the seven arguments of git's external diff; see 'git help diff'")
+        title, old, new = str(files[0]), files[1], files[4]
+    elif len(files) == 2:
+        title, (old, new) = "", files
+    else:
+        raise OsimliteError("diff takes two model files")
+    models = [Model() if str(file) == "/dev/null" else read(file) for file in (old, new)]
+    found = differences(models[0], models[1])
+    if git:
+        typer.echo(f"--- {title}\n+++ {title}")
+    for line in described(found):
+        typer.echo(line)
+    if found and not git:
+        raise typer.Exit(1)
+
+
+def described(found: list[Difference]) -> list[str]:
+    """One or two lines for each difference, grouped by component."""
+    lines: list[str] = []
+    last = None
+    for path, what, old, new in found:
+        if not what:
+            lines.append(f"+ {path} ({new})" if old is None else f"- {path} ({old})")
+            last = None
+            continue
+        if path != last:
+            lines.append(f"  {path}")
+            last = path
+        if old is None or new is None:
+            lines.append(f"    {'+' if old is None else '-'} {what}: {_words(new if old is None else old)}")
+        else:
+            lines.append(f"    {what}: {_words(old)} -> {_words(new)}")
+    return lines
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, float):
+        from osimlite.document.lexical import shortest
+
+        return shortest(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return " ".join(map(_words, value)) or "(empty)"
+    return str(value) or "(empty)"

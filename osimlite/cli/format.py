@@ -1,0 +1,61 @@
+"""``osimlite format``: canonical text that keeps people's comments."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def format(
+    paths: Annotated[list[Path], typer.Argument(help="Model files, or folders to search.", show_default=False)],
+    check: Annotated[bool, typer.Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
+    show_diff: Annotated[bool, typer.Option("--diff", help="Change nothing; print what would change.")] = False,
+) -> None:
+    """Write model files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
+
+    Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format is
+    left alone: upgrade it first.
+    """
+    from osimlite.document.printer import to_text
+    from osimlite.document.reader import read_document
+    from osimlite.document.source import Source
+    from osimlite.errors import OsimliteError
+    from osimlite.files import model_files, write_atomically
+    from osimlite.schema.model import CURRENT_VERSION
+
+    changed, failed = 0, 0
+    for path in model_files(paths):
+        try:
+            document = read_document(Source.of_file(path))
+            if document.version != CURRENT_VERSION:
+                raise OsimliteError(
+                    f"document version {document.version}: run 'osimlite upgrade' first", file=str(path)
+                )
+        except OsimliteError as error:
+            typer.echo(f"osimlite: {error}", err=True)
+            failed += 1
+            continue
+        before = document.source.text
+        after = to_text(document.model)
+        if before == after:
+            continue
+        changed += 1
+        if show_diff:
+            typer.echo("".join(_unified(before, after, str(path))), nl=False)
+        elif check:
+            typer.echo(f"would reformat {path}")
+        else:
+            write_atomically(path, after)
+            typer.echo(f"reformatted {path}")
+    if failed:
+        raise typer.Exit(2)
+    if changed and (check or show_diff):
+        raise typer.Exit(1)
+
+
+def _unified(before: str, after: str, name: str) -> list[str]:
+    old, new = before.splitlines(keepends=True), after.splitlines(keepends=True)
+    return list(difflib.unified_diff(old, new, name, f"{name} (formatted)"))

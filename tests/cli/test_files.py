@@ -1,0 +1,121 @@
+"""``build``, ``format``, ``diff`` and ``info`` from the command line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import osimlite
+
+
+def run(*arguments: str, folder: Path | None = None) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "osimlite", *arguments], capture_output=True, text=True, cwd=folder, check=False
+    )
+    assert "Traceback" not in done.stderr
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_build_writes_the_walker(tmp_path: Path) -> None:
+    code, out, _ = run("build", "dynamic-walker", folder=tmp_path)
+    assert code == 0 and "DynamicWalkerModel.osim" in out
+    assert osimlite.read(tmp_path / "DynamicWalkerModel.osim").name == "DynamicWalkerModel"
+
+
+def test_build_lists_models_and_takes_parameters(tmp_path: Path) -> None:
+    code, out, _ = run("build", "--list")
+    assert code == 0 and out.split()[0] == "dynamic-walker"
+    code, _, _ = run("build", "dynamic-walker", "-p", "thigh_length=0.42", "-o", "w.osim", folder=tmp_path)
+    assert code == 0
+    contact = osimlite.read(tmp_path / "w.osim")["/contactgeometryset/RKneeContact"]
+    assert contact.location == (0.0, 0.21, 0.0)
+
+
+def test_build_takes_a_file_of_the_user(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import osimlite\n"
+        "def helper(): pass\n"
+        "def pendulum(mass: float = 1.0) -> osimlite.Model:\n"
+        "    model = osimlite.Model(name='pendulum')\n"
+        "    bob = model.add(osimlite.Body(name='bob', mass=mass, inertia=(1, 1, 1, 0, 0, 0)))\n"
+        "    model.add(osimlite.PinJoint(name='pin').between(model.ground, bob, child_at=(0.0, 1.0, 0.0)))\n"
+        "    return model\n"
+    )
+    code, _, error = run("build", "mine.py", "-p", "mass=3", "-o", "p.osim", folder=tmp_path)
+    assert code == 0, error
+    assert osimlite.read(tmp_path / "p.osim")["/bodyset/bob"].mass == 3.0
+    code, _, error = run("build", "mine.py:pendulum", "-p", "mas=3", "-o", "q.osim", folder=tmp_path)
+    assert code == 2 and "did you mean 'mass'" in error
+    code, _, error = run("build", "mine.py", "-p", "mass=heavy", "-o", "q.osim", folder=tmp_path)
+    assert code == 2 and "must be a number" in error
+    assert not (tmp_path / "q.osim").exists()
+
+
+def test_build_writes_nothing_if_the_model_has_an_error(tmp_path: Path) -> None:
+    (tmp_path / "bad.py").write_text(
+        "import osimlite\n"
+        "def bad() -> osimlite.Model:\n"
+        "    model = osimlite.Model(name='bad')\n"
+        "    model.add(osimlite.ContactSphere(name='s', radius=0.1, socket_frame='/bodyset/nowhere'))\n"
+        "    return model\n"
+    )
+    code, _, error = run("build", "bad.py", "-o", "bad.osim", folder=tmp_path)
+    assert code == 1 and "nowhere" in error
+    assert not (tmp_path / "bad.osim").exists()
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [("dynamic-wlker", "did you mean 'dynamic-walker'"), ("no.py", "no such file"), ("no.such:thing", "cannot import")],
+)
+def test_build_names_what_is_missing(source: str, words: str) -> None:
+    code, _, error = run("build", source)
+    assert code == 2 and words in error
+
+
+def test_format_is_stable_and_keeps_comments(fixtures: Path, tmp_path: Path) -> None:
+    text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text()
+    text = text.replace("<OpenSimDocument", "<!-- ours -->\n<OpenSimDocument", 1)
+    text = text.replace("<gravity>", "<!-- as on earth -->\n<gravity>", 1)
+    file = tmp_path / "m.osim"
+    file.write_text(text)
+    code, out, _ = run("format", "--check", "m.osim", folder=tmp_path)
+    assert code == 1 and "would reformat" in out and file.read_text() == text
+    code, out, _ = run("format", "--diff", "m.osim", folder=tmp_path)
+    assert code == 1 and "+++ m.osim (formatted)" in out and file.read_text() == text
+    assert run("format", ".", folder=tmp_path)[0] == 0
+    formatted = file.read_text()
+    assert "<!-- ours -->" in formatted and "<!-- as on earth -->" in formatted
+    assert "<!--The mass of the body (kg)-->" not in formatted
+    assert run("format", "--check", "m.osim", folder=tmp_path)[:2] == (0, "")
+    assert osimlite.read_text(text) == osimlite.read(file)
+
+
+def test_diff(fixtures: Path, tmp_path: Path) -> None:
+    old = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    new = str(tmp_path / "new.osim")
+    model = osimlite.read(old)
+    osimlite.write(model, new)
+    assert run("diff", old, new) == (0, "", "")
+    model["/bodyset/Pelvis"].mass = 2.0
+    osimlite.write(model, new)
+    assert run("diff", old, new)[:2] == (1, "  /bodyset/Pelvis\n    mass: 1 -> 2\n")
+    code, out, _ = run("diff", "--git", "m.osim", old, "0" * 40, "100644", new, "1" * 40, "100644")
+    assert code == 0 and out.startswith("--- m.osim\n+++ m.osim\n") and "mass: 1 -> 2" in out
+
+
+def test_info(fixtures: Path) -> None:
+    code, out, _ = run("info", str(fixtures / "walker" / "DynamicWalkerModel.osim"))
+    assert code == 0
+    for words in ("DynamicWalkerModel", "6 kg", "40600", "RKnee_rz", "locked", "6 ContactSphere"):
+        assert words in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_errors_are_one_sentence(tmp_path: Path) -> None:
+    code, out, error = run("info", "nowhere.osim", folder=tmp_path)
+    assert (code, out) == (2, "")
+    assert error == "osimlite: nowhere.osim: cannot read the file: no such file\n"

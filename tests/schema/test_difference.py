@@ -1,0 +1,51 @@
+"""Differences of meaning."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.difference import Difference, differences
+from osimlite.schema.model import Model
+
+
+@pytest.fixture
+def walker(fixtures: Path) -> Model:
+    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+
+
+def test_a_model_does_not_differ_from_its_copies(walker: Model) -> None:
+    assert differences(walker, copy.deepcopy(walker)) == []
+    assert differences(walker, osimlite.read_text(osimlite.to_text(walker))) == []
+
+
+def test_writing_defaults_down_and_spelling_paths_differently_change_nothing(walker: Model) -> None:
+    """The file spells every frame's axes out; the model made in Python leaves them to their defaults."""
+    assert differences(walker, dynamic_walker()) == []
+
+
+def test_every_kind_of_change(walker: Model) -> None:
+    new = copy.deepcopy(walker)
+    new["/bodyset/Pelvis"].mass = 2.0
+    new["/forceset/RFootForce"].contact_parameters.objects[0].stiffness = 2e6
+    new["/contactgeometryset/RFootContact"].socket_frame = "/bodyset/RightThigh"
+    new.remove(new["/forceset/LFootForce"])
+    new.rename(new["/forceset/RHipLimitTorque"], "stop")
+    assert differences(walker, new) == [
+        Difference("/forceset/LFootForce", "", "HuntCrossleyForce", None),
+        Difference("/forceset/RHipLimitTorque", "", "CoordinateLimitForce", None),
+        Difference("/bodyset/Pelvis", "mass", 1.0, 2.0),
+        Difference("/forceset/RFootForce", "contact_parameters.objects.stiffness", 1e6, 2e6),
+        Difference("/contactgeometryset/RFootContact", "socket_frame", "/bodyset/RightShank", "/bodyset/RightThigh"),
+        Difference("/forceset/stop", "", None, "CoordinateLimitForce"),
+    ]
+
+
+def test_differences_are_symmetric(walker: Model) -> None:
+    other = dynamic_walker(thigh_length=0.42)
+    there, back = differences(walker, other), differences(other, walker)
+    assert there and {(d.path, d.what, d.old, d.new) for d in there} == {(d.path, d.what, d.new, d.old) for d in back}
