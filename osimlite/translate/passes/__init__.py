@@ -1,0 +1,1 @@
+"""Passes: small changes from one neutral robot to another, one per module."""
