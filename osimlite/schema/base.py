@@ -355,6 +355,13 @@ def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @cache
+def name_spec(cls: type[Object]) -> FieldSpec:
+    """The name of a class whose instances bear the name of another component, as a property with tag ``@name``."""
+    assert cls.name_reference is not None
+    return FieldSpec("name", "@name", cls.name_reference, None, "", None, cls)
+
+
+@cache
 def value_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that are numbers, switches or texts."""
     return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Value))

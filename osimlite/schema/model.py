@@ -68,7 +68,7 @@ class Model(ModelComponent):
 
         known = getattr(self, "_tree", None)
         if known is None or known.epoch != epoch.count:
-            known = Tree(self)
+            known = Tree(self, known)
             object.__setattr__(self, "_tree", known)
         return cast("Tree", known)
 

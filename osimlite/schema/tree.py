@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import Component, FieldSpec, Object, field_specs
+from osimlite.schema.base import Component, FieldSpec, Object, field_specs, name_spec
 from osimlite.schema.fields import Held, Reference, epoch
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.text import did_you_mean
@@ -70,7 +70,7 @@ class Use:
 class Tree:
     """Index of one model: component by path, path by component, children, and the names each rule looks up."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, previous: Tree | None = None) -> None:
         self.epoch = epoch.count
         self.model = model
         self.components: list[Component] = []
@@ -80,7 +80,11 @@ class Tree:
         self._parents: dict[int, Component] = {}
         self._owners: dict[int, Component] = {}
         self._names: dict[str, dict[str, Component]] = {}
+        self._parts: dict[int, tuple[Component, list[Component]]] = {}
+        self._known_parts = previous._parts if previous is not None else {}
+        self._internal: set[int] = set()
         self._place(model, "", None)
+        self._known_parts = {}
 
     def path_of(self, component: Object) -> str | None:
         """The absolute path of a component, None if it is not in this tree."""
@@ -94,6 +98,10 @@ class Tree:
         """The component that an object without a path belongs to; a component owns itself."""
         return item if isinstance(item, Component) else self._owners[id(item)]
 
+    def is_internal(self, component: Component) -> bool:
+        """Whether the component is a part that OpenSim makes for itself: it has a path and stands in no file."""
+        return id(component) in self._internal
+
     def at(self, path: str) -> Component:
         """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
         found = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
@@ -104,7 +112,11 @@ class Tree:
     def uses(self) -> Iterator[Use]:
         """Yield every reference of the model that has a text or a component, in tree order."""
         for owner in self.components:
+            if id(owner) in self._internal:
+                continue
             for holder in self._objects_of(owner):
+                if holder.name_reference is not None and holder.name:
+                    yield Use(holder, owner, name_spec(type(holder)), holder.name)
                 for spec in field_specs(type(holder)).values():
                     if not isinstance(spec.kind, Reference):
                         continue
@@ -184,7 +196,7 @@ class Tree:
         if parent is not None:
             self._parents[id(component)] = parent
         taken: dict[str, Component] = {}
-        for name, child in self._children(component, component):
+        for name, child in (*self._internal_parts(component), *self._children(component, component)):
             unique = self._unique(name, taken)
             if unique != name:
                 self.renamed.append(Renamed(child, unique, taken[name]))
@@ -206,6 +218,18 @@ class Tree:
             else:
                 self._owners[id(item)] = owner
                 yield from self._children(item, owner)
+
+    def _internal_parts(self, owner: Component) -> Iterator[tuple[str, Component]]:
+        """Yield the parts that OpenSim makes for itself; the same ones for the same owner, as long as it lives."""
+        if not owner.internal:
+            return
+        known = self._known_parts.get(id(owner))
+        if known is None or known[0] is not owner:
+            known = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
+        self._parts[id(owner)] = known
+        for (name, _), part in zip(owner.internal, known[1], strict=True):
+            self._internal.add(id(part))
+            yield name, part
 
     def _objects_of(self, owner: Component) -> Iterator[Object]:
         """Yield a component and the objects without a path that belong to it."""
