@@ -1,0 +1,1 @@
+"""From mechanism to motion: time steppers, engines, trajectories."""

@@ -1,0 +1,409 @@
+"""Time steppers: Runge-Kutta-Merson with Simbody's error control, and semi-implicit Euler with a fixed step.
+
+A state is one list y = (q, u) or (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative
+comes from a function f(t, y) that returns (qdot, udot) or (qdot, udot, zdot) as a fresh sequence of Python floats
+and leaves y alone. Lists of floats are quicker than arrays here up to some 30 states.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from math import inf, isfinite, sqrt
+
+from osimlite.errors import SimulationError
+
+Derivative = Callable[[float, list[float]], Sequence[float]]
+Observer = Callable[[float, list[float]], object]
+
+DEFAULT_ACCURACY = 1e-3
+"""What OpenSim's Manager uses where no accuracy was set."""
+
+INITIAL_STEP = 0.01
+"""First step tried, s: a tenth of Simbody's default time scale."""
+
+_ROUNDING = 2.0**-52
+
+
+class IntegrationError(SimulationError):
+    """The integrator cannot go on.
+
+    Attributes:
+        time: where, s.
+        index: the entry of the state that is to blame, if one is.
+    """
+
+    def __init__(self, message: str, time: float, index: int | None = None) -> None:
+        super().__init__(message)
+        self.time = time
+        self.index = index
+
+
+class Stepper(ABC):
+    """Common face of the steppers: a present state, steps, and states at times in between.
+
+    When `observe` is called for a step, the last call of f was the one at exactly that time and state; whatever f
+    kept of it (contact forces, say) belongs to the step. It is not called for the initial state.
+
+    Attributes:
+        time: s.
+        state: y at that time; a new list after every step, not changed later.
+        derivative: f(time, state).
+        evaluations: calls of f so far.
+        taken: steps taken so far.
+    """
+
+    def __init__(
+        self,
+        f: Derivative,
+        t: float,
+        y: Iterable[float],
+        observe: Observer | None,
+        names: Sequence[str] | None,
+    ) -> None:
+        self._f = f
+        self._observe = observe
+        self._names = names
+        self.time = t
+        self.state = list(y)
+        self.derivative = self._evaluate(t, self.state)
+        self.evaluations = 1
+        self.taken = 0
+        if len(self.derivative) != len(self.state):
+            raise ValueError(f"f gives {len(self.derivative)} derivatives of {len(self.state)} states")
+        self._previous = t, self.state, self.derivative
+
+    @abstractmethod
+    def step(self, limit: float = inf) -> None:
+        """Take one step, which ends at `limit` (s) at the latest.
+
+        Raises:
+            IntegrationError: a derivative is not a finite number, or no step is small enough.
+        """
+
+    @abstractmethod
+    def interpolate(self, t: float) -> list[float]:
+        """State at a time within the last step, s."""
+
+    def steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
+        """Yield (time, state) after each step; the last one ends at `until` (s), as with OpenSim's Manager."""
+        while self.time < until:
+            self.step(until)
+            yield self.time, self.state
+
+    def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
+        """Yield (time, state) at times that do not decrease, s.
+
+        They do not shorten the steps: within a step, the state is interpolated. The last step ends at the last
+        time, so that the steps are those of `steps` up to it.
+        """
+        for t in times:
+            while self.time < t:
+                self.step(times[-1])
+            yield t, self.at(t)
+
+    def at(self, t: float) -> list[float]:
+        """State at a time not before the start of the last step nor after its end, s."""
+        if t == self.time:
+            return self.state
+        start = self._previous[0]
+        if not start <= t < self.time:
+            raise ValueError(f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s")
+        return self.interpolate(t)
+
+    def _advance(self, t: float, y: list[float]) -> None:
+        """Make (t, y) the present state."""
+        self._previous = self.time, self.state, self.derivative
+        self.derivative = self._evaluate(t, y)
+        self.time = t
+        self.state = y
+        self.evaluations += 1
+        self.taken += 1
+        if self._observe is not None:
+            self._observe(t, y)
+
+    def _require_room(self, limit: float) -> None:
+        if not limit > self.time:
+            raise ValueError(f"the limit {limit:.9g} s of the step is not after the present {self.time:.9g} s")
+
+    def _evaluate(self, t: float, y: list[float]) -> Sequence[float]:
+        """The derivative at a state that is part of the motion, where it must exist."""
+        try:
+            derivative = self._f(t, y)
+        except ArithmeticError as failure:
+            raise IntegrationError(f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t) from failure
+        total = sum(derivative)
+        if total - total != 0.0:
+            self._refuse_non_finite(t, derivative)
+        return derivative
+
+    def _refuse_non_finite(self, t: float, derivative: Sequence[float]) -> None:
+        """Raise an error that names the first entry that is not finite, if there is one."""
+        for index, value in enumerate(derivative):
+            if not isfinite(value):
+                raise IntegrationError(
+                    f"The derivative of {self._name(index)} is {value} at t = {t:.9g} s; check the masses, "
+                    "inertias and force parameters that it depends on.",
+                    t,
+                    index,
+                )
+
+    def _name(self, index: int) -> str:
+        return f"state {index}" if self._names is None else self._names[index]
+
+
+class RungeKuttaMerson(Stepper):
+    """Simbody's RungeKuttaMerson, the default integrator of OpenSim: `accuracy` means what it means there.
+
+    Merson's method propagates a fourth-order solution and estimates its error from an embedded third-order one
+    (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is taken
+    if the norm of the error, as `_error` forms it, is at most `accuracy`, and repeated smaller if not. With the
+    same f, the steps are OpenSim's to the last bit.
+
+    Args:
+        f: derivative of the state. An ArithmeticError that it raises within a step makes the step smaller.
+        t: initial time, s.
+        y: initial state.
+        nq: number of coordinates in it.
+        nu: number of speeds after them; the rest are auxiliary states. By default all the rest are speeds.
+        accuracy: as OpenSim's Manager and ForwardTool understand it, 1.
+        maximum_step: s.
+        minimum_step: s. The integrator refuses to go on where it needs a smaller one; Simbody takes the step
+            then, whatever its error. Rounding sets a bound of about 1e-15 s in any case; OpenSim's tools use 1e-8.
+        count_q: what the sum of the squared errors of q is divided by. Simbody counts all coordinates of a model,
+            also locked and prescribed ones (their error is 0), and one more for each ball, free or ellipsoid
+            joint: give that number where y leaves them out.
+        count_u: the same for u, without the one more.
+        observe: called with (time, state) after each step taken.
+        names: what the entries of y are called in messages.
+
+    Attributes:
+        attempted: steps tried so far, of which `taken` were accepted.
+    """
+
+    def __init__(
+        self,
+        f: Derivative,
+        t: float,
+        y: Iterable[float],
+        nq: int,
+        *,
+        nu: int | None = None,
+        accuracy: float = DEFAULT_ACCURACY,
+        maximum_step: float = inf,
+        minimum_step: float = 0.0,
+        count_q: int | None = None,
+        count_u: int | None = None,
+        observe: Observer | None = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        if not 0.0 < accuracy < 1.0:
+            raise SimulationError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
+        if not 0.0 <= minimum_step <= maximum_step or maximum_step == 0.0:
+            raise SimulationError(
+                f"The smallest step ({minimum_step} s) must not be negative nor exceed the largest ({maximum_step} s)."
+            )
+        super().__init__(f, t, y, observe, names)
+        n = len(self.state)
+        nu = n - nq if nu is None else nu
+        if not 0 <= nq <= nq + nu <= n:
+            raise ValueError(f"{nq} coordinates and {nu} speeds do not fit into {n} states")
+        self._end_q = nq
+        self._end_u = nq + nu
+        self._count_q = nq if count_q is None else count_q
+        self._count_u = nu if count_u is None else count_u
+        self._accuracy = accuracy
+        self._maximum_step = maximum_step
+        self._minimum_step = minimum_step
+        self._next_step = min(max(INITIAL_STEP, minimum_step), maximum_step)
+        self.attempted = 0
+
+    @property
+    def rejected(self) -> int:
+        """Steps tried and not taken."""
+        return self.attempted - self.taken
+
+    def step(self, limit: float = inf) -> None:
+        """Take one step of the size that the error allows, and choose the next one."""
+        self._require_room(limit)
+        f, t0, y0, f0 = self._f, self.time, self.state, self.derivative
+        # Errors of speeds and auxiliary states count relative to their value at the start where that exceeds 1.
+        weights = [1.0 / abs(x) if abs(x) > 1.0 else 1.0 for x in y0[self._end_q :]]
+        smallest = max(self._minimum_step, 4.0 * _ROUNDING * max(1.0, abs(t0)))
+        while True:
+            h = self._next_step
+            # A step that all but reaches the limit goes there. One cut much shorter tells nothing about the next.
+            t1 = limit if limit <= t0 + 1.001 * h else t0 + h
+            cut = limit < t0 + 0.95 * h
+            self.attempted += 1
+            self.evaluations += 4
+            cause: ArithmeticError | None = None
+            try:
+                y1, companion = merson_step(f, t0, y0, f0, t1)
+                error = self._error(y1, companion, weights)
+            except ArithmeticError as failure:
+                error, cause = inf, failure
+            self._next_step = min(next_step_size(h, error, self._accuracy, cut), self._maximum_step)
+            if error <= self._accuracy:
+                self._advance(t1, y1)
+                return
+            if h <= smallest:
+                self._give_up(t1, error, weights, cause)
+            self._next_step = max(self._next_step, smallest)
+
+    def interpolate(self, t: float) -> list[float]:
+        """State at a time within the last step, s, by the cubic Hermite polynomial through its ends."""
+        t0, y0, f0 = self._previous
+        h = self.time - t0
+        s = (t - t0) / h
+        b1 = s * s * (3.0 - 2.0 * s)
+        b0 = 1.0 - b1
+        c = h * s * (s - 1.0)
+        c1 = c * s
+        c0 = c1 - c
+        ends = zip(y0, self.state, f0, self.derivative, strict=True)
+        return [b0 * y + b1 * z + c0 * f + c1 * g for y, z, f, g in ends]
+
+    def _error(self, y1: list[float], companion: list[float], weights: list[float]) -> float:
+        """Largest of three root mean squares: errors of q as they are, of u and of z weighted."""
+        nq, nu = self._end_q, self._end_u - self._end_q
+        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
+        error = [0.2 * (y - z) for y, z in zip(y1, companion, strict=True)]
+        of_q = sum([e * e for e in error[:nq]]) / max(self._count_q, 1)
+        weighted = [w * e for w, e in zip(weights, error[nq:], strict=True)]
+        of_u = sum([e * e for e in weighted[:nu]]) / max(self._count_u, 1)
+        of_z = sum([e * e for e in weighted[nu:]]) / max(len(weighted) - nu, 1)
+        # The sum carries what is not a number; a comparison could lose it.
+        return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf
+
+    def _give_up(self, t1: float, error: float, weights: list[float], cause: ArithmeticError | None) -> None:
+        """Raise the error that tells why the smallest step fails."""
+        t0, y0, f0 = self.time, self.state, self.derivative
+
+        def finite(t: float, y: list[float]) -> Sequence[float]:
+            derivative = self._f(t, y)
+            self._refuse_non_finite(t, derivative)
+            return derivative
+
+        index = None
+        if cause is None:
+            y1, companion = merson_step(finite, t0, y0, f0, t1)
+            weighted = [w * abs(y - z) for w, y, z in zip([1.0] * self._end_q + weights, y1, companion, strict=True)]
+            index = max(range(len(weighted)), key=lambda i: weighted[i] if isfinite(weighted[i]) else inf)
+            what = (
+                f"misses the accuracy {error / self._accuracy:.3g} times, most of all in {self._name(index)}"
+                if isfinite(weighted[index])
+                else f"leaves the range of numbers in {self._name(index)}"
+            )
+        else:
+            what = f"fails ({cause})"
+        raise IntegrationError(
+            f"The integrator cannot go on at t = {t0:.9g} s: even its smallest step of {t1 - t0:.3g} s {what}. "
+            "Something changes too abruptly there, such as a very stiff contact or a sharp limit: soften it, or "
+            "ask for less accuracy.",
+            t0,
+            index,
+        ) from cause
+
+
+class SemiImplicitEuler(Stepper):
+    """Fixed steps u1 = u0 + h udot(t0, q0, u0), q1 = q0 + h qdot(q0, u1): first order; PyBullet steps like that.
+
+    Args:
+        f: derivative of the state (q, u); only the speeds' part is used.
+        t: initial time, s.
+        y: initial state.
+        nq: number of coordinates in it.
+        h: step, s. Only a step that would pass the limit is shortened.
+        rates: qdot as a function of (q, u); by default qdot = u.
+        observe: called with (time, state) after each step taken.
+        names: what the entries of y are called in messages.
+    """
+
+    def __init__(
+        self,
+        f: Derivative,
+        t: float,
+        y: Iterable[float],
+        nq: int,
+        h: float,
+        *,
+        rates: Callable[[list[float], list[float]], Sequence[float]] | None = None,
+        observe: Observer | None = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        if not 0.0 < h < inf:
+            raise SimulationError(f"The fixed step must be positive and finite; {h} s is not.")
+        super().__init__(f, t, y, observe, names)
+        if rates is None and len(self.state) != 2 * nq:
+            raise ValueError(f"{nq} coordinates and {len(self.state) - nq} speeds need a function for qdot")
+        self._nq = nq
+        self._h = h
+        self._rates = rates
+        self._origin, self._since = t, 0
+
+    def step(self, limit: float = inf) -> None:
+        """Take one step of the fixed size, or up to the limit if that comes first."""
+        self._require_room(limit)
+        h = self._h
+        # Counted from an origin, so that rounding does not pile up in the time.
+        self._since += 1
+        t = self._origin + h * self._since
+        if t > limit - 1e-9 * h:
+            if t > limit + 1e-9 * h:
+                h = limit - self.time
+            t = limit
+            self._origin, self._since = limit, 0
+        q = self.state[: self._nq]
+        u = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
+        rates = u if self._rates is None else self._rates(q, u)
+        self._advance(t, [x + h * v for x, v in zip(q, rates, strict=True)] + u)
+
+    def interpolate(self, t: float) -> list[float]:
+        """State at a time within the last step, s, on the straight line between its ends."""
+        t0, y0, _ = self._previous
+        s = (t - t0) / (self.time - t0)
+        return [y + s * (z - y) for y, z in zip(y0, self.state, strict=True)]
+
+
+def merson_step(
+    f: Derivative, t0: float, y0: list[float], f0: Sequence[float], t1: float
+) -> tuple[list[float], list[float]]:
+    """One step of Merson's method from (t0, y0), where f0 = f(t0, y0), to t1 with four more calls of f.
+
+    Returns:
+        y1, of fourth order, and its companion: the estimated error is a fifth of their difference.
+    """
+    h = t1 - t0
+    c = h / 3.0
+    fa = f(t0 + c, [y + c * a for y, a in zip(y0, f0, strict=True)])
+    c = h / 6.0
+    fa = f(t0 + h / 3.0, [y + c * (a + b) for y, a, b in zip(y0, f0, fa, strict=True)])
+    c = h / 8.0
+    fb = f(t0 + h / 2.0, [y + c * (a + 3.0 * b) for y, a, b in zip(y0, f0, fa, strict=True)])
+    c = h / 2.0
+    companion = [y + c * (a - 3.0 * b + 4.0 * d) for y, a, b, d in zip(y0, f0, fa, fb, strict=True)]
+    fa = f(t1, companion)
+    c = h / 6.0
+    return [y + c * (a + 4.0 * b + d) for y, a, b, d in zip(y0, f0, fb, fa, strict=True)], companion
+
+
+def next_step_size(h: float, error: float, accuracy: float, cut: bool = False) -> float:
+    """Step to try after one of size h, as Simbody chooses it; less than h if and only if error > accuracy.
+
+    The estimated error goes with h^4, so 0.9 h (accuracy / error)^(1/4) should just do. That is taken if it is at
+    least a fifth more or, after a failure, a tenth less; never more than five times nor less than a tenth of h.
+
+    Args:
+        h: step just tried, s.
+        error: norm of its estimated error; infinite or not a number after a failed evaluation.
+        accuracy: what the error may be.
+        cut: whether the step was cut short by a limit, so that it is no ground for a larger one.
+    """
+    if not isfinite(error):
+        return 0.1 * h
+    if error > accuracy:
+        wanted: float = 0.9 * h * (accuracy / error) ** 0.25
+        return max(min(wanted, 0.9 * h), 0.1 * h)
+    wanted = 0.9 * h * (accuracy / error) ** 0.25 if error > 0.0 else inf
+    return h if cut or wanted < 1.2 * h else min(wanted, 5.0 * h)

@@ -1,0 +1,485 @@
+"""The time steppers on equations whose solution is known, and where they must refuse."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.errors import OsimliteError, SimulationError
+from osimlite.simulate.integrators import (
+    IntegrationError,
+    RungeKuttaMerson,
+    SemiImplicitEuler,
+    merson_step,
+    next_step_size,
+)
+
+
+def oscillator(t, y):
+    """Unit mass on a unit spring: q = cos t from (1, 0)."""
+    return [y[1], -y[0]]
+
+
+def pendulum(t, y):
+    return [y[1], -9.81 * math.sin(y[0])]
+
+
+def cannon(t, y):
+    """Quadratic drag: u = tanh t from rest."""
+    return [y[1], 1.0 - y[1] * y[1]]
+
+
+def last(pairs):
+    for pair in pairs:
+        final = pair
+    return final
+
+
+class Counting:
+    """A derivative that remembers how often and where it was called."""
+
+    def __init__(self, f):
+        self.f = f
+        self.calls = 0
+        self.latest = None
+
+    def __call__(self, t, y):
+        self.calls += 1
+        self.latest = t, list(y)
+        return self.f(t, y)
+
+
+# ------------------------------------------------------------------------------------------------- Merson's method
+
+
+def fixed_steps(f, y, until, n):
+    companions = []
+    for i in range(n):
+        t0, t1 = until * i / n, until * (i + 1) / n
+        y, companion = merson_step(f, t0, y, f(t0, y), t1)
+        companions.append(max(abs(a - b) for a, b in zip(y, companion, strict=True)))
+    return y, max(companions)
+
+
+@pytest.mark.parametrize("f", [pendulum, cannon])
+def test_fourth_order(f):
+    reference, _ = fixed_steps(f, [1.0, 0.0], 1.0, 4000)
+    errors = [abs(fixed_steps(f, [1.0, 0.0], 1.0, n)[0][0] - reference[0]) for n in (40, 80, 160)]
+    for coarse, fine in pairwise(errors):
+        assert math.log2(coarse / fine) == pytest.approx(4.0, abs=0.35)
+
+
+def test_error_estimate_goes_with_the_fourth_power_of_the_step():
+    estimates = [fixed_steps(pendulum, [1.0, 0.0], 1.0, n)[1] for n in (40, 80, 160)]
+    for coarse, fine in pairwise(estimates):
+        assert math.log2(coarse / fine) == pytest.approx(4.0, abs=0.2)
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.1, 2.0), st.floats(-1.0, 1.0))
+def test_exact_for_cubic_derivatives(coefficients, h, t0):
+    """Quadrature of order four, at the solution's weights and at the nodes of the method."""
+    a, b, c, d = coefficients
+
+    def antiderivative(t):
+        return t * (a + t * (b / 2 + t * (c / 3 + t * d / 4)))
+
+    def f(t, y):
+        return [a + t * (b + t * (c + t * d))]
+
+    (y1,), _ = merson_step(f, t0, [0.0], f(t0, [0.0]), t0 + h)
+    assert y1 == pytest.approx(antiderivative(t0 + h) - antiderivative(t0), abs=1e-12 * (1 + h) ** 4 * 20)
+
+
+# ------------------------------------------------------------------------------------------------ error control
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7, 1e-9, 1e-11])
+def test_error_follows_the_accuracy(accuracy):
+    integrator = RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
+    t, y = last(integrator.steps(10.0))
+    assert t == 10.0
+    error = max(abs(y[0] - math.cos(10.0)), abs(y[1] + math.sin(10.0)))
+    # No step may err by more than the accuracy; an oscillator does not amplify what was erred before.
+    assert error < 2.0 * accuracy * integrator.taken
+    assert error > 1e-3 * accuracy
+
+
+def test_more_accuracy_costs_more_and_gains():
+    errors, costs = [], []
+    for accuracy in (1e-3, 1e-5, 1e-7, 1e-9):
+        integrator = RungeKuttaMerson(cannon, 0.0, [0.0, 0.0], 1, accuracy=accuracy)
+        _, y = last(integrator.steps(3.0))
+        errors.append(abs(y[0] - math.log(math.cosh(3.0))))
+        costs.append(integrator.evaluations)
+    assert errors == sorted(errors, reverse=True)
+    assert costs == sorted(costs)
+
+
+def test_default_accuracy_and_first_step_are_opensims():
+    first = RungeKuttaMerson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
+    first.step()
+    assert first.time == 0.01  # no error at all: taken as it is ...
+    first.step()
+    assert first.time == pytest.approx(0.06)  # ... and followed by one five times as large
+    by_default = list(RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0))
+    assert by_default == list(RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).steps(2.0))
+
+
+def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
+    def exponential(t, y):
+        return [4.0 * x for x in y]
+
+    def count(y, nq, **options):
+        integrator = RungeKuttaMerson(exponential, 0.0, y, nq, accuracy=1e-6, **options)
+        last(integrator.steps(1.0))
+        return integrator.attempted
+
+    assert count([1e3], 0) == count([1e6], 0)
+    assert count([1e6], 1) > 1.5 * count([1e3], 1)
+    # Below 1, speeds count as they are.
+    assert count([1e-9], 0) < count([1e-3], 0) < count([1.0], 0) == count([1e3], 0)
+    # Auxiliary states count as speeds do.
+    assert count([1e6], 0, nu=0) == count([1e6], 0)
+
+
+def test_coordinates_left_out_may_be_counted():
+    """A locked coordinate in the state, or out of it but counted: the same steps."""
+
+    def locked(t, y):
+        return [0.0, y[3], 0.0, -9.81 * math.sin(y[1])]
+
+    with_it = [t for t, _ in RungeKuttaMerson(locked, 0.0, [0.3, 1.0, 0.0, 0.0], 2).steps(2.0)]
+    counted = RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1, count_q=2, count_u=2)
+    assert [t for t, _ in counted.steps(2.0)] == with_it
+    assert [t for t, _ in RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0)] != with_it
+
+
+def test_the_worst_of_coordinates_speeds_and_auxiliary_states_decides():
+    """Three states that do not know of each other: steps are as small as the most demanding one needs."""
+
+    def apart(t, y):
+        return [math.cos(3 * t), math.cos(20 * t), math.cos(7 * t)]
+
+    together = RungeKuttaMerson(apart, 0.0, [0.0, 0.0, 0.0], 1, nu=1)
+    alone = RungeKuttaMerson(lambda t, y: [math.cos(20 * t)], 0.0, [0.0], 0)
+    assert [t for t, _ in together.steps(1.0)] == [t for t, _ in alone.steps(1.0)]
+
+
+positive = st.floats(1e-12, 1e3)
+
+
+@given(positive, st.floats(0.0, 1e6), st.floats(1e-12, 0.5), st.booleans())
+def test_next_step(h, error, accuracy, cut):
+    new = next_step_size(h, error, accuracy, cut)
+    assert 0.1 * h <= new <= 5.0 * h
+    assert (new < h) == (error > accuracy)
+    if new > h:
+        assert not cut and new >= 1.2 * h
+    if new < h:
+        assert new <= 0.9 * h
+    if h < new < 5.0 * h or 0.1 * h < new < 0.9 * h:
+        # The error to be expected of the new step is 0.9^4 of the accuracy.
+        assert error * (new / h) ** 4 == pytest.approx(0.9**4 * accuracy, rel=1e-6)
+
+
+@pytest.mark.parametrize("error", [math.nan, math.inf])
+def test_next_step_after_a_failed_evaluation(error):
+    assert next_step_size(1.0, error, 1e-3) == 0.1
+
+
+def test_counts():
+    f = Counting(pendulum)
+    integrator = RungeKuttaMerson(f, 0.0, [3.0, 0.0], 1)
+    steps = list(integrator.steps(10.0))
+    assert len(steps) == integrator.taken
+    assert integrator.rejected == integrator.attempted - integrator.taken > 0
+    assert integrator.evaluations == f.calls == 1 + 4 * integrator.attempted + integrator.taken
+
+
+def test_largest_step():
+    integrator = RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, maximum_step=0.004)
+    times = [0.0, *(t for t, _ in integrator.steps(1.0))]
+    assert max(b - a for a, b in pairwise(times)) <= 0.004 * (1 + 1e-12)
+
+
+# --------------------------------------------------------------------------------- where steps and reports end
+
+
+def steppers():
+    return [
+        RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1),
+        SemiImplicitEuler(pendulum, 0.0, [1.0, 0.0], 1, 1e-3),
+    ]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_steps_end_where_they_are_told_to_and_go_on(which):
+    stepper = steppers()[which]
+    first = list(stepper.steps(0.7305))
+    assert first[-1][0] == stepper.time == 0.7305
+    assert first[-1][1] is stepper.state
+    second = list(stepper.steps(1.0))
+    assert second[-1][0] == 1.0
+    times = [t for t, _ in first + second]
+    assert times == sorted(set(times))
+    assert list(stepper.steps(1.0)) == []
+    assert last(stepper.steps(2.0))[0] == 2.0
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_reports_do_not_change_the_steps(which):
+    alone, reporting = steppers()[which], steppers()[which]
+    list(alone.steps(1.0))
+    seen = list(reporting.reports([0.0, 0.0, 1e-4, 0.25, 0.2503, 1.0]))
+    assert [t for t, _ in seen] == [0.0, 0.0, 1e-4, 0.25, 0.2503, 1.0]
+    assert (reporting.taken, reporting.time, reporting.state) == (alone.taken, alone.time, alone.state)
+    assert seen[0][1] == [1.0, 0.0]
+    assert seen[-1][1] == alone.state
+
+
+def test_reports_are_as_accurate_as_steps():
+    integrator = RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=1e-6)
+    for t, y in integrator.reports([i / 100 for i in range(501)]):
+        assert y == pytest.approx([math.cos(t), -math.sin(t)], abs=2e-5)
+    assert integrator.taken < 200
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.0, 1.0))
+def test_interpolation_is_exact_for_cubic_motion(coefficients, fraction):
+    a, b, c, d = coefficients
+    integrator = RungeKuttaMerson(lambda t, y: [b + t * (2 * c + t * 3 * d)], 0.0, [a], 1)
+    list(integrator.steps(0.5))
+    start = integrator._previous[0]
+    t = start + fraction * (0.5 - start)
+    assert integrator.at(t)[0] == pytest.approx(a + t * (b + t * (c + t * d)), abs=1e-9)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_states_outside_the_last_step_are_refused(which):
+    stepper = steppers()[which]
+    list(stepper.steps(0.5))
+    with pytest.raises(ValueError, match="outside the last step"):
+        stepper.at(0.1)
+    with pytest.raises(ValueError, match="outside the last step"):
+        stepper.at(0.5001)
+    with pytest.raises(ValueError, match="limit"):
+        stepper.step(0.5)
+
+
+@pytest.mark.parametrize("make", [RungeKuttaMerson, partial(SemiImplicitEuler, h=1e-2)])
+def test_the_observer_sees_each_step_right_after_its_derivative(make):
+    f = Counting(pendulum)
+    seen = []
+
+    def observe(t, y):
+        assert f.latest == (t, y)
+        seen.append((t, y))
+
+    stepper = make(f, 0.0, [1.0, 0.0], 1, observe=observe)
+    assert seen == []
+    assert list(stepper.steps(0.5)) == seen
+    assert stepper.evaluations == f.calls
+
+
+# -------------------------------------------------------------------------------------------------------- refusals
+
+
+def test_a_derivative_that_is_no_number_at_the_start():
+    with pytest.raises(IntegrationError, match=r"derivative of knee_speed is nan at t = 2\.5 s") as caught:
+        RungeKuttaMerson(lambda t, y: [0.0, math.nan], 2.5, [0.0, 1.0], 1, names=["knee", "knee_speed"])
+    assert (caught.value.time, caught.value.index) == (2.5, 1)
+    assert isinstance(caught.value, SimulationError) and isinstance(caught.value, OsimliteError)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_derivative_that_ceases_to_exist(bad):
+    """The integrator creeps up to the place and names it."""
+
+    def f(t, y):
+        return [y[1], 0.0, bad if t > 0.7 else 1.0]
+
+    integrator = RungeKuttaMerson(f, 0.0, [0.0, 1.0, 0.0], 1)
+    with pytest.raises(IntegrationError, match="derivative of state 2") as caught:
+        list(integrator.steps(1.0))
+    assert caught.value.time == pytest.approx(0.7)
+    assert caught.value.index == 2
+    assert integrator.time == pytest.approx(0.7)
+
+
+def test_no_number_in_a_trial_step_only():
+    """A first step into forbidden ground is made smaller, as Simbody would."""
+
+    def f(t, y):
+        return [math.nan if y[0] > 1.1 else -400.0 * (y[0] - 1.0)]
+
+    integrator = RungeKuttaMerson(f, 0.0, [0.0], 0)
+    _, y = last(integrator.steps(0.1))
+    assert y[0] == pytest.approx(1.0, abs=1e-3)
+    assert integrator.rejected > 0
+
+
+def test_overflow_in_a_trial_step_only():
+    failures = []
+
+    def steep(t, y):
+        try:
+            return [-200.0 * math.sinh(y[0])]
+        except OverflowError:
+            failures.append(t)
+            raise
+
+    integrator = RungeKuttaMerson(steep, 0.0, [8.0], 0)
+    _, y = last(integrator.steps(0.1))
+    assert y[0] == pytest.approx(0.0, abs=5e-3)
+    assert failures and integrator.rejected > 0
+
+
+def test_overflow_for_good():
+    def f(t, y):
+        return [1.0 if t < 0.5 else math.exp(1e3)]
+
+    with pytest.raises(IntegrationError, match=r"cannot go on .* fails \(math range error\)") as caught:
+        list(RungeKuttaMerson(f, 0.0, [0.0], 0).steps(1.0))
+    assert isinstance(caught.value.__cause__, OverflowError)
+    assert caught.value.time == pytest.approx(0.5)
+
+
+def test_states_that_leave_the_range_of_numbers():
+    def f(t, y):
+        return [0.0, 1e308 if t > 0.5 else 0.0]
+
+    with pytest.raises(IntegrationError, match="leaves the range of numbers in state 1") as caught:
+        list(RungeKuttaMerson(f, 0.0, [0.0, 1.7e308], 0).steps(3.0))
+    assert caught.value.index == 1
+
+
+def test_failing_at_the_first_state():
+    with pytest.raises(IntegrationError, match="cannot be computed at t = 0 s"):
+        RungeKuttaMerson(lambda t, y: [1.0 / y[0]], 0.0, [0.0], 1)
+
+
+def test_no_step_small_enough():
+    """y' = y^2 leaves every bound at t = 1."""
+    integrator = RungeKuttaMerson(lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"])
+    with pytest.raises(IntegrationError) as caught:
+        list(integrator.steps(2.0))
+    assert caught.value.time == pytest.approx(1.0, abs=1e-3)
+    assert caught.value.index == 1
+    assert "speed of q" in str(caught.value)
+
+
+def test_smallest_step_of_the_user():
+    def jump(t, y):
+        return [0.0 if t < 0.5 else 1e6]
+
+    def first_trouble(**options):
+        integrator = RungeKuttaMerson(jump, 0.0, [0.0], 1, **options)
+        with pytest.raises(
+            IntegrationError, match=r"smallest step of 1e-06 s misses the accuracy .* state 0"
+        ) as caught:
+            list(integrator.steps(1.0))
+        return caught.value.time
+
+    assert first_trouble(minimum_step=1e-6) == pytest.approx(0.5, abs=1e-2)
+    _, y = last(RungeKuttaMerson(jump, 0.0, [0.0], 1).steps(0.6))
+    assert y[0] == pytest.approx(1e5, rel=1e-6)
+
+
+@pytest.mark.parametrize("accuracy", [0.0, 1.0, -1e-3, math.nan])
+def test_impossible_accuracies(accuracy):
+    with pytest.raises(SimulationError, match="accuracy"):
+        RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
+
+
+@pytest.mark.parametrize("options", [{"minimum_step": -1.0}, {"minimum_step": 0.1, "maximum_step": 0.01}])
+def test_impossible_step_bounds(options):
+    with pytest.raises(SimulationError, match="step"):
+        RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, **options)
+
+
+def test_sizes_that_do_not_fit():
+    with pytest.raises(ValueError, match="1 derivatives of 2 states"):
+        RungeKuttaMerson(lambda t, y: [0.0], 0.0, [1.0, 0.0], 1)
+    with pytest.raises(ValueError, match="do not fit"):
+        RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, nu=2)
+    with pytest.raises(ValueError, match="qdot"):
+        SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 0, 1e-3)
+
+
+# --------------------------------------------------------------------------------------------- semi-implicit Euler
+
+
+def test_one_euler_step():
+    stepper = SemiImplicitEuler(pendulum, 0.0, [1.0, 0.5], 1, 0.01)
+    stepper.step()
+    u = 0.5 - 0.01 * 9.81 * math.sin(1.0)
+    assert stepper.state == pytest.approx([1.0 + 0.01 * u, u], rel=1e-15)
+
+
+def test_euler_is_of_first_order():
+    errors = []
+    for h in (1e-2, 5e-3, 2.5e-3):
+        _, y = last(SemiImplicitEuler(cannon, 0.0, [0.0, 0.0], 1, h).steps(2.0))
+        errors.append(abs(y[0] - math.log(math.cosh(2.0))))
+    for coarse, fine in pairwise(errors):
+        assert coarse / fine == pytest.approx(2.0, rel=0.05)
+
+
+def test_euler_keeps_the_energy_of_an_oscillator():
+    """The semi-implicit method is symplectic: no drift in a hundred swings."""
+    for _, (q, u) in SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, 0.05).steps(200 * math.pi):
+        assert q * q + u * u == pytest.approx(1.0, abs=0.06)
+
+
+def test_euler_with_rates_of_its_own():
+    """Coordinates that are not the integrals of the speeds; the new speeds are used with the old coordinates."""
+
+    def f(t, y):
+        return [0.0, 1.0]
+
+    def rates(q, u):
+        return [3.0 * q[0] * u[0]]
+
+    stepper = SemiImplicitEuler(f, 0.0, [2.0, 1.0], 1, 0.5, rates=rates)
+    stepper.step()
+    assert stepper.state == [2.0 + 0.5 * 3.0 * 2.0 * 1.5, 1.5]
+
+
+def test_euler_counts_its_steps_without_drift():
+    stepper = SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, 1e-3)
+    times = [t for t, _ in stepper.steps(2.0)]
+    assert stepper.taken == 2000 and times[-1] == 2.0
+    assert max(abs(t - (i + 1) / 1000) for i, t in enumerate(times)) < 1e-15 * 4
+
+
+def test_euler_shortens_only_the_last_step():
+    stepper = SemiImplicitEuler(lambda t, y: [0.0, 0.0], 0.0, [0.0, 1.0], 1, 0.25)
+    assert [t for t, _ in stepper.steps(0.6)] == [0.25, 0.5, 0.6]
+    assert stepper.state[0] == pytest.approx(0.6)
+    assert [t for t, _ in stepper.steps(1.1)] == pytest.approx([0.85, 1.1])
+    assert stepper.taken == 5 and stepper.state[0] == pytest.approx(1.1)
+
+
+def test_euler_interpolates_on_a_line():
+    stepper = SemiImplicitEuler(lambda t, y: [0.0, 0.0], 0.0, [0.0, 2.0], 1, 0.25)
+    assert [y[0] for _, y in stepper.reports([0.1, 0.3, 0.5])] == pytest.approx([0.2, 0.6, 1.0])
+
+
+def test_euler_names_what_is_no_number():
+    stepper = SemiImplicitEuler(
+        lambda t, y: [0.0, math.nan if t > 0.5 else 0.0], 0.0, [0.0, 1.0], 1, 0.1, names=["hip", "hip_speed"]
+    )
+    with pytest.raises(IntegrationError, match="derivative of hip_speed is nan") as caught:
+        list(stepper.steps(1.0))
+    assert caught.value.time == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("h", [0.0, -1e-3, math.inf, math.nan])
+def test_euler_refuses_impossible_steps(h):
+    with pytest.raises(SimulationError, match="fixed step"):
+        SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, h)
