@@ -1,0 +1,80 @@
+"""Old formats to the current one, on the element tree and before any class is read.
+
+Each module holds the steps to one version of the format, which its name gives; `upgrade` runs those that a document
+needs, oldest first. What the steps do is what OpenSim 4.6 does (its component paths come out the same), without its
+rounding of numbers to six digits and without the references it breaks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lxml import etree
+
+from osimlite.document.upgrade import (
+    v10601_engine,  # noqa: F401
+    v10901_transform_axes,  # noqa: F401
+    v10905_point_actuators,  # noqa: F401
+    v20002_conditional_points,  # noqa: F401
+    v20101_geometry_files,  # noqa: F401
+    v20302_muscles,  # noqa: F401
+    v30000_moving_points,  # noqa: F401
+    v30500_bodies,  # noqa: F401
+    v30500_names,  # noqa: F401
+    v30501_ground_and_joints,  # noqa: F401
+    v30502_geometry,  # noqa: F401
+    v30505_offset_frames,  # noqa: F401
+    v30505_references,  # noqa: F401
+    v30506_components,  # noqa: F401
+    v30507_coordinates_and_contact,  # noqa: F401
+    v30509_switches,  # noqa: F401
+    v30512_frame_set,  # noqa: F401
+    v30513_controls,  # noqa: F401
+    v30514_reverse,  # noqa: F401
+    v30515_wrap_objects,  # noqa: F401
+    v30516_paths,  # noqa: F401
+    v30517_sockets,  # noqa: F401
+    v40000_meaningless,  # noqa: F401
+    v40500_path_names,  # noqa: F401
+    v40600_class_names,  # noqa: F401
+    v40600_controllers,  # noqa: F401
+)
+from osimlite.document.upgrade.draft import STEPS, Change, Draft, Element, Refused
+
+__all__ = ["STEPS", "Change", "Refused", "Upgraded", "upgrade"]
+
+
+@dataclass(slots=True)
+class Upgraded:
+    """What an upgrade made of a document.
+
+    `numbers` gives, for every element of the new tree in document order, the number of the element of the old document
+    it came from. `moved` finds the old element for a property by the number of its owner and its present tag, where
+    the old document has none of that tag.
+    """
+
+    root: Element
+    changes: list[Change]
+    numbers: list[int]
+    moved: dict[tuple[int, str], int]
+
+
+def upgrade(root: Element, version: int) -> Upgraded:
+    """Bring the tree of a document, in place, from `version` to the current format.
+
+    Raises:
+        Refused: the document says something that no step can carry over.
+    """
+    draft = Draft(root, version)
+    for step in sorted(STEPS, key=lambda step: step.order):
+        if version < step.below:
+            draft.step = step
+            step.apply(draft)
+    numbers = [draft.numbers[element] for element in draft.root.iter(etree.Element)]
+    moved: dict[tuple[int, str], int] = {}
+    for element in draft.touched:
+        parent = element.getparent()
+        if parent is not None:
+            moved.setdefault((draft.numbers[parent], element.tag), draft.numbers[element])
+    draft.changes.sort(key=lambda change: change.number)
+    return Upgraded(draft.root, draft.changes, numbers, moved)

@@ -1,0 +1,243 @@
+"""A document on its way from an old format to the current one: the element tree, and where each element came from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import NamedTuple
+
+from lxml import etree
+
+from osimlite.schema.registry import class_for
+
+Element = etree._Element
+
+STAND_IN = "\u00b7"
+"""Stands for ``::`` in the tags of the tree."""
+
+_FAMILY_OF_MEMBERS = {
+    "ConstraintSet": "Constraint",
+    "ContactGeometrySet": "ContactGeometry",
+    "ControllerSet": "Controller",
+    "ForceSet": "Force",
+    "JointSet": "Joint",
+    "PathPointSet": "AbstractPathPoint",
+    "ProbeSet": "Probe",
+    "WrapObjectSet": "WrapObject",
+}
+"""What an object of an unknown class (a plug-in) must be, going by the set it stands in."""
+
+
+class Change(NamedTuple):
+    """One thing an upgrade did.
+
+    Attributes:
+        step: the name of the step.
+        what: what that step does, in one line.
+        where: class and name of the component concerned.
+        number: the element it was found at, in document order.
+        lost: what the current format cannot say, if that was more than a default.
+    """
+
+    step: str
+    what: str
+    where: str
+    number: int
+    lost: str | None = None
+
+
+class Refused(Exception):
+    """A document says something that no step can carry over.
+
+    Attributes:
+        message: one plain sentence.
+        number: the element concerned, in document order.
+    """
+
+    def __init__(self, message: str, number: int) -> None:
+        super().__init__(message)
+        self.message = message
+        self.number = number
+
+
+class Step(NamedTuple):
+    """One step of the upgrade, for documents of a version `below` its own."""
+
+    below: int
+    order: int
+    name: str
+    what: str
+    apply: Callable[[Draft], None]
+
+
+STEPS: list[Step] = []
+"""Every step; `upgrade` runs them oldest first."""
+
+
+def step(*, below: int, order: int | None = None) -> Callable[[Callable[[Draft], None]], Callable[[Draft], None]]:
+    """Register a function as the step that documents of a version under `below` need.
+
+    The first line of its docstring says what it does to a document. `order` stands in for `below` where a step must
+    run sooner than its number says.
+    """
+
+    def register(function: Callable[[Draft], None]) -> Callable[[Draft], None]:
+        what = (function.__doc__ or "").strip().splitlines()[0].rstrip(".")
+        STEPS.append(Step(below, below if order is None else order, function.__name__, what, function))
+        return function
+
+    return register
+
+
+@cache
+def families(tag: str) -> frozenset[str]:
+    """The names of the class that a tag stands for and of its bases; none for a tag that is no class."""
+    cls = class_for(tag.replace(STAND_IN, "::"))
+    return frozenset() if cls is None else frozenset(base.__name__ for base in cls.__mro__)
+
+
+class Draft:
+    """The element tree of an old document, changed step by step.
+
+    `numbers` gives for every element its number in the document as it was; an element that a step makes has the number
+    of the element it was made from. `version` is that of the document as it was.
+    """
+
+    def __init__(self, root: Element, version: int) -> None:
+        self.root = root
+        self.version = version
+        self.numbers: dict[Element, int] = {
+            element: number for number, element in enumerate(root.iter(etree.Element))
+        }
+        self.changes: list[Change] = []
+        self.touched: dict[Element, None] = {}
+        self.step: Step | None = None
+        self._tags = {element.tag for element in self.numbers}
+
+    @property
+    def model(self) -> Element | None:
+        """The model, if the document holds one."""
+        return self.root.find("Model")
+
+    def every(self, *kinds: str) -> list[Element]:
+        """Every element of the classes named or of classes derived from them, in document order.
+
+        Objects of unknown classes count as what the set they stand in says.
+        """
+        wanted = frozenset(kinds)
+        tags = [tag for tag in self._tags if wanted & families(tag)]
+        sets = {owner for owner, kind in _FAMILY_OF_MEMBERS.items() if kind in wanted} & self._tags
+        found = list(self.root.iter(*tags)) if tags else []
+        if sets:
+            strange = [
+                member for owner in self.root.iter(*sets) for member in members(owner) if not families(member.tag)
+            ]
+            if strange:
+                found = sorted(dict.fromkeys([*found, *strange]), key=lambda element: self.numbers[element])
+        return found
+
+    def tagged(self, *tags: str) -> list[Element]:
+        """Every element with one of these tags, in document order."""
+        present = [tag for tag in tags if tag in self._tags]
+        return list(self.root.iter(*present)) if present else []
+
+    def add(
+        self, parent: Element, tag: str, text: str | None = None, *, source: Element, name: str | None = None
+    ) -> Element:
+        """Append a new element made from `source`."""
+        made = etree.SubElement(parent, tag)
+        made.text = text
+        if name is not None:
+            made.set("name", name)
+        self.numbers[made] = self.numbers[source]
+        self._tags.add(tag)
+        self.touched[made] = None
+        return made
+
+    def rename(self, element: Element, tag: str) -> None:
+        """Give an element another tag."""
+        element.tag = tag
+        self._tags.add(tag)
+        self.touched[element] = None
+
+    def move(self, element: Element, parent: Element) -> None:
+        """Make an element the last child of another."""
+        element.tail = None
+        parent.append(element)
+        self.touched[element] = None
+
+    def remove(self, element: Element) -> None:
+        """Take an element out."""
+        parent = element.getparent()
+        assert parent is not None
+        parent.remove(element)
+
+    def rename_child(self, parent: Element, old: str, new: str) -> bool:
+        """Give the first child `old` the tag `new`; whether there was one."""
+        child = parent.find(old)
+        if child is None:
+            return False
+        self.rename(child, new)
+        return True
+
+    def list_in(self, parent: Element, tag: str, *, source: Element) -> Element:
+        """The child that lists objects, made if it is not there."""
+        found = parent.find(tag)
+        return self.add(parent, tag, source=source) if found is None else found
+
+    def changed(self, element: Element, *, number: int | None = None, lost: str | None = None) -> None:
+        """Record that the current step changed something at an element, and what was lost."""
+        assert self.step is not None
+        number = self.numbers[element] if number is None else number
+        self.changes.append(Change(self.step.name, self.step.what, describe(element), number, lost))
+
+
+def describe(element: Element) -> str:
+    """An element as a reader knows it: its class and its name."""
+    name = element.get("name")
+    tag = element.tag.replace(STAND_IN, "::")
+    return f"{tag} '{name}'" if name else tag
+
+
+def members(owner: Element) -> Iterator[Element]:
+    """The objects of a set."""
+    objects = owner.find("objects")
+    if objects is not None:
+        yield from (child for child in objects if isinstance(child.tag, str))
+
+
+def elements(parent: Element) -> list[Element]:
+    """The child elements, without comments."""
+    return [child for child in parent if isinstance(child.tag, str)]
+
+
+def text_of(parent: Element, tag: str) -> str | None:
+    """The text of the first child with a tag, white space collapsed; None if there is none."""
+    child = parent.find(tag)
+    return None if child is None else plain(child)
+
+
+def plain(element: Element) -> str:
+    """The text of an element, white space collapsed."""
+    return " ".join("".join([element.text or "", *(node.tail or "" for node in element)]).split())
+
+
+def reals(text: str | None, count: int) -> list[float] | None:
+    """The numbers in a text, or None unless there are exactly `count`."""
+    words = (text or "").split()
+    if len(words) != count:
+        return None
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        return None
+
+
+def is_true(text: str) -> bool:
+    """A switch as OpenSim converts it; what cannot be read is false."""
+    return text.lower() in ("true", "1")
+
+
+def body_path(name: str) -> str:
+    """The path of a body in a document of version 4, from its name."""
+    return "/ground" if name == "ground" else f"/bodyset/{name}"

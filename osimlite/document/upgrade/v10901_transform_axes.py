@@ -1,0 +1,79 @@
+"""To 10901: a custom joint has six axes, three of rotation and three of translation, whether it uses them or not."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, Element, Refused, is_true, members, reals, step, text_of
+
+_UNIT = (("1", "0", "0"), ("0", "1", "0"), ("0", "0", "1"))
+
+
+@step(below=10901)
+def transform_axes(draft: Draft) -> None:
+    """<TransformAxisSet> becomes a <SpatialTransform> of six axes."""
+    for joint in draft.tagged("CustomJoint"):
+        old = joint.find("TransformAxisSet")
+        if old is None:
+            continue
+        given: dict[str, list[Element]] = {"rotation": [], "translation": []}
+        for axis in members(old):
+            given["rotation" if is_true(text_of(axis, "is_rotation") or "") else "translation"].append(axis)
+        spatial = draft.add(joint, "SpatialTransform", source=old)
+        for kind, axes in given.items():
+            if len(axes) > 3:
+                raise Refused(
+                    f"joint '{joint.get('name')}' has {len(axes)} axes of {kind}; a joint can keep three, "
+                    "the others would be lost",
+                    draft.numbers[axes[3]],
+                )
+            directions = _directions([text_of(axis, "axis") for axis in axes])
+            for place, direction in enumerate(directions):
+                name = f"{kind}{place + 1}"
+                if place < len(axes):
+                    _carry(draft, axes[place], spatial, name)
+                else:
+                    padding = draft.add(spatial, "TransformAxis", source=old, name=name)
+                    draft.add(padding, "axis", direction, source=old)
+        draft.remove(old)
+        draft.changed(joint, number=draft.numbers[old])
+
+
+def _carry(draft: Draft, axis: Element, spatial: Element, name: str) -> None:
+    axis.set("name", name)
+    draft.rename_child(axis, "coordinate", "coordinates")
+    flag = axis.find("is_rotation")
+    if flag is not None:
+        draft.remove(flag)
+    draft.move(axis, spatial)
+
+
+def _directions(given: list[str | None]) -> list[str]:
+    """The texts of three independent directions, of which the first are given."""
+    known = [reals(text, 3) or [float(word) for word in _UNIT[place]] for place, text in enumerate(given)]
+    texts = [text or " ".join(_UNIT[place]) for place, text in enumerate(given)]
+    if not known:
+        return [" ".join(unit) for unit in _UNIT]
+    if len(known) == 1:
+        units = [[float(word) for word in unit] for unit in _UNIT]
+        second = units[1] if abs(abs(_dot(known[0], units[1])) - 1) >= 1e-4 else units[2]
+        known.append(second)
+        texts.append(" ".join(f"{value:g}" for value in second))
+        texts.append(_normal(second, known[0]))
+    elif len(known) == 2:
+        texts.append(_normal(known[0], known[1]))
+    return texts
+
+
+def _dot(left: list[float], right: list[float]) -> float:
+    return sum(a * b for a, b in zip(left, right, strict=True))
+
+
+def _normal(left: list[float], right: list[float]) -> str:
+    cross = [
+        left[1] * right[2] - left[2] * right[1],
+        left[2] * right[0] - left[0] * right[2],
+        left[0] * right[1] - left[1] * right[0],
+    ]
+    length = _dot(cross, cross) ** 0.5
+    if not length:
+        return "0 0 1"
+    return " ".join(repr(value / length + 0.0) for value in cross)

@@ -1,0 +1,35 @@
+"""To 10905: a force or torque actuator names the body it acts on, not the one it reacts from."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, Element, elements, plain, step
+
+_RENAMED = {
+    "PointActuator": {"body_B": "body", "point_B": "point", "direction_A": "direction"},
+    "TorqueActuator": {"body_A": "bodyB", "body_B": "bodyA", "direction_A": "axis"},
+}
+
+
+@step(below=10905)
+def actuator_bodies(draft: Draft) -> None:
+    """Point and torque actuators say where they act, with the opposite direction."""
+    for actuator in draft.tagged(*_RENAMED):
+        names = _RENAMED[actuator.tag]
+        touched = False
+        for child in elements(actuator):
+            new = names.get(child.tag)
+            if new is not None:
+                touched = True
+                if child.tag == "direction_A":
+                    child.text = _opposite(child)
+                draft.rename(child, new)
+        if actuator.tag == "PointActuator" and actuator.find("force_is_global") is None:
+            draft.add(actuator, "force_is_global", "true", source=actuator)
+            touched = True
+        if touched:
+            draft.changed(actuator)
+
+
+def _opposite(element: Element) -> str:
+    """A vector's text with every sign turned round."""
+    return " ".join(word[1:] if word.startswith("-") else "-" + word.lstrip("+") for word in plain(element).split())

@@ -1,0 +1,31 @@
+"""To 30500: a body has one inertia, and a joint says in whose frame its places are."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, plain, step
+
+_INERTIA = {"xx": "1", "yy": "1", "zz": "1", "xy": "0", "xz": "0", "yz": "0"}
+_JOINT = {"location": "location_in_child", "orientation": "orientation_in_child"}
+
+
+@step(below=30500)
+def body_inertia(draft: Draft) -> None:
+    """Six numbers of inertia become one <inertia>."""
+    for body in draft.tagged("Body"):
+        parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
+        given = [part for part in parts.values() if part is not None]
+        words = [
+            default if (part := parts[axes]) is None else plain(part) for axes, default in _INERTIA.items()
+        ]
+        draft.add(body, "inertia", " ".join(words), source=given[0] if given else body)
+        for part in given:
+            draft.remove(part)
+        draft.changed(body)
+
+
+@step(below=30500)
+def joint_child_places(draft: Draft) -> None:
+    """<location> and <orientation> of a joint are those in the child."""
+    for joint in draft.every("Joint"):
+        for old, new in _JOINT.items():
+            draft.rename_child(joint, old, new)

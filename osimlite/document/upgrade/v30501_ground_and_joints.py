@@ -1,0 +1,70 @@
+"""To 30501: ground is no body, joints are no part of bodies, and markers name their frame by its path."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, Element, body_path, elements, members, plain, step
+
+_KEPT_BY_GROUND = frozenset("VisibleObject WrapObjectSet attached_geometry components geometry".split())
+
+
+@step(below=30501)
+def ground(draft: Draft) -> None:
+    """The body called ground becomes the model's <Ground>."""
+    model = draft.model
+    bodies = None if model is None else model.find("BodySet")
+    if model is None or bodies is None:
+        return
+    for body in members(bodies):
+        if body.tag == "Body" and body.get("name") == "ground":
+            for child in elements(body):
+                if child.tag not in _KEPT_BY_GROUND:
+                    draft.remove(child)
+            draft.rename(body, "Ground")
+            draft.move(body, model)
+            draft.changed(body)
+            return
+
+
+@step(below=30501)
+def joints(draft: Draft) -> None:
+    """Joints leave their bodies for a <JointSet> of the model and name both frames."""
+    model = draft.model
+    bodies = None if model is None else model.find("BodySet")
+    if model is None or bodies is None:
+        return
+    joint_set = model.find("JointSet")
+    if joint_set is None:
+        joint_set = draft.add(model, "JointSet", source=bodies)
+    objects = draft.list_in(joint_set, "objects", source=joint_set)
+    for body in members(bodies):
+        wrapper = body.find("Joint")
+        if wrapper is None:
+            continue
+        found = elements(wrapper)
+        if found:
+            _settle(draft, found[0], body, objects)
+        for extra in found[1:]:
+            draft.changed(body, number=draft.numbers[extra], lost=f"a second joint of the body, <{extra.tag}>")
+        draft.remove(wrapper)
+
+
+def _settle(draft: Draft, joint: Element, body: Element, objects: Element) -> None:
+    parent = next((child for child in elements(joint) if child.tag in ("parent_body", "socket_parent_body")), None)
+    if parent is not None:
+        parent.text = plain(parent)
+        draft.rename(parent, "socket_parent_frame")
+    if joint.find("socket_child_body") is None:
+        draft.add(joint, "socket_child_frame", body.get("name", ""), source=body)
+    draft.move(joint, objects)
+    draft.changed(joint)
+
+
+@step(below=30501)
+def marker_frames(draft: Draft) -> None:
+    """A marker names its body by path."""
+    for marker in draft.tagged("Marker"):
+        body = marker.find("body")
+        if body is not None:
+            body.text = body_path(plain(body))
+            draft.rename(body, "socket_parent_frame")
+            draft.changed(marker)

@@ -1,0 +1,92 @@
+"""To 30505 and 30506: a component names another by its path."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, Element, body_path, members, plain, step
+
+_CONSTRAINTS = {
+    "PointConstraint": ("body_1", "body_2"),
+    "ConstantDistanceConstraint": ("body_1", "body_2"),
+    "PointOnLineConstraint": ("line_body", "follower_body"),
+    "RollingOnSurfaceConstraint": ("rolling_body", "surface_body"),
+    "PointToPointSpring": ("body1", "body2"),
+}
+
+
+@step(below=30500)
+def constraint_bodies(draft: Draft) -> None:
+    """Constraints and springs between two bodies name them by path."""
+    for constraint in draft.tagged(*_CONSTRAINTS):
+        found = [_to_body(draft, constraint, tag, f"socket_{tag}") for tag in _CONSTRAINTS[constraint.tag]]
+        if any(found):
+            draft.changed(constraint)
+
+
+@step(below=30505)
+def point_bodies(draft: Draft) -> None:
+    """Path points name their body by path."""
+    for point in draft.every("AbstractPathPoint"):
+        if _to_body(draft, point, "body", "socket_parent_frame"):
+            draft.changed(point)
+
+
+@step(below=30505)
+def contact_bodies(draft: Draft) -> None:
+    """Contact geometry names its body by path."""
+    for geometry in draft.every("ContactGeometry"):
+        if _to_body(draft, geometry, "body_name", "socket_frame"):
+            draft.changed(geometry)
+
+
+@step(below=30506)
+def force_frames(draft: Draft) -> None:
+    """A prescribed force names its body by path."""
+    for force in draft.tagged("PrescribedForce"):
+        if _to_body(draft, force, "body", "socket_frame"):
+            draft.changed(force)
+
+
+@step(below=30505)
+def point_coordinates(draft: Draft) -> None:
+    """Conditional and moving path points name their coordinates by path.
+
+    OpenSim takes the first object of that name for the coordinate, whatever it is; here only coordinates count.
+    """
+    paths: dict[str, str] | None = None
+    for point in draft.tagged("ConditionalPathPoint", "MovingPathPoint"):
+        axes = ("",) if point.tag == "ConditionalPathPoint" else ("x_", "y_", "z_")
+        found = [child for axis in axes if (child := point.find(f"{axis}coordinate")) is not None]
+        for child in found:
+            if paths is None:
+                paths = _coordinate_paths(draft)
+            name = plain(child)
+            child.text = paths.get(name, name)
+            draft.rename(child, f"socket_{child.tag}")
+        if found:
+            draft.changed(point)
+
+
+def _to_body(draft: Draft, owner: Element, tag: str, socket: str) -> bool:
+    child = owner.find(tag)
+    if child is None:
+        return False
+    child.text = body_path(plain(child))
+    draft.rename(child, socket)
+    return True
+
+
+def _coordinate_paths(draft: Draft) -> dict[str, str]:
+    """The path of the first coordinate of each name; joints of the same name are told apart as OpenSim does."""
+    paths: dict[str, str] = {}
+    model = draft.model
+    joint_set = None if model is None else model.find("JointSet")
+    taken: set[str] = set()
+    for joint in () if joint_set is None else members(joint_set):
+        name = joint.get("name") or joint.tag.lower()
+        free, count = name, 0
+        while free in taken:
+            free, count = f"{name}_{count}", count + 1
+        taken.add(free)
+        for coordinate in joint.iter("Coordinate"):
+            paths.setdefault(coordinate.get("name", ""), f"/jointset/{free}/{coordinate.get('name')}")
+    return paths

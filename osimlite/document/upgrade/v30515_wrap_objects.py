@@ -1,0 +1,42 @@
+"""To 30515: a wrap object has an appearance."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, Element, plain, reals, step, text_of
+
+
+@step(below=30515)
+def wrap_appearance(draft: Draft) -> None:
+    """Colour and display preference of a wrap object become its <Appearance>."""
+    for wrap in draft.every("WrapObject"):
+        visible = wrap.find("VisibleObject")
+        color, own = wrap.find("color"), wrap.find("display_preference")
+        outer = None if visible is None else visible.find("display_preference")
+        representation, hidden, set_by = "3", False, color
+        for preference in (own, outer):
+            word = "" if preference is None else plain(preference)
+            if word == "0":
+                hidden, set_by = True, preference
+            elif word in ("1", "2", "3") and representation == "3":
+                representation, set_by = word, preference
+        if set_by is not None:
+            _appearance(draft, wrap, set_by, color, representation, hidden)
+        for part in (color, own, visible):
+            if part is not None:
+                draft.remove(part)
+        if set_by is not None or visible is not None:
+            placed = visible is not None and any(reals(text_of(visible, "transform"), 6) or ())
+            draft.changed(wrap, lost="where the shown surface stood off the wrap object" if placed else None)
+
+
+def _appearance(
+    draft: Draft, wrap: Element, source: Element, color: Element | None, representation: str, hidden: bool
+) -> None:
+    appearance = draft.add(wrap, "Appearance", source=source)
+    if hidden:
+        draft.add(appearance, "visible", "false", source=source)
+    text = "0 1 1" if color is None else plain(color)
+    draft.add(appearance, "color", text, source=source if color is None else color)
+    draft.add(appearance, "opacity", "0.5", source=source)
+    surface = draft.add(appearance, "SurfaceProperties", source=source)
+    draft.add(surface, "representation", representation, source=source)

@@ -1,0 +1,50 @@
+"""To 40600: a controller names its actuators by path."""
+
+from __future__ import annotations
+
+from osimlite.document.upgrade.draft import Draft, Element, families, members, plain, step
+
+
+@step(below=40600)
+def controller_actuators(draft: Draft) -> None:
+    """The names in <actuator_list> become paths in <socket_actuators>.
+
+    A name that no actuator has stays, as a path to nothing, where OpenSim drops it without a word.
+    """
+    listed = [c for c in draft.every("Controller") if c.find("actuator_list") is not None]
+    if not listed:
+        return
+    actuators = [(_path(actuator), actuator.get("name", "")) for actuator in draft.every("Actuator")]
+    forces = [
+        (_path(force), force.get("name", ""))
+        for force_set in draft.tagged("ForceSet")
+        for force in members(force_set)
+    ]
+    by_name: dict[str, str] = {}
+    for path, name in (*actuators, *forces):
+        by_name.setdefault(name, path)
+    for controller in listed:
+        names = controller.find("actuator_list")
+        assert names is not None
+        words = plain(names).split()
+        if any(word.lower() == "all" for word in words):
+            paths = [path for path, _ in actuators]
+        else:
+            paths = [by_name.get(word, f"/forceset/{word}") for word in words]
+        names.text = " ".join(dict.fromkeys(paths))
+        draft.rename(names, "socket_actuators")
+        draft.changed(controller)
+
+
+def _path(component: Element) -> str:
+    """The path of a component, by the rules of version 4."""
+    words: list[str] = []
+    here: Element | None = component
+    while here is not None and here.tag != "Model":
+        kinds = families(here.tag)
+        if "ModelComponentSet" in kinds:
+            words.append(here.tag.lower())
+        elif "Component" in kinds or here is component:
+            words.append(here.get("name") or here.tag.lower())
+        here = here.getparent()
+    return "/" + "/".join(reversed(words))
