@@ -1,0 +1,103 @@
+"""The translation of a whole model: robot, text, mesh files and the account of what was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from osimlite.errors import OsimliteError
+from osimlite.files import write_atomically
+from osimlite.multibody import build_mechanism
+from osimlite.schema.model import Model
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.passes.merge_fixed import merge_fixed
+from osimlite.translate.passes.names import legal, legal_names
+from osimlite.translate.passes.range_limits import range_limits
+from osimlite.translate.robot import Robot, build_robot
+from osimlite.translate.survey import survey
+from osimlite.translate.urdf import urdf_text
+from osimlite.translate.visuals import Visuals, collect_visuals
+
+Limits = Literal["none", "range"]
+Locked = Literal["fixed", "joint"]
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A model as URDF.
+
+    Attributes:
+        name: of the model, fit for a file name.
+        text: the URDF.
+        fidelity: what became of every component, and what URDF cannot say.
+        robot: the neutral robot that was written, which maps links and joints to bodies and coordinates.
+        files: mesh files that the text names, by name relative to it.
+    """
+
+    name: str
+    text: str
+    fidelity: Fidelity
+    robot: Robot
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write ``<name>.urdf``, its meshes and ``fidelity.json`` into a folder, which is made if it is not there.
+
+        Returns:
+            The files written, the URDF first. It is written last, when all it needs is in place.
+
+        Raises:
+            OsimliteError: a file cannot be written.
+        """
+        base = Path(folder)
+        urdf, account = base / f"{self.name}.urdf", base / "fidelity.json"
+        meshes = [(base / name, content) for name, content in self.files.items()]
+        for parent in sorted({base, *(path.parent for path, _ in meshes)}):
+            try:
+                parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(parent)) from None
+        for path, content in meshes:
+            write_atomically(path, content)
+        write_atomically(account, self.fidelity.to_json())
+        write_atomically(urdf, self.text)
+        return [urdf, *(path for path, _ in meshes), account]
+
+
+def to_urdf(
+    model: Model,
+    *,
+    visuals: bool = True,
+    limits: Limits = "none",
+    locked: Locked = "fixed",
+    merge: bool = False,
+    folder: str | Path | None = None,
+) -> Urdf:
+    """Translate a model to URDF.
+
+    Args:
+        model: the model.
+        visuals: whether to say what bodies look like.
+        limits: ``"range"`` writes coordinate ranges as hard limits; OpenSim itself lets coordinates leave them.
+        locked: whether a locked coordinate becomes a fixed joint at its default value, or a joint that moves.
+        merge: make bodies that do not move relative to each other one link.
+        folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
+
+    Raises:
+        ModelError: the model is not a mechanism: something it names is not there, or a body is not connected.
+        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+    """
+    mechanism = build_mechanism(model)
+    fidelity = Fidelity(mechanism.name, "urdf")
+    places: Sequence[Path] = () if folder is None else (Path(folder), Path(folder) / "Geometry")
+    shapes = collect_visuals(model, mechanism, fidelity, places) if visuals else Visuals()
+    robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body)
+    if merge:
+        robot = merge_fixed(robot)
+    if limits == "range":
+        robot = range_limits(robot)
+    robot = legal_names(robot)
+    survey(model, robot, fidelity)
+    return Urdf(legal(model.name or "model"), urdf_text(robot), fidelity, robot, shapes.files)

@@ -1,0 +1,99 @@
+"""The account of a translation: what became what, and what the target cannot say."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One thing that the target cannot say.
+
+    Attributes:
+        kind: a word for what it concerns: force, contact-geometry, coordinate-range, gravity ...
+        component: absolute path in the model.
+        cannot_say: what the target cannot say.
+        done: what was done about it.
+        detail: the numbers and names of this case; may be empty.
+    """
+
+    kind: str
+    component: str
+    cannot_say: str
+    done: str
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Records that say the same of several components."""
+
+    kind: str
+    cannot_say: str
+    done: str
+    components: tuple[str, ...]
+
+
+@dataclass
+class Fidelity:
+    """Everything a translation has to answer for: each component of the model is in `translated` or in a record.
+
+    What stands below a component that has a record shares its fate and may have none of its own; containers (the
+    sets) and the axes that viewers draw at a frame are not counted.
+
+    Attributes:
+        model: name of the model.
+        target: the format, e.g. ``"urdf"``.
+        translated: what became of a component, by absolute path: ``"link Pelvis"``, ``"joint RHip_rz"``.
+        records: what the target cannot say.
+    """
+
+    model: str
+    target: str
+    translated: dict[str, str] = field(default_factory=dict)
+    records: list[Record] = field(default_factory=list)
+
+    def __iter__(self) -> Iterator[Record]:
+        return iter(self.records)
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def add(self, kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+        """Add a record."""
+        self.records.append(Record(kind, component, cannot_say, done, detail))
+
+    def groups(self) -> list[Group]:
+        """The records, those of one kind that say the same together, in the order of the first of each."""
+        found: dict[tuple[str, str, str], list[str]] = {}
+        for record in self.records:
+            found.setdefault((record.kind, record.cannot_say, record.done), []).append(record.component)
+        return [Group(*key, tuple(paths)) for key, paths in found.items()]
+
+    def left_out(self, paths: Iterable[str]) -> list[str]:
+        """Those of the paths that nothing accounts for: neither translated nor recorded, nor below a record."""
+        recorded = {record.component for record in self.records}
+        missing = []
+        for path in paths:
+            parts = path.split("/")
+            above = {"/".join(parts[:count]) for count in range(2, len(parts) + 1)} | {path}
+            if path not in self.translated and not above & recorded:
+                missing.append(path)
+        return missing
+
+    def to_json(self) -> str:
+        """The account as JSON text."""
+        records = [
+            {
+                "kind": record.kind,
+                "component": record.component,
+                "cannot_say": record.cannot_say,
+                "done": record.done,
+                **({"detail": record.detail} if record.detail else {}),
+            }
+            for record in self.records
+        ]
+        content = {"model": self.model, "target": self.target, "records": records, "translated": self.translated}
+        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,234 @@
+"""What URDF cannot say of a model: a walk over every component, with a record for each that is lost or changed."""
+
+from __future__ import annotations
+
+from osimlite.multibody.functions import IDENTITY
+from osimlite.schema.base import Component
+from osimlite.schema.constraints import Constraint
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.controllers import Controller
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import Force
+from osimlite.schema.frames import PhysicalOffsetFrame
+from osimlite.schema.geometry import FrameGeometry
+from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, Joint, ScapulothoracicJoint
+from osimlite.schema.markers import Marker
+from osimlite.schema.model import Model
+from osimlite.schema.probes import Probe
+from osimlite.schema.sets import ModelComponentSet
+from osimlite.schema.wrapping import WrapObject, WrapObjectSet
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.passes.principal_axes import breaks_triangle_rule, principal_axes
+from osimlite.translate.robot import Robot
+
+CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
+"""Components that say nothing of their own: sets, and the axes that a viewer may draw at a frame."""
+
+_ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
+
+_LOST: tuple[tuple[type[Component], str, str], ...] = (
+    (Force, "force", "a force"),
+    (ContactGeometry, "contact-geometry", "a contact surface and its material"),
+    (Marker, "marker", "a marker"),
+    (Controller, "controller", "a controller"),
+    (Probe, "probe", "a probe"),
+    (Constraint, "constraint", "a constraint besides the joints"),
+    (WrapObject, "wrap-object", "a surface that paths wrap around"),
+)
+
+
+def survey(model: Model, robot: Robot, fidelity: Fidelity) -> None:
+    """Fill `fidelity` with what became of every component of `model` in `robot`.
+
+    Args:
+        model: the model.
+        robot: made of it, with its final names and limits.
+        fidelity: already has the records of the geometry.
+    """
+    _Survey(model, robot, fidelity).run()
+
+
+class _Survey:
+    def __init__(self, model: Model, robot: Robot, fidelity: Fidelity) -> None:
+        self.model, self.robot, self.fidelity = model, robot, fidelity
+        self.tree = model.tree()
+        self.note = fidelity.add
+
+    def run(self) -> None:
+        self.fidelity.translated["/"] = f"robot {self.robot.name}"
+        self._gravity()
+        self._links()
+        self._joints()
+        for index, info in enumerate(self.robot.mechanism.coordinates):
+            found = self.tree.by_path[info.path]
+            assert isinstance(found, Coordinate)
+            self._coordinate(index, found, info.path)
+        for link in self.robot.links:
+            for visual in link.visuals:
+                self.fidelity.translated[visual.source] = f"visual of link {link.name}"
+        self._frames()
+        self._rest()
+
+    def _gravity(self) -> None:
+        units = f"{self.model.length_units} {self.model.force_units}".lower().split()
+        if units not in (["meters", "n"], ["m", "n"]):
+            self.note("units", "/", "that the model's units are words for people", "numbers written as m, kg, s, rad")
+        x, y, z = self.model.gravity
+        self.note(
+            "gravity",
+            "/",
+            "gravity",
+            "left out: set it in the program that loads the file",
+            f"({x:g}, {y:g}, {z:g}) m/s^2",
+        )
+
+    def _links(self) -> None:
+        for path, (link, _) in self.robot.link_of.items():
+            self.fidelity.translated[path] = f"link {link.name}"
+            own_name = path.rsplit("/", 1)[1]
+            if path != "/ground" and link.name != own_name:
+                together = len(link.bodies) > 1
+                self.note(
+                    "merged-body" if together else "name",
+                    path,
+                    "bodies welded together as links of their own" if together else "the name of a component as it is",
+                    f"merged into link {link.name}" if together else "renamed",
+                    "" if together else f"link {link.name}",
+                )
+            moments, _ = principal_axes(link.inertia)
+            if breaks_triangle_rule(moments):
+                self.note(
+                    "inertia",
+                    path,
+                    "an inertia that no body can have (one principal moment exceeds the sum of the others)",
+                    "written as it is: PyBullet takes zero instead, MuJoCo refuses it",
+                    "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
+                )
+
+    def _joints(self) -> None:
+        massless = {link.name for link in self.robot.links if not link.bodies}
+        for joint in self.tree.components:
+            if not isinstance(joint, Joint):
+                continue
+            path = self.tree.path_of(joint) or ""
+            chain = [part for part in self.robot.joints if part.source == path]
+            names = " ".join(part.name for part in chain)
+            self.fidelity.translated[path] = f"joint {names}" if names else "merged into the link that carries it"
+            between = [part.child for part in chain if part.child in massless]
+            if between:
+                self.note(
+                    "massless-link",
+                    path,
+                    "a joint with several axes, or one whose axis passes by the origin of the body it moves",
+                    "a chain of one-axis joints with massless links between",
+                    f"links {' '.join(between)}",
+                )
+            moving = {index for part in chain for index in part.coordinates}
+            if isinstance(joint, _ANGULAR_SPEEDS) and moving:
+                self.note(
+                    "ball-joint",
+                    path,
+                    "a ball joint: three rotations at once, whose speeds are an angular velocity",
+                    "three revolute joints: singular where the second stands at +-90 degrees; their speeds are the "
+                    "rates of the angles",
+                )
+
+    def _coordinate(self, index: int, coordinate: Coordinate, path: str) -> None:
+        unit = "m" if self.robot.mechanism.coordinates[index].motion_type == "translational" else "rad"
+        joint = self.robot.joint_of.get(index)
+        driven = [part for part in self.robot.moving if index in part.coordinates]
+        if not driven:
+            self.fidelity.translated[path] = "fixed"
+            self.note(
+                "locked",
+                path,
+                "that a joint is locked",
+                "a fixed joint at its value",
+                f"{coordinate.default_value:g} {unit}",
+            )
+            return
+        self.fidelity.translated[path] = f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
+        if joint is not None and joint.name != path.rsplit("/", 1)[1]:
+            self.note("name", path, "the name of a component as it is", "renamed", f"joint {joint.name}")
+        low, high = coordinate.range
+        text = f"{low:g} to {high:g} {unit}"
+        hard = joint is not None and joint.limits is not None
+        self.note(
+            "coordinate-range",
+            path,
+            "a range that stops nothing (a URDF limit is a hard stop)",
+            "written as a hard limit" if hard else "no limit written",
+            text,
+        )
+        if coordinate.clamped:
+            self.note("clamped", path, "that a user interface must not leave the range", "left out", text)
+        if coordinate.locked:
+            self.note("locked", path, "that a joint is locked", "a joint that moves: hold it in your program")
+        if coordinate.default_value != 0.0:
+            self.note(
+                "default-pose",
+                path,
+                "a starting value: every joint starts at zero",
+                "left out: set the joint in your program",
+                f"{coordinate.default_value:g} {unit}",
+            )
+        if coordinate.default_speed_value != 0.0:
+            self.note(
+                "default-speed",
+                path,
+                "a starting speed",
+                "left out: set it in your program",
+                f"{coordinate.default_speed_value:g} {unit}/s",
+            )
+        for part in driven:
+            if part.function == IDENTITY:
+                continue
+            mimic = joint is not None and part.function.slope is not None and len(part.coordinates) == 1
+            self.note(
+                "coordinate-function",
+                path,
+                "a joint that moves by a function of a coordinate",
+                "a joint that mimics the joint of the coordinate"
+                if mimic
+                else "a free joint: its value has to be computed",
+                f"joint {part.name}",
+            )
+
+    def _frames(self) -> None:
+        mechanism = self.robot.mechanism
+        for frame in self.tree.components:
+            if not isinstance(frame, PhysicalOffsetFrame):
+                continue
+            path = self.tree.path_of(frame) or ""
+            if isinstance(self.tree.parent_of(frame), Joint):
+                self.fidelity.translated[path] = "origins of the joint's parts"
+                continue
+            body, where = mechanism.frames[path]
+            owner = mechanism.bodies[body].path if body >= 0 else "/ground"
+            x, y, z = where[:3, 3]
+            self.note(
+                "frame",
+                path,
+                "a frame that is no link",
+                "left out as a frame; what is fixed to it is in the body's link",
+                f"in {owner} at ({x:g}, {y:g}, {z:g}) m",
+            )
+
+    def _rest(self) -> None:
+        accounted = {record.component for record in self.fidelity.records} | self.fidelity.translated.keys()
+        dropped: set[int] = set()
+        for component in self.tree.components:
+            path = self.tree.path_of(component) or ""
+            above = self.tree.parent_of(component)
+            if above is not None and id(above) in dropped:
+                # A part of something left out, such as the path of a muscle.
+                dropped.add(id(component))
+            elif path not in accounted and not isinstance(component, CONTAINERS):
+                dropped.add(id(component))
+                kind, what = next(
+                    ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls)),
+                    ("component", f"a {getattr(component, 'class_name', '') or type(component).__name__}"),
+                )
+                self.note(
+                    kind, path, what, "left out", getattr(component, "class_name", "") or type(component).__name__
+                )
