@@ -1,0 +1,166 @@
+"""RungeKuttaMerson over OpenSim's own accelerations takes the very steps of OpenSim's Manager.
+
+Both run on one machine with one library, so nothing but a different method, or a different order of rounding, could
+make the steps differ: where the states are the same numbers, they are compared without tolerance.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+
+import pytest
+
+from osimlite.simulate.integrators import RungeKuttaMerson
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+
+@pytest.fixture
+def walker(fixtures):
+    opensim.Logger.setLevelString("error")
+    return opensim.Model(str(fixtures / "walker" / "DynamicWalkerModel.osim"))
+
+
+def dynamics(model, state):
+    """Derivative of the state in Simbody's order (all q, all u, all z), and its initial value."""
+    size = state.getNY()
+
+    def f(t, y):
+        state.setTime(t)
+        state.setY(opensim.Vector(y))
+        model.realizeAcceleration(state)
+        derivative = state.getYDot()
+        return [derivative.get(i) for i in range(size)]
+
+    initial = state.getY()
+    return f, [initial.get(i) for i in range(size)]
+
+
+def manager_run(model, until, accuracy=None):
+    """Times that a Manager records, its last state, and (taken, attempted, realizations) of its integrator."""
+    sink = opensim.StringLogSink()
+    state = model.initSystem()
+    manager = opensim.Manager(model)
+    if accuracy is not None:
+        manager.setIntegratorAccuracy(accuracy)
+    manager.initialize(state)
+    opensim.Logger.setLevelString("info")
+    opensim.Logger.addSink(sink)
+    try:
+        last = manager.integrate(until).getY()
+        log = sink.getString()
+    finally:
+        opensim.Logger.removeSink(sink)
+        opensim.Logger.setLevelString("error")
+    counts = re.search(r"realizations: (\d+)[^$]*?taken / attempted: (\d+) / (\d+)", log)
+    assert counts is not None
+    realizations, taken, attempted = map(int, counts.groups())
+    times = list(manager.getStatesTable().getIndependentColumn())
+    return times, [last.get(i) for i in range(last.size())], (taken, attempted, realizations)
+
+
+def counts(integrator):
+    return integrator.taken, integrator.attempted, integrator.evaluations
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "expected"),
+    [(None, (135, 173, 828)), (1e-5, (360, 440, 2121)), (1e-8, (1799, 1972, 9688))],
+)
+def test_the_walkers_steps_are_opensims(walker, accuracy, expected):
+    times, last, measured = manager_run(walker, 2.0, accuracy)
+    f, y0 = dynamics(walker, walker.initSystem())
+    integrator = RungeKuttaMerson(f, 0.0, y0, 8, **({} if accuracy is None else {"accuracy": accuracy}))
+    steps = list(integrator.steps(2.0))
+    assert counts(integrator) == measured == expected
+    assert [t for t, _ in steps] == times[1:]
+    assert steps[-1][1] == last
+
+
+def test_recorded_steps(walker, shared):
+    """Not only the run of this day: times and states of the reference data."""
+    f, y0 = dynamics(walker, walker.initSystem())
+    with (shared / "oracle" / "trajectory_default_internal_steps.csv").open() as text:
+        rows = [[float(x) for x in row] for row in csv.reader(line for line in text if line[0] not in "#t")]
+    steps = list(RungeKuttaMerson(f, 0.0, y0, 8).steps(2.0))
+    assert len(rows) == 1 + len(steps) == 136
+    for row, (t, y) in zip(rows[1:], steps, strict=True):
+        assert [t, *y] == pytest.approx(row[:17], rel=1e-9, abs=1e-9)
+
+
+def test_a_locked_coordinate_left_out_but_counted(walker):
+    """Platform out of the state: count_q and count_u keep OpenSim's norm, and so its steps."""
+    times, last, _ = manager_run(walker, 2.0)
+    whole, y0 = dynamics(walker, walker.initSystem())
+
+    def f(t, y):
+        derivative = whole(t, [y0[0], *y[:7], 0.0, *y[7:]])
+        return derivative[1:8] + derivative[9:]
+
+    y = y0[1:8] + y0[9:]
+    integrator = RungeKuttaMerson(f, 0.0, y, 7, count_q=8, count_u=8)
+    steps = list(integrator.steps(2.0))
+    assert [t for t, _ in steps] == times[1:]
+    assert steps[-1][1] == last[1:8] + last[9:]
+    uncounted = RungeKuttaMerson(f, 0.0, y, 7)
+    assert [t for t, _ in uncounted.steps(2.0)] != times[1:]
+
+
+def test_a_manager_that_is_asked_every_millisecond(walker):
+    """The Manager does not interpolate: its steps end where it is told to stop, and so do ours."""
+    state = walker.initSystem()
+    f, y0 = dynamics(walker, opensim.State(state))
+    manager = opensim.Manager(walker)
+    manager.initialize(state)
+    integrator = RungeKuttaMerson(f, 0.0, y0, 8)
+    for i in range(1, 201):
+        expected = manager.integrate(i / 1000).getY()
+        for _ in integrator.steps(i / 1000):
+            pass
+        assert integrator.state == [expected.get(j) for j in range(16)]
+
+
+def test_auxiliary_states(walker):
+    """Energy dissipated by the limit forces, integrated along as auxiliary states."""
+    for name in ("RKneeLimitTorque", "LHipLimitTorque"):
+        force = opensim.CoordinateLimitForce.safeDownCast(walker.updForceSet().get(name))
+        force.set_compute_dissipation_energy(True)
+    times, last, measured = manager_run(walker, 2.0)
+    state = walker.initSystem()
+    assert (state.getNQ(), state.getNU(), state.getNZ()) == (8, 8, 2)
+    f, y0 = dynamics(walker, state)
+    integrator = RungeKuttaMerson(f, 0.0, y0, 8, nu=8)
+    steps = list(integrator.steps(2.0))
+    assert counts(integrator) == measured
+    assert [t for t, _ in steps] == times[1:]
+    assert steps[-1][1] == last
+
+
+def test_a_free_joint_counts_one_coordinate_more():
+    """Simbody keeps seven slots for the six coordinates of a free joint, and divides the squares of errors by seven."""
+    opensim.Logger.setLevelString("error")
+    model = opensim.Model()
+    body = opensim.Body("body", 1.0, opensim.Vec3(0.1, 0.2, 0.0), opensim.Inertia(0.3, 0.5, 0.4))
+    model.addBody(body)
+    joint = opensim.FreeJoint("joint", model.getGround(), body)
+    model.addJoint(joint)
+    for index, (value, speed) in enumerate([(0.3, 4.0), (0.2, -3.0), (-0.5, 5.0), (0, 1), (0, 2), (0, 3)]):
+        joint.upd_coordinates(index).setDefaultValue(value)
+        joint.upd_coordinates(index).setDefaultSpeedValue(speed)
+    times, last, measured = manager_run(model, 1.0, 1e-6)
+    state = model.initSystem()
+    assert (state.getNQ(), state.getNU()) == (7, 6)
+    whole, y0 = dynamics(model, state)
+
+    def f(t, y):
+        derivative = whole(t, [*y[:6], 0.0, *y[6:]])
+        return derivative[:6] + derivative[7:]
+
+    integrator = RungeKuttaMerson(f, 0.0, y0[:6] + y0[7:], 6, accuracy=1e-6, count_q=7)
+    steps = list(integrator.steps(1.0))
+    assert counts(integrator)[:2] == measured[:2]
+    # Simbody weights errors of q by way of those of u, which rounds.
+    assert [t for t, _ in steps] == pytest.approx(times[1:], abs=1e-9)
+    assert steps[-1][1] == pytest.approx(last[:6] + last[7:], abs=1e-9)
