@@ -74,34 +74,24 @@ class _Survey:
         if units not in (["meters", "n"], ["m", "n"]):
             self.note("units", "/", "that the model's units are words for people", "numbers written as m, kg, s, rad")
         x, y, z = self.model.gravity
-        self.note(
-            "gravity",
-            "/",
-            "gravity",
-            "left out: set it in the program that loads the file",
-            f"({x:g}, {y:g}, {z:g}) m/s^2",
-        )
+        self.note("gravity", "/", "gravity", "left out: set it in your program", f"({x:g}, {y:g}, {z:g}) m/s^2")
 
     def _links(self) -> None:
         for path, (link, _) in self.robot.link_of.items():
             self.fidelity.translated[path] = f"link {link.name}"
-            own_name = path.rsplit("/", 1)[1]
-            if path != "/ground" and link.name != own_name:
-                together = len(link.bodies) > 1
-                self.note(
-                    "merged-body" if together else "name",
-                    path,
-                    "bodies welded together as links of their own" if together else "the name of a component as it is",
-                    f"merged into link {link.name}" if together else "renamed",
-                    "" if together else f"link {link.name}",
-                )
+            if len(link.bodies) > 1 and path != "/ground":
+                massless = " without its mass, for it does not move" if "/ground" in link.bodies else ""
+                merged = f"merged into link {link.name}{massless}"
+                self.note("merged-body", path, "bodies welded together as links of their own", merged)
+            elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
+                self._renamed(path, f"link {link.name}")
             moments, _ = principal_axes(link.inertia)
             if breaks_triangle_rule(moments):
                 self.note(
                     "inertia",
                     path,
                     "an inertia that no body can have (one principal moment exceeds the sum of the others)",
-                    "written as it is: PyBullet takes zero instead, MuJoCo refuses it",
+                    "written as it is; PyBullet takes zero instead",
                     "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
                 )
 
@@ -139,17 +129,12 @@ class _Survey:
         driven = [part for part in self.robot.moving if index in part.coordinates]
         if not driven:
             self.fidelity.translated[path] = "fixed"
-            self.note(
-                "locked",
-                path,
-                "that a joint is locked",
-                "a fixed joint at its value",
-                f"{coordinate.default_value:g} {unit}",
-            )
+            value = f"{coordinate.default_value:g} {unit}"
+            self.note("locked", path, "that a joint is locked", "a fixed joint at its value", value)
             return
         self.fidelity.translated[path] = f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
         if joint is not None and joint.name != path.rsplit("/", 1)[1]:
-            self.note("name", path, "the name of a component as it is", "renamed", f"joint {joint.name}")
+            self._renamed(path, f"joint {joint.name}")
         low, high = coordinate.range
         text = f"{low:g} to {high:g} {unit}"
         hard = joint is not None and joint.limits is not None
@@ -188,9 +173,7 @@ class _Survey:
                 "coordinate-function",
                 path,
                 "a joint that moves by a function of a coordinate",
-                "a joint that mimics the joint of the coordinate"
-                if mimic
-                else "a free joint: its value has to be computed",
+                "a joint that mimics that of the coordinate" if mimic else "a free joint: compute its value",
                 f"joint {part.name}",
             )
 
@@ -225,10 +208,10 @@ class _Survey:
                 dropped.add(id(component))
             elif path not in accounted and not isinstance(component, CONTAINERS):
                 dropped.add(id(component))
-                kind, what = next(
-                    ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls)),
-                    ("component", f"a {getattr(component, 'class_name', '') or type(component).__name__}"),
-                )
-                self.note(
-                    kind, path, what, "left out", getattr(component, "class_name", "") or type(component).__name__
-                )
+                name = getattr(component, "class_name", "") or type(component).__name__
+                known = ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls))
+                kind, what = next(known, ("component", f"a {name}"))
+                self.note(kind, path, what, "left out", name)
+
+    def _renamed(self, path: str, name: str) -> None:
+        self.note("name", path, "the name of a component as it is", "renamed", name)

@@ -1,0 +1,64 @@
+"""``osimlite translate``: a model as a file of another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def translate(
+    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    to: Annotated[str, typer.Option("--to", help="The format: 'urdf'.")] = "urdf",
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
+    ] = Path("."),
+    limits: Annotated[
+        str, typer.Option(help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.")
+    ] = "none",
+    merge: Annotated[
+        bool, typer.Option("--merge", help="Make bodies that do not move relative to each other one link.")
+    ] = False,
+) -> None:
+    """Translate a model: writes <model>.urdf, its meshes, and fidelity.json.
+
+    fidelity.json says what became of every component, and what the format cannot say; the table shows the latter.
+
+    Example: osimlite translate walker.osim --to urdf -o robot
+    """
+    from typing import cast
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from osimlite.document.reader import read
+    from osimlite.errors import OsimliteError
+    from osimlite.text import listed
+    from osimlite.translate.export import Limits, to_urdf
+
+    if to != "urdf":
+        raise OsimliteError(f"--to is 'urdf', not '{to}'")
+    if limits not in ("none", "range"):
+        raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
+    urdf = to_urdf(read(file), limits=cast("Limits", limits), merge=merge, folder=file.parent)
+    written = urdf.write(output)
+
+    console = Console()
+    table = Table(title=f"What URDF cannot say of {urdf.fidelity.model}", title_justify="left", show_lines=True)
+    table.add_column("what", overflow="fold", ratio=4)
+    table.add_column("done about it", overflow="fold", ratio=3)
+    table.add_column("where", overflow="fold", ratio=3)
+    for group in urdf.fidelity.groups():
+        names = [path.rsplit("/", 1)[1] or "the model" for path in group.components]
+        table.add_row(group.cannot_say, group.done, listed(names, most=3))
+    if table.row_count:
+        console.print(table)
+    robot = urdf.robot
+    console.print(
+        f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
+        + listed([str(path) for path in written], most=4),
+        highlight=False,
+        soft_wrap=True,
+    )
