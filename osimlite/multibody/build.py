@@ -30,14 +30,13 @@ from osimlite.text import listed
 def build_mechanism(model: Model) -> Mechanism:
     """The tree of bodies and mobilizers that a model describes.
 
-    Bodies come in breadth-first order from ground, the joints of one body in the order of the model;
-    coordinates come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its
-    parent is reversed.
+    Bodies come level by level from ground, within a level in the order of the joints that carry them; coordinates
+    come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is
+    reversed. Markers, forces and geometry play no part.
 
     Raises:
-        ModelError: a frame or joint names what does not exist, bodies are not connected to ground, a joint
-            connects a
-            body with itself or has the wrong number of coordinates, a mass or inertia is impossible.
+        ModelError: a frame or joint names what does not exist, bodies are not connected to ground, a joint connects
+            a body with itself or has the wrong number of coordinates, a mass or an inertia is impossible.
         UnsupportedError: a joint of another type, a closed loop, a constraint, a prescribed coordinate.
     """
     return _Builder(model).mechanism()
@@ -94,13 +93,14 @@ class _Builder:
 
     def _refuse(self, component: Component) -> None:
         """Stop at what would move the bodies differently and is not computed here."""
-        if isinstance(component, Unknown):
-            parent = self.tree.parent_of(component)
-            if parent in (self.model.joint_set, self.model.constraint_set, self.model.body_set):
-                raise self._unknown(self._path(component), component.class_name)
-        if isinstance(component, Constraint) and component.isEnforced:
+        kind = component.class_name if isinstance(component, Unknown) else type(component).__name__
+        holder = self.tree.parent_of(component)
+        if isinstance(component, Unknown) and holder in (self.model.joint_set, self.model.body_set):
+            raise self._unknown(self._path(component), kind)
+        unknown_constraint = isinstance(component, Unknown) and holder is self.model.constraint_set
+        if unknown_constraint or (isinstance(component, Constraint) and component.isEnforced):
             raise UnsupportedError(
-                f"the constraint '{self._path(component)}' ({type(component).__name__}) cannot be computed; "
+                f"the constraint '{self._path(component)}' ({kind}) cannot be computed; "
                 "set its isEnforced to false or remove it"
             )
 
@@ -180,17 +180,18 @@ class _Builder:
         )
 
     def _sorted(self, edges: list[_Edge]) -> Iterator[MobileBody]:
-        """Yield the bodies breadth-first from ground, each with the mobilizer that carries it."""
-        ground = self._path(self.model.ground)
-        index = {ground: GROUND}
-        waiting, used = [ground], set()
-        while waiting:
-            carrier = waiting.pop(0)
+        """Yield the bodies level by level from ground, each with the mobilizer that carries it."""
+        level = [self._path(self.model.ground)]
+        index, used = {level[0]: GROUND}, set()
+        while level:
+            beyond = []
             for edge in edges:
-                if edge.path in used or carrier not in (edge.parent, edge.child):
+                if edge.path in used or (edge.parent not in level and edge.child not in level):
                     continue
                 used.add(edge.path)
-                outer = edge.child if edge.parent == carrier else edge.parent
+                carrier, outer = edge.parent, edge.child
+                if carrier not in level:
+                    carrier, outer = outer, carrier
                 if outer in index:
                     raise UnsupportedError(
                         f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
@@ -201,10 +202,11 @@ class _Builder:
                     path=outer,
                     parent=index[carrier],
                     mass_properties=self._mass_properties(outer),
-                    mobilizer=edge.mobilizer(reversed=edge.child == carrier),
+                    mobilizer=edge.mobilizer(reversed=carrier == edge.child),
                 )
                 index[outer] = len(index) - 1
-                waiting.append(outer)
+                beyond.append(outer)
+            level = beyond
         loose = [path for path in self.bodies if path not in index]
         if loose:
             raise ModelError(

@@ -145,8 +145,9 @@ def _times(matrices: Array, vectors: Array) -> Array:
 
 def _projected(jacobians: Array, loads: Array) -> Array:
     """Sum over the bodies of each Jacobian (b, 3, n), transposed, times its load (b, 3) or loads (b, 3, m)."""
-    flat = jacobians.reshape(-1, jacobians.shape[2])
-    result: Array = flat.T @ loads.reshape(len(flat), *loads.shape[2:])
+    count, _, size = jacobians.shape
+    flat = jacobians.reshape(3 * count, size)
+    result: Array = flat.T @ loads.reshape(3 * count, *loads.shape[2:])
     return result
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite.multibody.spatial import Array
 
@@ -124,7 +124,7 @@ class PiecewiseLinear(Univariate):
     y: tuple[float, ...]
 
     def _at(self, x: float) -> tuple[float, float, float]:
-        k = min(max(bisect_right(self.x, x) - 1, 0), len(self.x) - 2)
+        k = _interval(self.x, x)
         slope = (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
         return self.y[k] + slope * (x - self.x[k]), slope, 0.0
 
@@ -137,7 +137,7 @@ class PiecewiseConstant(Univariate):
     y: tuple[float, ...]
 
     def _at(self, x: float) -> tuple[float, float, float]:
-        return self.y[max(bisect_right(self.x, x) - 1, 0)], 0.0, 0.0
+        return self.y[-1 if x >= self.x[-1] else _interval(self.x, x)], 0.0, 0.0
 
 
 class SimmSpline(Univariate):
@@ -148,9 +148,9 @@ class SimmSpline(Univariate):
     two a line. Intervals narrower than 1e-7 count as 1e-7 wide, as in OpenSim.
     """
 
-    def __init__(self, x: Sequence[float], y: Sequence[float]) -> None:
-        self.x = tuple(float(value) for value in x)
-        self.y = tuple(float(value) for value in y)
+    def __init__(self, x: ArrayLike, y: ArrayLike) -> None:
+        self.x: tuple[float, ...] = tuple(np.asarray(x, dtype=float).tolist())
+        self.y: tuple[float, ...] = tuple(np.asarray(y, dtype=float).tolist())
         points = np.array(self.x)
         widths = np.maximum(np.diff(points), 1e-7)
         slopes = np.diff(self.y) / widths
@@ -169,10 +169,32 @@ class SimmSpline(Univariate):
             k = 0 if x < self.x[0] else last
             y, slope, _, _ = self._pieces[k]
             return y + slope * (x - self.x[k]), slope, 0.0
-        k = min(max(bisect_right(self.x, x) - 1, 0), max(last - 1, 0))
+        k = _interval(self.x, x)
         y, b, c, d = self._pieces[k]
         t = x - self.x[k]
         return y + t * (b + t * (c + t * d)), b + t * (2.0 * c + 3.0 * t * d), 2.0 * c + 6.0 * t * d
+
+
+def _interval(knots: Sequence[float], x: float) -> int:
+    """The index of the knot before `x`, of the first or last but one for `x` outside.
+
+    At a knot both neighbours would do. OpenSim takes the one that this search by halves meets first, which shows
+    where slopes or values jump.
+    """
+    if x <= knots[0]:
+        return 0
+    if x >= knots[-1]:
+        return len(knots) - 2
+    low, high = 0, len(knots)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < knots[middle]:
+            high = middle
+        elif x > knots[middle + 1]:
+            low = middle
+        else:
+            return middle
+    return low
 
 
 def _spline_curvature(points: Array, widths: Array, slopes: Array) -> Array:

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite.errors import ModelError, SimulationError
 from osimlite.multibody.functions import Function
@@ -30,8 +31,7 @@ from osimlite.multibody.motions import (
     translate,
 )
 from osimlite.multibody.spatial import Array, RelativeMotion, inverse, rotation_about, transform
-
-MotionType = Literal["rotational", "translational", "coupled"]
+from osimlite.schema.joints import MotionType
 
 # Coordinates in OpenSim's order: planar rz, tx, ty; free rx, ry, rz, tx, ty, tz.
 MOTIONS: dict[str, tuple[Motion, ...]] = {
@@ -47,14 +47,12 @@ MOTIONS: dict[str, tuple[Motion, ...]] = {
 """X_FM of the joint types that have no properties of their own."""
 
 
-def ellipsoid(radii: Sequence[float]) -> tuple[Motion, ...]:
+def ellipsoid(radii: ArrayLike) -> tuple[Motion, ...]:
     """Motions of an EllipsoidJoint: rx, ry, rz on the ellipsoid with `radii` (m) along F."""
     return (SphericalMotion((0, 1, 2), np.array(radii, dtype=float)),)
 
 
-def scapulothoracic(
-    radii: Sequence[float], winging_origin: Sequence[float], winging_direction: float
-) -> tuple[Motion, ...]:
+def scapulothoracic(radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float) -> tuple[Motion, ...]:
     """Motions of a ScapulothoracicJoint.
 
     Args:
@@ -63,11 +61,11 @@ def scapulothoracic(
         winging_direction: angle of the winging axis (rad).
     """
     quarter = rotation_about(np.array(Z), math.pi / 2)
-    x, y = winging_origin
+    x, y = np.asarray(winging_origin, dtype=float).tolist()
     axis = (-math.sin(winging_direction), math.cos(winging_direction), 0.0)
     return (
         place(quarter),
-        SphericalMotion((0, 1, 2), np.array((radii[1], radii[0], radii[2]), dtype=float)),
+        SphericalMotion((0, 1, 2), np.asarray(radii, dtype=float)[[1, 0, 2]]),
         place(quarter.T),
         place(None, (x, y, 0.0)),
         rotate(axis, 3),
@@ -79,7 +77,7 @@ class TransformAxis(NamedTuple):
     """One axis of a CustomJoint: `function` of `coordinates` (places in the joint) along or about `axis`."""
 
     coordinates: tuple[int, ...]
-    axis: Sequence[float]
+    axis: ArrayLike
     function: Function
 
 
@@ -98,7 +96,7 @@ def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMot
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
     if not length > 0.0:
-        raise ModelError(f"the axis {tuple(axis.axis)} of a transform has no direction; give one that is not zero")
+        raise ModelError(f"the axis {direction.tolist()} of a transform has no direction; give one that is not zero")
     return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
 
 

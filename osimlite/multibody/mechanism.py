@@ -20,9 +20,10 @@ from osimlite.errors import ModelError
 from osimlite.multibody import dynamics
 from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.dynamics import MassCentres, Wrench
-from osimlite.multibody.joints import Mobilizer, MotionType
+from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.spatial import Array
+from osimlite.schema.joints import MotionType
 from osimlite.text import did_you_mean
 
 GROUND = -1

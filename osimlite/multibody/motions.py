@@ -1,8 +1,7 @@
 """Elementary motions: what the transform of every joint is a product of.
 
-A motion carries its outgoing frame in its incoming frame as its own few generalized coordinates q and speeds
-u say. The numbers in `coordinates` are places among the coordinates of the joint; `q` and `u` are all those
-of the joint.
+A motion moves its outgoing frame in its incoming frame as a few generalized coordinates and speeds say. The numbers
+in `coordinates` are places among the coordinates of the joint; `q` (k,) and `u` (k,) always are all those of the joint.
 """
 
 from __future__ import annotations
@@ -201,11 +200,11 @@ class EllipsoidPoint(Function):
             value = sb
             gradient[1], hessian[1, 1] = cb, -sb
         else:
-            # -sin a cos b, and its derivative with respect to -a: cos a cos b.
-            f, df = (-sa, -ca) if self.component == 1 else (ca, -sa)
-            value = f * cb
-            gradient[:2] = df * cb, -f * sb
-            hessian[:2, :2] = (-f * cb, -df * sb), (-df * sb, -f * cb)
+            # g(a) cos b with g = -sin a for y and cos a for z, so that g'' = -g.
+            g, slope = (-sa, -ca) if self.component == 1 else (ca, -sa)
+            value = g * cb
+            gradient[:2] = slope * cb, -g * sb
+            hessian[:2, :2] = (-g * cb, -slope * sb), (-slope * sb, -g * cb)
         return self.radius * value, self.radius * gradient, self.radius * hessian
 
 

@@ -84,10 +84,10 @@ def motions(joint_type: str, properties: dict[str, Any]) -> tuple[Motion, ...]:
     return MOTIONS[joint_type]
 
 
-def mechanism_of(case: dict[str, Any], *, reversed: bool = False, name: str = "case") -> Mechanism:
+def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechanism:
     """Ground and one body, joined as a case of joint_kinematics_cases.json says; the body is the child.
 
-    With `reversed` the body is the joint's parent and ground its child.
+    With `turned_round` the body is the joint's parent and ground its child.
     """
     parts = motions(case["joint_type"], case["properties"])
     count = len(case["coordinates"])
@@ -99,7 +99,7 @@ def mechanism_of(case: dict[str, Any], *, reversed: bool = False, name: str = "c
         coordinates=tuple(range(count)),
         parent_frame=offset(**case["parent_offset"]),
         child_frame=offset(**case["child_offset"]),
-        reversed=reversed,
+        reversed=turned_round,
     )
     coordinates = tuple(
         CoordinateInfo(item["name"], f"/jointset/j/{item['name']}", "/jointset/j", types[index])
@@ -107,7 +107,7 @@ def mechanism_of(case: dict[str, Any], *, reversed: bool = False, name: str = "c
     )
     properties = MassProperties(1.3, np.array((0.1, -0.2, 0.05)), np.diag((0.3, 0.4, 0.5)))
     body = MobileBody("C", "/bodyset/C", -1, properties, mobilizer)
-    return Mechanism(name, (body,), coordinates)
+    return Mechanism("case", (body,), coordinates)
 
 
 def _numbers(element: ElementTree.Element, tag: str) -> list[float]:

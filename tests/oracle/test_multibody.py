@@ -1,0 +1,133 @@
+"""Kinematics and accelerations against OpenSim 4.6, live: reversed joints, locks, awkward inertias."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.multibody import Mechanism
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+JOINT_TYPES = ("PinJoint", "SliderJoint", "PlanarJoint", "UniversalJoint", "GimbalJoint", "BallJoint", "FreeJoint")
+
+
+def _vector(rng: np.random.Generator, size: float) -> Any:
+    return opensim.Vec3(*rng.uniform(-size, size, 3))
+
+
+def _body(model: Any, name: str, rng: np.random.Generator, **changed: Any) -> Any:
+    body = opensim.Body()
+    body.setName(name)
+    body.set_mass(changed.get("mass", rng.uniform(0.5, 2.0)))
+    body.set_mass_center(_vector(rng, 0.2))
+    body.set_inertia(opensim.Vec6(*changed.get("inertia", (*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))))
+    model.addBody(body)
+    return body
+
+
+def _join(model: Any, kind: str, name: str, parent: Any, child: Any, rng: np.random.Generator) -> None:
+    spots = [_vector(rng, size) for size in (0.3, 1.0, 0.3, 1.0)]
+    model.addJoint(getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3]))
+
+
+def _model() -> Any:
+    opensim.Logger.setLevelString("error")
+    model = opensim.Model()
+    model.setName("m")
+    model.setGravity(opensim.Vec3(0.3, -9.5, 0.7))
+    return model
+
+
+def _built(model: Any, folder: Path) -> Mechanism:
+    model.finalizeConnections()
+    path = folder / "model.osim"
+    model.printToXML(str(path))
+    return osimlite.mechanism(osimlite.read(path))
+
+
+def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:
+    model.realizeAcceleration(state)
+    coordinates = [model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))]
+    assert [item.getAbsolutePathString() for item in coordinates] == [i.path for i in mechanism.coordinates]
+    q, u, udot = (
+        np.array([getattr(item, f"get{what}Value")(state) for item in coordinates])
+        for what in ("", "Speed", "Acceleration")
+    )
+    found = mechanism.acceleration(q, u)
+    assert np.abs(found - udot).max() < 1e-11 * (1.0 + np.abs(udot).max())
+    transforms, velocities = mechanism.body_transforms(q), mechanism.body_velocities(q, u)
+    for body in mechanism.bodies:
+        theirs = model.getBodySet().get(body.name)
+        velocity = theirs.getVelocityInGround(state)
+        expected = np.concatenate([velocity.get(part).to_numpy() for part in (0, 1)])
+        assert velocities[body.name] == pytest.approx(expected, abs=1e-12)
+        position = theirs.getPositionInGround(state).to_numpy()
+        assert transforms[body.name][:3, 3] == pytest.approx(position, abs=1e-13)
+
+
+@pytest.mark.parametrize("turned_round", [False, True], ids=["forward", "reversed"])
+@pytest.mark.parametrize("kind", JOINT_TYPES)
+def test_a_chain_of_two_bodies(kind: str, turned_round: bool, tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    model = _model()
+    inner, outer = _body(model, "inner", rng), _body(model, "outer", rng)
+    for name, ends in (("j1", (model.getGround(), inner)), ("j2", (inner, outer))):
+        parent, child = reversed(ends) if turned_round else ends
+        _join(model, kind, name, parent, child, rng)
+    mechanism = _built(model, tmp_path)
+    assert [body.mobilizer.reversed for body in mechanism.bodies] == [turned_round] * 2
+    state = model.initSystem()
+    for _ in range(3):
+        for index in range(len(mechanism.coordinates)):
+            coordinate = model.getCoordinateSet().get(index)
+            coordinate.setValue(state, rng.uniform(-1.0, 1.0), False)
+            coordinate.setSpeedValue(state, rng.uniform(-2.0, 2.0))
+        _same_motion(model, state, mechanism)
+
+
+@pytest.mark.parametrize("places", [(), (1,), (0, 2), (2, 3), (0, 1, 2, 3)], ids=str)
+def test_locked_coordinates_of_a_ball_joint(places: tuple[int, ...], tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    model = _model()
+    inner, outer = _body(model, "inner", rng), _body(model, "outer", rng)
+    _join(model, "BallJoint", "j1", model.getGround(), inner, rng)
+    _join(model, "PinJoint", "j2", inner, outer, rng)
+    model.finalizeConnections()
+    coordinates = [model.getCoordinateSet().get(index) for index in range(4)]
+    for index, coordinate in enumerate(coordinates):
+        coordinate.set_locked(index in places)
+        coordinate.set_default_value(0.3 + 0.2 * index)
+        coordinate.set_default_speed_value(1.0 - 0.3 * index)
+    mechanism = _built(model, tmp_path)
+    state = model.initSystem()
+    q, u = mechanism.default_state()
+    assert q == pytest.approx([item.getValue(state) for item in coordinates], abs=1e-15)
+    assert u == pytest.approx([item.getSpeedValue(state) for item in coordinates], abs=1e-12)
+    _same_motion(model, state, mechanism)
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind"),
+    [
+        ({"mass": 0.0}, "WeldJoint"),
+        ({"inertia": (1.0, 1.0, 5.0, 0.0, 0.0, 0.0)}, "PinJoint"),
+    ],
+    ids=["massless-with-inertia", "no-triangle"],
+)
+def test_awkward_mass_properties(changed: dict[str, Any], kind: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(9)
+    model = _model()
+    inner, outer = _body(model, "inner", rng), _body(model, "outer", rng, **changed)
+    _join(model, "BallJoint", "j1", model.getGround(), inner, rng)
+    _join(model, kind, "j2", inner, outer, rng)
+    mechanism = _built(model, tmp_path)
+    state = model.initSystem()
+    for index in range(len(mechanism.coordinates)):
+        model.getCoordinateSet().get(index).setSpeedValue(state, rng.uniform(-2.0, 2.0))
+    _same_motion(model, state, mechanism)
