@@ -44,6 +44,16 @@ class MissingFileError(DocumentError):
     exit_code = 2
 
 
+class NotWellFormedError(DocumentError):
+    """The text is not XML, or declares entities."""
+
+
+class VersionError(DocumentError):
+    """The version of the document is missing, no number (`version` is None then), or one that is not read."""
+
+    version: int | None = None
+
+
 class ModelError(OsimliteError):
     """The model says something that cannot be, or names something that is not there."""
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any, Literal
 from xml.sax.saxutils import escape, quoteattr
 
+from osimlite.document.foreign import relaid
 from osimlite.document.lexical import formatter
 from osimlite.files import write_atomically
-from osimlite.schema.base import Component, FieldSpec, Layout, Object, Remark, Unknown, field_specs
+from osimlite.schema.base import Component, FieldSpec, Include, Layout, Object, Remark, Unknown, field_specs
 from osimlite.schema.fields import Held, Reference
 from osimlite.schema.model import CURRENT_VERSION, Model
 
@@ -26,7 +28,20 @@ def to_text(model: Model, *, numbers: Numbers = "shortest", comments: bool = Tru
     Raises:
         ModelError: a reference leads to a component outside the model.
     """
-    printer = _Printer(model, numbers, comments)
+    return _document(_Printer(model, numbers, comments))
+
+
+def write(model: Model, path: str | Path, *, numbers: Numbers = "shortest") -> None:
+    """Write a model file; it appears whole or not at all.
+
+    What was read from a file of its own and is unchanged stays a reference to that file. Arguments and errors as
+    `to_text`.
+    """
+    write_atomically(path, _document(_Printer(model, numbers, True, Path(path).resolve().parent)))
+
+
+def _document(printer: _Printer) -> str:
+    model = printer.model
     layout = model.layout or Layout()
     lines = printer.lines
     lines.append('<?xml version="1.0" encoding="UTF-8" ?>')
@@ -38,17 +53,18 @@ def to_text(model: Model, *, numbers: Numbers = "shortest", comments: bool = Tru
     return "\n".join(lines) + "\n"
 
 
-def write(model: Model, path: str | Path, *, numbers: Numbers = "shortest") -> None:
-    """Write a model file; it appears whole or not at all. Arguments and errors as `to_text`."""
-    write_atomically(path, to_text(model, numbers=numbers))
-
-
 class _Printer:
-    def __init__(self, model: Model, numbers: str, comments: bool) -> None:
+    """Collects the lines of one document; `folder` is where it will stand, if that is known."""
+
+    def __init__(self, model: Model, numbers: str, comments: bool, folder: Path | None = None) -> None:
+        self.model = model
         self.tree = model.tree()
         self.numbers = numbers
         self.comments = comments
+        self.folder = folder
         self.lines: list[str] = []
+        block = model.layout.defaults if model.layout is not None else []
+        self.defaults = {type(item): item for item in reversed(block)}
 
     def object(self, item: Object, name: str, depth: int) -> None:
         """Print one object as an element with this name attribute."""
@@ -57,18 +73,28 @@ class _Printer:
         if layout is not None:
             self.comment(layout.comments, depth)
         if isinstance(item, Unknown):
-            self._element(item.content, depth)
+            self._unknown(item, depth)
+        elif layout is not None and layout.include is not None and layout.include.held == item:
+            self.lines.append(f"{indent}<{item.tag} file={quoteattr(self._place_of(layout.include))} />")
         else:
             head = f"{indent}<{item.tag}" + (f" name={quoteattr(name)}" if name else "")
             if layout is not None:
                 head += "".join(f" {key}={quoteattr(text)}" for key, text in layout.attributes.items())
             self.lines.append(head + ">")
+            if item is self.model and layout is not None and layout.defaults:
+                self._block(layout.defaults, depth + 1)
             present = item.model_fields_set
+            default = self.defaults.get(type(item))
             for spec in field_specs(type(item)).values():
                 if layout is not None and layout.before and spec.tag in layout.before:
                     self._remarks(layout.before[spec.tag], depth + 1)
                 value = getattr(item, spec.name)
-                if spec.name in present or (isinstance(spec.kind, Held) and has_content(value)):
+                if (
+                    spec.name in present
+                    or (default is not None and value != getattr(default, spec.name))
+                    or (default is None and layout is not None and spec.name in layout.inherited)
+                    or (default is None and isinstance(spec.kind, Held) and has_content(value))
+                ):
                     self._property(item, spec, value, depth + 1)
             if layout is not None and None in layout.before:
                 self._remarks(layout.before[None], depth + 1)
@@ -76,12 +102,36 @@ class _Printer:
         if layout is not None and layout.after:
             self._remarks(layout.after, depth)
 
+    def _block(self, block: list[Object], depth: int) -> None:
+        """Print a ``<defaults>`` block; what is equal to it is not printed on the objects themselves."""
+        defaults, self.defaults = self.defaults, {}
+        self.lines.append("\t" * depth + "<defaults>")
+        for item in block:
+            self.object(item, item.name, depth + 1)
+        self.lines.append("\t" * depth + "</defaults>")
+        self.defaults = defaults
+
+    def _unknown(self, item: Unknown, depth: int) -> None:
+        if item.content:
+            self.lines.extend(relaid(item.content, depth, comments=self.comments, name=item.name))
+        else:
+            name = f" name={quoteattr(item.name)}" if item.name else ""
+            self.lines.append("\t" * depth + f"<{item.class_name}{name} />")
+
+    def _place_of(self, include: Include) -> str:
+        """The file of an included object as it is found from where the document will stand."""
+        if self.folder is None or Path(self.folder, include.file).resolve() == Path(include.path):
+            return include.file
+        return Path(os.path.relpath(include.path, self.folder)).as_posix()
+
     def _property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
         kind = spec.kind
         indent = "\t" * depth
         if not isinstance(kind, Held):
             text = self._text(item, spec, value)
-            self.lines.append(f"{indent}<{spec.tag}>{text}</{spec.tag}>")
+            # OpenSim closes empty lists of its first property system like this, and all else with an end tag.
+            short = not text and spec.legacy and kind.shape == "list"  # type: ignore[attr-defined]
+            self.lines.append(f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>")
         elif kind.form == "single":
             self.object(value, spec.tag, depth)
         elif kind.form == "unnamed":
@@ -116,7 +166,7 @@ class _Printer:
     def _remarks(self, remarks: list[Remark], depth: int) -> None:
         for remark in remarks:
             if remark.element:
-                self._element(remark.text, depth)
+                self.lines.extend(relaid(remark.text, depth, comments=self.comments))
             else:
                 self.comment([remark.text], depth)
 
@@ -125,10 +175,6 @@ class _Printer:
         if self.comments:
             indent = "\t" * depth
             self.lines.extend(f"{indent}<!--{text}-->" for text in texts)
-
-    def _element(self, xml: str, depth: int) -> None:
-        """Print foreign XML as it was; only its last line's indent follows ours."""
-        self.lines.append("\t" * depth + xml)
 
 
 def has_content(value: Any) -> bool:

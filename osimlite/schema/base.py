@@ -57,7 +57,9 @@ class Layout:
     before that property (key None: at the end). `raw` keeps, per field, text that reads only partly, together with
     the value it was read as: while the value is unchanged the text is written back. `attributes` are unknown ones,
     `after` is what followed the last member of a list, `version` the version of a whole document,
-    `prolog` and `epilog` the comments before and behind its root element.
+    `prolog` and `epilog` the comments before and behind its root element. `defaults` is the ``<defaults>`` block of a
+    document; `inherited` names the fields whose value an object took from it. `include` is there if the object was
+    read from a file of its own.
     """
 
     comments: list[str] = field(default_factory=list)
@@ -68,11 +70,22 @@ class Layout:
     version: int | None = None
     prolog: list[str] = field(default_factory=list)
     epilog: list[str] = field(default_factory=list)
+    defaults: list[Object] = field(default_factory=list)
+    inherited: frozenset[str] = frozenset()
+    include: Include | None = None
 
     @property
     def unknown(self) -> list[str]:
         """The unknown child elements, as XML text."""
         return [remark.text for remarks in self.before.values() for remark in remarks if remark.element]
+
+
+class Include(NamedTuple):
+    """Where an object was read from: the file as the text names it, its full path, and a copy of what was read."""
+
+    file: str
+    path: str
+    held: Object
 
 
 class Remark(NamedTuple):

@@ -1,0 +1,74 @@
+"""XML that no class of ours stands for: plug-in classes and misspelt tags, kept as they were written.
+
+lxml takes no ``::`` in a tag, which OpenSim has, so a stand-in takes its place while a text is parsed.
+"""
+
+from __future__ import annotations
+
+import re
+from xml.sax.saxutils import escape, quoteattr
+
+from lxml import etree
+
+from osimlite.errors import ModelError
+
+_COLONS = re.compile(rb"(</?[A-Za-z_][A-Za-z0-9_.-]*)::(?=[A-Za-z_])")
+STAND_IN = "\u00b7"
+"""Takes the place of ``::`` in a tag: two bytes in UTF-8 as well, and legal in a name where ``::`` is not."""
+
+
+def without_colons(data: bytes) -> bytes:
+    """UTF-8 text with the stand-in for ``::`` in tags; every position stays what it was."""
+    return _COLONS.sub(rb"\1" + STAND_IN.encode(), data) if b"::" in data else data
+
+
+def is_element(node: etree._Element) -> bool:
+    """Whether a node is an element, and no comment or processing instruction (whose tag is a function)."""
+    return type(node.tag) is str
+
+
+def xml_of(element: etree._Element) -> str:
+    """The XML of an element in OpenSim's layout, from the left margin."""
+    return "\n".join(lines_of(element, 0))
+
+
+def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = None) -> list[str]:
+    """The lines of an XML text in OpenSim's layout, `depth` tabs in; `name` replaces its name attribute.
+
+    Raises:
+        ModelError: the text is no XML element.
+    """
+    try:
+        element = etree.fromstring(without_colons(xml.encode()))
+    except etree.XMLSyntaxError as error:
+        raise ModelError(f"the content of an unknown component is no XML element: {error.msg}") from None
+    if name and element.get("name") != name:
+        element.set("name", name)
+    return lines_of(element, depth, comments=comments)
+
+
+def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> list[str]:
+    """The lines of an element in OpenSim's layout; where text and elements mix, white space stays as it was."""
+    indent = "\t" * depth
+    if not is_element(element):
+        kept = comments or not isinstance(element, etree._Comment)
+        return [indent + etree.tostring(element, encoding="unicode", with_tail=False)] if kept else []
+    tag = element.tag.replace(STAND_IN, "::")
+    head = f"{indent}<{tag}" + "".join(f" {key}={quoteattr(text)}" for key, text in _attributes(element))
+    texts = [element.text, *(child.tail for child in element)]
+    if not len(element):
+        text = "" if element.text is None or element.text.isspace() else escape(element.text)
+        return [f"{head}>{text}</{tag}>" if element.text is not None else f"{head} />"]
+    if any(text and not text.isspace() for text in texts):
+        inner = escape(element.text or "")
+        for child in element:
+            inner += "\n".join(lines_of(child, 0, comments=comments)) + escape(child.tail or "")
+        return [f"{head}>{inner}</{tag}>"]
+    lines = [head + ">"]
+    for child in element:
+        lines += lines_of(child, depth + 1, comments=comments)
+    return [*lines, f"{indent}</{tag}>"]
+
+
+def _attributes(element: etree._Element) -> list[tuple[str, str]]:
+    return [(str(key), str(text)) for key, text in element.items()]

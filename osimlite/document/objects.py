@@ -1,0 +1,366 @@
+"""Elements to objects: one plan per class says what each tag becomes."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple, TypeVar
+
+from lxml import etree
+
+from osimlite.document.comments import is_generated
+from osimlite.document.foreign import STAND_IN, is_element, xml_of
+from osimlite.document.lexical import ABSENT, Unclean, converter
+from osimlite.document.notes import Note, NoteKind
+from osimlite.schema.base import (
+    FieldSpec,
+    Include,
+    Layout,
+    Object,
+    Remark,
+    Unknown,
+    defaults,
+    field_specs,
+    object_specs,
+)
+from osimlite.schema.fields import Held, ObjectList
+from osimlite.schema.registry import class_for
+
+Read = TypeVar("Read", bound=Object)
+Included = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | None]
+
+DEFAULTS = "defaults"
+
+
+class Step(NamedTuple):
+    """What to do with a child element: the action, the field, the text converter, the property."""
+
+    action: int
+    name: str
+    convert: Callable[[str], Any]
+    spec: FieldSpec
+
+
+_TEXT, _ONE, _WRAPPED, _LIST = range(4)
+
+
+class Plan(NamedTuple):
+    """How the children of one class's element are read: steps by tag, and named one-object properties by name."""
+
+    steps: dict[Any, Step]
+    named: dict[str, FieldSpec]
+
+
+@cache
+def plan_for(cls: type[Object]) -> Plan:
+    """The plan of a class, made once from its declaration."""
+    steps: dict[Any, Step] = {}
+    named: dict[str, FieldSpec] = {}
+    for tag, spec in field_specs(cls).items():
+        tag = tag.replace("::", STAND_IN)
+        if not isinstance(spec.kind, Held):
+            steps[tag] = Step(_TEXT, spec.name, converter(spec.kind), spec)
+        elif spec.kind.form == "unnamed":
+            steps[tag] = Step(_ONE, spec.name, str, spec)
+        else:
+            steps[tag] = Step(_LIST if spec.kind.form == "list" else _WRAPPED, spec.name, str, spec)
+            if spec.kind.form == "single":
+                named[spec.tag] = spec
+    return Plan(steps, named)
+
+
+_Late = tuple[NoteKind, int, str, FieldSpec | None, Any]
+
+
+class _Extra:
+    """What an element says beyond its properties; most say nothing of the kind."""
+
+    __slots__ = ("before", "late", "pending", "raw")
+
+    def __init__(self) -> None:
+        self.pending: list[Remark] = []
+        self.before: dict[str | None, list[Remark]] = {}
+        self.raw: dict[str, tuple[Any, str]] = {}
+        self.late: list[_Late] = []
+
+    def settle(self, tag: str | None) -> None:
+        """Put the remarks that wait before the property `tag`."""
+        if self.pending:
+            self.before.setdefault(tag, []).extend(self.pending)
+            self.pending = []
+
+
+class ObjectReader:
+    """Walks one element tree. `count` is the number of the next element in document order.
+
+    `included` reads the object of another file that a ``file`` attribute names. `defaults` is what the document's
+    own ``<defaults>`` block says, by class; it ends with the document.
+    """
+
+    def __init__(self, included: Included) -> None:
+        self.count = 0
+        self.notes: list[Note] = []
+        self.defaults: dict[type[Object], Object] = {}
+        self.included = included
+
+    def top(self, element: etree._Element, cls: type[Read]) -> Read:
+        """Read the object of a document; only there may a ``<defaults>`` block stand."""
+        block = element.find(DEFAULTS)
+        found: list[Object] = []
+        if block is not None:
+            start = self.count
+            self.count += 2 + sum(size(node) for node in block.itersiblings(preceding=True) if is_element(node))
+            found = self._block(block)
+            self.count = start
+        top = self.object(element, cls, skip=block)
+        if found:
+            layout_of(top).defaults = found
+        return top
+
+    def object(
+        self, element: etree._Element, cls: type[Read], name: str | None = None, skip: etree._Element | None = None
+    ) -> Read:
+        """Read one element as an instance of `cls`; `name` overrides the attribute, `skip` is a child to pass over."""
+        number = self.count
+        self.count = number + 1
+        plan = plan_for(cls)
+        steps = plan.steps
+        values: dict[str, Any] = {}
+        extra: _Extra | None = None
+        late: list[_Late] = []
+        for child in element:
+            step = steps.get(child.tag)
+            if step is None:
+                if child is skip:
+                    self.count += size(child)
+                    continue
+                extra = extra or _Extra()
+                if is_element(child):
+                    self._indirect(child, cls, plan.named, values, extra)
+                else:
+                    remember(child, extra.pending)
+                continue
+            action, field_name, convert, spec = step
+            if field_name in values:
+                extra = extra or _Extra()
+                self._duplicate(child, spec, extra)
+                continue
+            if extra is not None and extra.pending:
+                extra.settle(spec.tag)
+            if action == _TEXT:
+                here = self.count
+                self.count = here + 1
+                text = child.text or ""
+                if len(child):
+                    extra = extra or _Extra()
+                    text = self._text_of(child, here, spec, extra)
+                try:
+                    values[field_name] = convert(text)
+                except Unclean as unclean:
+                    extra = extra or _Extra()
+                    value = self._default(cls, field_name) if unclean.value is ABSENT else unclean.value
+                    values[field_name] = value
+                    extra.raw[field_name] = (value, text)
+                    noted = None if unclean.value is ABSENT else value
+                    extra.late.append((unclean.trouble, here, unclean.word, spec, noted))
+            elif action == _LIST:
+                values[field_name] = self._members(child, spec, late)
+            elif action == _ONE:
+                values[field_name] = self._owned(child, spec.accepts)
+            else:
+                members = self._members(child, spec, late)
+                optional = isinstance(spec.kind, Held) and spec.kind.form == "optional"
+                values[field_name] = members[0] if members else None if optional else spec.factory()
+            if late:
+                extra = extra or _Extra()
+                extra.late.extend(late)
+                late.clear()
+        attributes = element.items()
+        present = set(values)
+        for key, attribute in attributes:
+            if key == "name" and attribute:
+                values["name"] = attribute
+                present.add("name")
+            elif key != "name":
+                extra = extra or _Extra()
+                kind: NoteKind = "include" if key == "file" else "unknown-attribute"
+                extra.late.append((kind, number, str(key), None, str(attribute)))
+        if name:
+            values["name"] = name
+            present.add("name")
+        inherited = self._inherit(cls, values) if self.defaults else None
+        built = cls.build(values, present, number)
+        if inherited:
+            layout_of(built).inherited = inherited
+        return built if extra is None else self._finish(built, extra)
+
+    def _finish(self, built: Read, extra: _Extra) -> Read:
+        """Give an object what its element said beyond its properties."""
+        extra.settle(None)
+        if extra.before:
+            layout_of(built).before = extra.before
+        if extra.raw:
+            layout_of(built).raw = extra.raw
+        for kind, where, word, spec, value in extra.late:
+            if kind in ("include", "unknown-attribute"):
+                layout_of(built).attributes[word] = value
+            self.notes.append(Note(kind, where, word, built, spec, value))
+        return built
+
+    def _duplicate(self, element: etree._Element, spec: FieldSpec, extra: _Extra) -> None:
+        """Keep a repeated property at the end, where OpenSim passes over it again."""
+        extra.late.append(("duplicate-tag", self.count, spec.tag, spec, None))
+        extra.before.setdefault(None, []).append(Remark(xml_of(element), True))
+        self.count += size(element)
+
+    def _owned(self, element: etree._Element, cls: Any, name: str | None = None) -> Object:
+        """Read the object of a property, from another file if a ``file`` attribute says so."""
+        file = element.get("file")
+        found = self.included(str(file), cls) if file else None
+        if found is None:
+            plain: Object = self.object(element, cls, name)
+            return plain
+        number = self.count
+        self.count += size(element)
+        item, include, notes = found
+        for part in item.walk():
+            object.__setattr__(part, "_index", number)
+        if name:
+            object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
+        layout_of(item).include = include
+        self.notes.extend(note._replace(number=number) for note in notes)
+        return item
+
+    def _members(self, wrapper: etree._Element, spec: FieldSpec, late: list[_Late]) -> ObjectList[Any]:
+        """Read the objects inside ``<objects>`` or another wrapper."""
+        self.count += 1
+        members: ObjectList[Any] = ObjectList()
+        pending: list[Remark] = []
+        accepts = spec.accepts
+        assert accepts is not None
+        for child in wrapper:
+            cls = _accepted(child.tag, accepts)
+            if cls is not None:
+                # OpenSim reads no other file for the members of a set.
+                member: Object = self.object(child, cls) if spec.legacy else self._owned(child, cls)
+            elif is_element(child):
+                known = class_for(child.tag.replace(STAND_IN, "::"))
+                late.append(("unknown-class" if known is None else "wrong-class", self.count, child.tag, spec, known))
+                member = self._unknown(child)
+            else:
+                remember(child, pending)
+                continue
+            if pending:
+                layout_of(member).comments.extend(remark.text for remark in pending)
+                pending = []
+            members.append(member)
+        if pending and members:
+            layout_of(members[-1]).after.extend(pending)
+        return members
+
+    def _indirect(
+        self,
+        child: etree._Element,
+        cls: type[Object],
+        named: dict[str, FieldSpec],
+        values: dict[str, Any],
+        extra: _Extra,
+    ) -> None:
+        """Read a child whose tag is no property: an object by its property's name, or something unknown."""
+        tag = child.tag.replace(STAND_IN, "::")
+        name = child.get("name")
+        held = class_for(tag)
+        spec = named.get(name) if name is not None else None
+        if spec is None and name is None and held is not None:
+            # OpenSim takes an acceptable object without a name for a property that has none yet.
+            free = (s for s in named.values() if s.name not in values and _accepted(child.tag, s.accepts))
+            spec = next(free, None)
+        if spec is not None and spec.name not in values:
+            accepted = _accepted(child.tag, spec.accepts)
+            if accepted is not None:
+                extra.settle(spec.tag)
+                values[spec.name] = self._owned(child, accepted, spec.tag)
+                return
+            extra.late.append(("unknown-class" if held is None else "wrong-class", self.count, tag, spec, held))
+        elif spec is not None:
+            self._duplicate(child, spec, extra)
+            return
+        else:
+            extra.late.append(("unknown-tag", self.count, tag, None, held))
+        extra.pending.append(Remark(xml_of(child), True))
+        self.count += size(child)
+
+    def _unknown(self, element: etree._Element) -> Unknown:
+        content = xml_of(element)
+        number = self.count
+        self.count += size(element)
+        name = element.get("name") or ""
+        values = {"name": name, "class_name": element.tag.replace(STAND_IN, "::"), "content": content}
+        return Unknown.build(values, {"name"} if name else set(), number)
+
+    def _text_of(self, element: etree._Element, number: int, spec: FieldSpec, extra: _Extra) -> str:
+        """The text of a value element that has comments or, wrongly, elements inside."""
+        inner = [node for node in element if is_element(node)]
+        if inner:
+            extra.late.append(("child-in-value", number, inner[0].tag, spec, None))
+            self.count += sum(size(node) for node in inner)
+        return "".join([element.text or "", *(node.tail or "" for node in element)])
+
+    def _block(self, block: etree._Element) -> list[Object]:
+        """Read a ``<defaults>`` block; each object counts for those of its class that are read after it."""
+        found: list[Object] = []
+        for child in block:
+            if not is_element(child):
+                continue
+            cls = class_for(child.tag.replace(STAND_IN, "::"))
+            if cls is None:
+                found.append(self._unknown(child))
+                continue
+            item = self.object(child, cls)
+            self.defaults.setdefault(cls, item)
+            found.append(item)
+        return found
+
+    def _default(self, cls: type[Object], name: str) -> Any:
+        """The value of a text property that the file does not give."""
+        block = self.defaults.get(cls)
+        return defaults(cls)[0][name] if block is None else getattr(block, name)
+
+    def _inherit(self, cls: type[Object], values: dict[str, Any]) -> frozenset[str]:
+        """Take what the file does not give from the document's defaults; the names of the fields taken."""
+        block = self.defaults.get(cls)
+        if block is None:
+            return frozenset()
+        wanted = block.model_fields_set | {spec.name for spec in object_specs(cls)}
+        taken = frozenset(wanted - values.keys() - {"name"})
+        for name in taken:
+            values[name] = copy.deepcopy(getattr(block, name))
+        return taken
+
+
+@cache
+def _accepted(tag: Any, accepts: type[Object] | None) -> type[Object] | None:
+    """The class of a tag if it is one that a property for `accepts` may hold; a comment's tag is a function."""
+    cls = class_for(tag.replace(STAND_IN, "::")) if isinstance(tag, str) else None
+    return cls if cls is not None and accepts is not None and issubclass(cls, accepts) else None
+
+
+def remember(node: etree._Element, remarks: list[Remark]) -> None:
+    """Add a comment to `remarks` unless OpenSim wrote it."""
+    text = node.text or ""
+    if isinstance(node, etree._Comment) and not is_generated(text):
+        remarks.append(Remark(text, False))
+
+
+def layout_of(item: Object) -> Layout:
+    """The layout of an object, made if it has none."""
+    if item.layout is None:
+        object.__setattr__(item, "_layout", Layout())
+    assert item.layout is not None
+    return item.layout
+
+
+def size(element: etree._Element) -> int:
+    """Number of elements in a subtree, its root included."""
+    return sum(1 for _ in element.iter(etree.Element))
