@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable
 from functools import cache
+from math import isfinite
 from typing import Any, Literal
 
 from osimlite.schema.fields import Kind, Reference, Value
@@ -18,6 +19,8 @@ Trouble = Literal["unreadable", "cut", "too-many", "too-few", "empty", "ignored"
 
 ABSENT: Any = object()
 """Stands for "OpenSim keeps the default"."""
+
+_PLAIN_FLAGS = {"true": True, "false": False}
 
 _PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "infinity": math.inf, "+inf": math.inf, "+infinity": math.inf}
@@ -110,6 +113,16 @@ def converter(kind: Kind) -> Callable[[str], Any]:
 
 def _one(read: Callable[[str], Any]) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
+        # Almost every text is one clean number or switch; what follows this is for the rest.
+        if read is real:
+            try:
+                value = float(raw)
+                if isfinite(value) and "_" not in raw:
+                    return value
+            except ValueError:
+                pass
+        elif raw in _PLAIN_FLAGS and read is not whole:
+            return _PLAIN_FLAGS[raw]
         words = raw.split()
         if not words:
             raise Unclean("empty", "")
@@ -124,8 +137,8 @@ def _exactly(size: int) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         words = raw.split()
         try:
-            values = tuple([float(word) for word in words])
-            if len(values) == size and all(-math.inf < value < math.inf for value in values) and "_" not in raw:
+            values = tuple(map(float, words))
+            if len(values) == size and isfinite(sum(values)) and "_" not in raw:
                 return values
         except ValueError:
             pass
@@ -151,6 +164,13 @@ def _exactly(size: int) -> Callable[[str], Any]:
 def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         words = raw.split()
+        if read is real and least <= len(words) and (most is None or len(words) <= most):
+            try:
+                numbers = tuple(map(float, words))
+                if isfinite(sum(numbers)) and "_" not in raw:
+                    return numbers
+            except ValueError:
+                pass
         if read is str:
             values: list[Any] = list(words)
         else:
