@@ -235,7 +235,7 @@ def dissipated_power(
     fy: float,
     fz: float,
 ) -> float:
-    """Power that the contact takes out of the motion and does not store, in W; never negative.
+    """Power that the contact takes out of the motion and does not store, in W; never negative (but for rounding).
 
     F . v is what the bodies give, and the elastic force of Hertz times vn is what the elastic part stores of
     it.

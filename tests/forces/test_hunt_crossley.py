@@ -312,7 +312,8 @@ def test_power_is_lost_and_never_made(contact, vt):
     assume(2.0 * contact[4] >= contact[5])  # else friction drives, see above
     power = dissipated_power(d, R, k, *n, *v, *force)
     scale = abs(dot(force, v)) + k * d * sqrt(R * k * d) * math.hypot(*v)
-    assert power >= -1e-12 * scale
+    # A slip that is but the rounding of v counts as v / vt roundings in the friction.
+    assert power >= -1e-10 * scale
 
 
 @given(contacts(), slip_scale)

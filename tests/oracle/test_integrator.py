@@ -108,16 +108,17 @@ def test_a_locked_coordinate_left_out_but_counted(walker):
     assert [t for t, _ in uncounted.steps(2.0)] != times[1:]
 
 
-def test_a_manager_that_is_asked_every_millisecond(walker):
+@pytest.mark.parametrize("interval", [1, 13, 37])
+def test_a_manager_that_is_stopped_often(walker, interval):
     """The Manager does not interpolate: its steps end where it is told to stop, and so do ours."""
     state = walker.initSystem()
     f, y0 = dynamics(walker, opensim.State(state))
     manager = opensim.Manager(walker)
     manager.initialize(state)
     integrator = RungeKuttaMerson(f, 0.0, y0, 8)
-    for i in range(1, 201):
-        expected = manager.integrate(i / 1000).getY()
-        for _ in integrator.steps(i / 1000):
+    for stop in range(interval, 150 * interval, interval):
+        expected = manager.integrate(stop / 1000).getY()
+        for _ in integrator.steps(stop / 1000):
             pass
         assert integrator.state == [expected.get(j) for j in range(16)]
 

@@ -187,6 +187,15 @@ def test_next_step(h, error, accuracy, cut):
         assert error * (new / h) ** 4 == pytest.approx(0.9**4 * accuracy, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "chosen"),
+    [(20.0, 5.0), (4.0, 4.0), (1.21, 1.21), (1.19, 1.0), (0.91, 1.0), (0.895, 0.895), (0.5, 0.5), (0.05, 0.1)],
+)
+def test_next_step_where_a_given_one_is_wanted(wanted, chosen):
+    """Factors of the present step; just below 0.9 the error exceeds the accuracy."""
+    assert next_step_size(1.0, 1e-3 * (0.9 / wanted) ** 4, 1e-3) == pytest.approx(chosen)
+
+
 @pytest.mark.parametrize("error", [math.nan, math.inf])
 def test_next_step_after_a_failed_evaluation(error):
     assert next_step_size(1.0, error, 1e-3) == 0.1
@@ -208,6 +217,24 @@ def test_largest_step():
 
 
 # --------------------------------------------------------------------------------- where steps and reports end
+
+
+@pytest.mark.parametrize(
+    ("limit", "ends"),
+    [
+        (0.005, [0.005, 0.015]),  # cut short: no reason to grow
+        (0.0094, [0.0094, 0.0194]),
+        (0.0096, [0.0096, 0.0596]),  # all but a whole step: five times as much next
+        (0.010005, [0.010005, 0.060005]),  # little more than a whole step: stretched to the limit
+        (0.0102, [0.01, 0.0102, 0.0602]),  # a remainder needs a step of its own
+    ],
+)
+def test_steps_near_a_limit(limit, ends):
+    """No error at all, so that the first step is the initial one of 0.01 s and any growth is fivefold."""
+    integrator = RungeKuttaMerson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
+    times = [t for t, _ in integrator.steps(limit)]
+    integrator.step()
+    assert [*times, integrator.time] == pytest.approx(ends, rel=1e-12)
 
 
 def steppers():
