@@ -135,6 +135,15 @@ class Robot:
         values = self.mechanism.values(q)
         return {joint.name: joint.value(values) for joint in self.moving}
 
+    def joint_jacobian(self, q: Values) -> Array:
+        """Rates of the m moving joints per rates of the n coordinates (m, n), in the order of `moving`."""
+        values = self.mechanism.values(q)
+        jacobian = np.zeros((len(self.moving), len(values)))
+        for row, joint in enumerate(self.moving):
+            places = list(joint.coordinates)
+            jacobian[row, places] = joint.function.evaluate(values[places])[1]
+        return jacobian
+
     def link_transforms(self, q: Values) -> dict[str, Array]:
         """Transform (4, 4) of every link in the root link."""
         values = self.mechanism.values(q)
