@@ -286,9 +286,7 @@ def contact_forces(
     return forces, energy
 
 
-def simbody_pair_order(
-    centres: Sequence[tuple[float, float, float]], radii: Sequence[float]
-) -> list[tuple[int, int]]:
+def simbody_pair_order(centres: Sequence[tuple[float, float, float]], radii: Sequence[float]) -> list[tuple[int, int]]:
     """Pairs of surfaces of one HuntCrossleyForce that may touch, in the order in which Simbody works on them.
 
     Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of distances
