@@ -94,11 +94,11 @@ class _Extra:
 class ObjectReader:
     """Walks one element tree. `count` is the number of the next element in document order.
 
-    `included` reads the object of another file that a ``file`` attribute names. `defaults` is what the document's
+    `included` reads the object of another file that a ``file`` attribute names, if the text has any. `defaults` is what the document's
     own ``<defaults>`` block says, by class; it ends with the document.
     """
 
-    def __init__(self, included: Included) -> None:
+    def __init__(self, included: Included | None = None) -> None:
         self.count = 0
         self.notes: list[Note] = []
         self.defaults: dict[type[Object], Object] = {}
@@ -123,7 +123,7 @@ class ObjectReader:
     ) -> Read:
         """Read one element as an instance of `cls`; `name` overrides the attribute, `skip` is a child to pass over."""
         number = self.count
-        self.count = number + 1
+        count = number + 1
         plan = plan_for(cls)
         steps = plan.steps
         values: dict[str, Any] = {}
@@ -133,28 +133,34 @@ class ObjectReader:
             step = steps.get(child.tag)
             if step is None:
                 if child is skip:
-                    self.count += size(child)
+                    count += size(child)
                     continue
                 extra = extra or _Extra()
                 if is_element(child):
+                    self.count = count
                     self._indirect(child, cls, plan.named, values, extra)
+                    count = self.count
                 else:
                     remember(child, extra.pending)
                 continue
             action, field_name, convert, spec = step
             if field_name in values:
                 extra = extra or _Extra()
+                self.count = count
                 self._duplicate(child, spec, extra)
+                count = self.count
                 continue
             if extra is not None and extra.pending:
                 extra.settle(spec.tag)
             if action == _TEXT:
-                here = self.count
-                self.count = here + 1
+                here = count
+                count = here + 1
                 text = child.text or ""
                 if len(child):
                     extra = extra or _Extra()
+                    self.count = count
                     text = self._text_of(child, here, spec, extra)
+                    count = self.count
                 try:
                     values[field_name] = convert(text)
                 except Unclean as unclean:
@@ -164,7 +170,9 @@ class ObjectReader:
                     extra.raw[field_name] = (value, text)
                     noted = None if unclean.value is ABSENT else value
                     extra.late.append((unclean.trouble, here, unclean.word, spec, noted))
-            elif action == _LIST:
+                continue
+            self.count = count
+            if action == _LIST:
                 values[field_name] = self._members(child, spec, late)
             elif action == _ONE:
                 values[field_name] = self._owned(child, spec.accepts)
@@ -172,10 +180,12 @@ class ObjectReader:
                 members = self._members(child, spec, late)
                 optional = isinstance(spec.kind, Held) and spec.kind.form == "optional"
                 values[field_name] = members[0] if members else None if optional else spec.factory()
+            count = self.count
             if late:
                 extra = extra or _Extra()
                 extra.late.extend(late)
                 late.clear()
+        self.count = count
         attributes = element.items()
         present = set(values)
         for key, attribute in attributes:
@@ -216,8 +226,8 @@ class ObjectReader:
 
     def _owned(self, element: etree._Element, cls: Any, name: str | None = None) -> Object:
         """Read the object of a property, from another file if a ``file`` attribute says so."""
-        file = element.get("file")
-        found = self.included(str(file), cls) if file else None
+        file = element.get("file") if self.included is not None else None
+        found = self.included(str(file), cls) if file and self.included is not None else None
         if found is None:
             plain: Object = self.object(element, cls, name)
             return plain
@@ -269,7 +279,7 @@ class ObjectReader:
     ) -> None:
         """Read a child whose tag is no property: an object by its property's name, or something unknown."""
         tag = child.tag.replace(STAND_IN, "::")
-        name = child.get("name")
+        name = child.get("name") or None
         held = class_for(tag)
         spec = named.get(name) if name is not None else None
         if spec is None and name is None and held is not None:
