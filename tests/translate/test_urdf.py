@@ -185,7 +185,7 @@ def test_no_line_is_too_long_for_bullet():
     mechanism = walker()
     bodies = tuple(dataclasses.replace(body, name=body.name * 1500) for body in mechanism.bodies)
     robot = legal_names(build_robot(Mechanism("long", bodies, mechanism.coordinates)))
-    file = "meshes/" + "x" * 4000 + ".obj"
+    file = "meshes/" + "x" * 7930 + ".obj"
     visual = Visual(MeshFile(file, (1.2345678901234567,) * 3), np.eye(4))
     links = (dataclasses.replace(robot.links[0], visuals=(visual,)), *robot.links[1:])
     text = urdf_text(dataclasses.replace(robot, links=links))

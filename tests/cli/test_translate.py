@@ -1,0 +1,73 @@
+"""``translate`` from the command line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.models.dynamic_walker import dynamic_walker
+
+
+def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "osimlite", "translate", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        check=False,
+        env={"PATH": "", "PYTHONPATH": str(Path(osimlite.__file__).parents[1])},
+    )
+    assert "Traceback" not in done.stderr
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture
+def walker(tmp_path: Path) -> Path:
+    osimlite.write(dynamic_walker(), tmp_path / "walker.osim")
+    return tmp_path
+
+
+def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
+    code, out, _ = run("walker.osim", "--to", "urdf", "-o", "robot", folder=walker)
+    assert code == 0
+    assert (walker / "robot/DynamicWalkerModel.urdf").read_text().startswith("<?xml")
+    assert (walker / "robot/meshes/ellipsoid.obj").exists()
+    records = json.loads((walker / "robot/fidelity.json").read_text())["records"]
+    assert {"force", "gravity", "locked"} <= {record["kind"] for record in records}
+    assert "a contact surface" in out and "13 links, 12 joints of which 7 move" in out
+    table = [line for line in out.splitlines() if line.startswith(("│", "┃", "├"))]
+    assert len(table) > 10 and max(map(len, table)) <= 80
+
+
+def test_translate_takes_options(walker: Path) -> None:
+    code, out, _ = run("walker.osim", "--limits", "range", "--merge", folder=walker)
+    assert code == 0 and "8 links, 7 joints of which 7 move" in out
+    assert '<joint name="RKnee_rz" type="revolute">' in (walker / "DynamicWalkerModel.urdf").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("walker.osim", "--to", "mjcf"), "--to is 'urdf', not 'mjcf'"),
+        (("walker.osim", "--limits", "all"), "--limits is 'none' or 'range'"),
+        (("gone.osim",), "gone.osim"),
+        (("walker.osim", "-o", "walker.osim"), "cannot make this folder"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(walker: Path, arguments: tuple[str, ...], said: str) -> None:
+    code, out, error = run(*arguments, folder=walker)
+    assert code == 2 and out == ""
+    assert said in error and len(error.splitlines()) == 1
+
+
+def test_a_model_that_is_no_mechanism_is_refused(walker: Path) -> None:
+    text = (walker / "walker.osim").read_text()
+    (walker / "loose.osim").write_text(text.replace("/bodyset/RightShank</socket_parent>", "/ground</socket_parent>"))
+    code, _, error = run("loose.osim", "-o", "robot", folder=walker)
+    assert code == 1 and "closes a loop" in error
+    assert not (walker / "robot").exists()
