@@ -6,10 +6,10 @@ lxml takes no ``::`` in a tag, which OpenSim has, so a stand-in takes its place 
 from __future__ import annotations
 
 import re
-from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
+from osimlite.document.escape import escape, quoted
 from osimlite.errors import ModelError
 
 _TAG_SO_FAR = re.compile(rb"</?[A-Za-z_][A-Za-z0-9_.-]*")
@@ -61,7 +61,7 @@ def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> l
         kept = comments or not isinstance(element, etree._Comment)
         return [indent + etree.tostring(element, encoding="unicode", with_tail=False)] if kept else []
     tag = element.tag.replace(STAND_IN, "::")
-    head = f"{indent}<{tag}" + "".join(f" {key}={quoteattr(text)}" for key, text in _attributes(element))
+    head = f"{indent}<{tag}" + "".join(f" {key}={quoted(text)}" for key, text in _attributes(element))
     texts = [element.text, *(child.tail for child in element)]
     if not len(element):
         text = "" if element.text is None or element.text.isspace() else escape(element.text)

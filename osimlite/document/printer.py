@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 from typing import Any, Literal
-from xml.sax.saxutils import escape, quoteattr
 
+from osimlite.document.escape import escape, quoted
 from osimlite.document.foreign import relaid
 from osimlite.document.lexical import formatter
 from osimlite.files import write_atomically
@@ -75,11 +75,11 @@ class _Printer:
         if isinstance(item, Unknown):
             self._unknown(item, depth)
         elif layout is not None and layout.include is not None and layout.include.held == item:
-            self.lines.append(f"{indent}<{item.tag} file={quoteattr(self._place_of(layout.include))} />")
+            self.lines.append(f"{indent}<{item.tag} file={quoted(self._place_of(layout.include))} />")
         else:
-            head = f"{indent}<{item.tag}" + (f" name={quoteattr(name)}" if name else "")
+            head = f"{indent}<{item.tag}" + (f" name={quoted(name)}" if name else "")
             if layout is not None:
-                head += "".join(f" {key}={quoteattr(text)}" for key, text in layout.attributes.items())
+                head += "".join(f" {key}={quoted(text)}" for key, text in layout.attributes.items())
             self.lines.append(head + ">")
             if item is self.model and layout is not None and layout.defaults:
                 self._block(layout.defaults, depth + 1)
@@ -115,7 +115,7 @@ class _Printer:
         if item.content:
             self.lines.extend(relaid(item.content, depth, comments=self.comments, name=item.name))
         else:
-            name = f" name={quoteattr(item.name)}" if item.name else ""
+            name = f" name={quoted(item.name)}" if item.name else ""
             self.lines.append("\t" * depth + f"<{item.class_name}{name} />")
 
     def _place_of(self, include: Include) -> str:
