@@ -24,6 +24,9 @@ NoteKind = Literal[
     "second-object",
     "encoding",
     "include",
+    "bare-ampersand",
+    "duplicate-attribute",
+    "hyphens-in-comment",
 ]
 
 

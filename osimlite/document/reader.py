@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lxml import etree
 
@@ -20,17 +21,30 @@ from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.schema.base import Include, Object, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
 
-OLDEST_READ = 40000
+if TYPE_CHECKING:
+    from osimlite.document.upgrade import Change, Upgraded
+
+OLDEST = 10500
+"""The version of documents from before documents said their version."""
+
+OLDEST_KNOWN = 10901
+"""The oldest version whose every word is known; of an older document nothing may be left over."""
 
 
 @dataclass(slots=True)
 class Document:
-    """A model together with the text it came from and what the reader noticed in it."""
+    """A model together with the text it came from and what the reader noticed in it.
+
+    `changes` is what was done to a document of an older version; `fault` is what the XML parser says against a text
+    that could be read all the same.
+    """
 
     model: Model
     source: Source
     version: int
     notes: list[Note] = field(default_factory=list)
+    changes: list[Change] = field(default_factory=list)
+    fault: NotWellFormedError | None = None
 
 
 def read(path: str | Path) -> Model:
@@ -53,7 +67,16 @@ def read_document(source: Source) -> Document:
     Raises:
         DocumentError: the text is not an OpenSim model document; with line and column.
     """
-    root = parse(source)
+    try:
+        root = parse(source)
+    except NotWellFormedError as fault:
+        from osimlite.document.repair import read_repaired
+
+        root, notes = read_repaired(source, fault, parse)
+        document = document_of(source, root, version_of(source, root))
+        document.notes[:0] = notes
+        document.fault = fault
+        return document
     return document_of(source, root, version_of(source, root))
 
 
@@ -61,14 +84,59 @@ def document_of(source: Source, root: etree._Element, version: int) -> Document:
     """The document that an element tree stands for.
 
     Raises:
-        DocumentError: there is no model in it.
+        DocumentError: there is no model in it, or something that no rule carries over from an older version.
     """
     with _collector_paused():
-        reader = ObjectReader(_included_by(source))
-        model = _model_in(source, root, reader)
+        upgraded = _upgraded(source, root, version) if version < CURRENT_VERSION else None
+        reader = ObjectReader(_included_by(source) if b"file=" in source.data else None)
+        model = _model_in(source, root if upgraded is None else upgraded.root, reader)
         if version != CURRENT_VERSION:
             layout_of(model).version = version
+        if upgraded is not None:
+            notes = _renumber(source, model, reader.notes, upgraded)
+            _refuse_leftovers(source, version, notes)
+            return Document(model, source, version, notes, upgraded.changes)
     return Document(model, source, version, reader.notes)
+
+
+def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
+    """The tree in the current format; VersionError if something cannot be carried over."""
+    from osimlite.document.upgrade import Refused, upgrade
+
+    try:
+        return upgrade(root, version)
+    except Refused as refused:
+        line, column, _ = source.of_tag(refused.number)
+        fault = VersionError(refused.message, file=source.file, line=line, column=column)
+        fault.version = version
+        raise fault from None
+
+
+def _renumber(source: Source, model: Model, notes: list[Note], upgraded: Upgraded) -> list[Note]:
+    """Give everything read from an upgraded tree the place it has in the old text."""
+    numbers = upgraded.numbers
+    source.moved = upgraded.moved
+    for top in (model, *layout_of(model).defaults):
+        for item in top.walk():
+            if item._index is not None:
+                object.__setattr__(item, "_index", numbers[item._index])
+    return [note._replace(number=numbers[note.number]) for note in notes]
+
+
+def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
+    """Refuse a document from before every word is known, if there is a word in it that no rule knows."""
+    left = [note for note in notes if note.kind in ("unknown-tag", "unknown-class", "wrong-class")]
+    if version >= OLDEST_KNOWN or not left:
+        return
+    tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in left})[:8])
+    line, column, _ = source.of_tag(left[0].number)
+    fault = VersionError(
+        f"document version {version} is older than {OLDEST_KNOWN}, and no rule says what becomes of {tags}: that would "
+        "be lost; take it out, or open and save the model with OpenSim 2",
+        file=source.file, line=line, column=column,
+    )  # fmt: skip
+    fault.version = version
+    raise fault
 
 
 def parse(source: Source, *, recover: bool = False) -> etree._Element:
@@ -80,7 +148,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
-    doctype = data.find(b"<!DOCTYPE")
+    doctype = data.find(b"<!DOCTYPE", 0, data.find(b"<OpenSimDocument"))
     if doctype >= 0 and re.match(rb"<!DOCTYPE[^>]*\[", data[doctype : doctype + 4096]):
         line, column, _ = source.position(source.text.index("<!DOCTYPE"))
         raise NotWellFormedError(
@@ -92,8 +160,13 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
     body = data.lstrip()
     blank = data[: len(data) - len(body)].count(b"\n")
     parser = etree.XMLParser(
-        encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False, recover=recover,
+        encoding="utf-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        recover=recover,
         remove_comments=all_generated(data),
+        remove_blank_text=True,
     )
     try:
         root = etree.fromstring(body, parser)
@@ -125,8 +198,10 @@ def version_of(source: Source, root: etree._Element) -> int:
         VersionError: the version is missing, no whole number, or too old to be read.
     """
     text = root.get("Version")
-    if root.tag == "OpenSimDocument" and text is not None and text.strip().isdecimal() and int(text) >= OLDEST_READ:
+    if root.tag == "OpenSimDocument" and text is not None and text.strip().isdecimal() and int(text) >= OLDEST:
         return int(text)
+    if root.tag == "Model" and text is None:
+        return OLDEST
     # Places cost a pass over the text, so they are computed for errors only.
     line, column, _ = source.of_tag(0)
     if root.tag != "OpenSimDocument":
@@ -140,8 +215,8 @@ def version_of(source: Source, root: etree._Element) -> int:
             f'<OpenSimDocument> {found}; write Version="{CURRENT_VERSION}"', file=source.file, line=line, column=column
         )
     fault = VersionError(
-        f"document version {int(text)} is older than {OLDEST_READ}, which is not read yet; "
-        "open and save the model with OpenSim 4 first",
+        f"document version {int(text)} is none that OpenSim ever wrote (they begin at {OLDEST}); "
+        f'write Version="{CURRENT_VERSION}" if the model is in the current format',
         file=source.file, line=line, column=column,
     )  # fmt: skip
     fault.version = int(text)
@@ -199,7 +274,9 @@ def _included_by(source: Source, around: tuple[str, ...] = ()) -> Included:
         try:
             inner = Source.of_file(path)
             root = parse(inner)
-            version_of(inner, root)
+            version = version_of(inner, root)
+            if version < CURRENT_VERSION:
+                root = _upgraded(inner, root, version).root
         except DocumentError:
             return None
         top = next((child for child in root if is_element(child)), None)

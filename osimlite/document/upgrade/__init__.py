@@ -13,6 +13,7 @@ from lxml import etree
 
 from osimlite.document.upgrade import (
     v10601_engine,  # noqa: F401
+    v10901_scale_factors,  # noqa: F401
     v10901_transform_axes,  # noqa: F401
     v10905_point_actuators,  # noqa: F401
     v20002_conditional_points,  # noqa: F401
@@ -34,6 +35,7 @@ from osimlite.document.upgrade import (
     v30515_wrap_objects,  # noqa: F401
     v30516_paths,  # noqa: F401
     v30517_sockets,  # noqa: F401
+    v40000_axis_functions,  # noqa: F401
     v40000_meaningless,  # noqa: F401
     v40500_path_names,  # noqa: F401
     v40600_class_names,  # noqa: F401
@@ -66,6 +68,8 @@ def upgrade(root: Element, version: int) -> Upgraded:
         Refused: the document says something that no step can carry over.
     """
     draft = Draft(root, version)
+    if root.tag == "Model":
+        draft.wrap("OpenSimDocument")
     for step in sorted(STEPS, key=lambda step: step.order):
         if version < step.below:
             draft.step = step

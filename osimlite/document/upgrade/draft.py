@@ -114,6 +114,13 @@ class Draft:
         self.step: Step | None = None
         self._tags = {element.tag for element in self.numbers}
 
+    def wrap(self, tag: str) -> None:
+        """Put a new root around the tree."""
+        made = etree.Element(tag)
+        self.numbers[made] = self.numbers[self.root]
+        made.append(self.root)
+        self.root = made
+
     @property
     def model(self) -> Element | None:
         """The model, if the document holds one."""
@@ -241,3 +248,17 @@ def is_true(text: str) -> bool:
 def body_path(name: str) -> str:
     """The path of a body in a document of version 4, from its name."""
     return "/ground" if name == "ground" else f"/bodyset/{name}"
+
+
+def path_of(component: Element) -> str:
+    """The path of a component, by the rules of version 4; unnamed ones go by their class."""
+    words: list[str] = []
+    here: Element | None = component
+    while here is not None and here.tag != "Model":
+        kinds = families(here.tag)
+        if "ModelComponentSet" in kinds:
+            words.append(here.tag.lower())
+        elif "Component" in kinds or here is component:
+            words.append(here.get("name") or here.tag.lower())
+        here = here.getparent()
+    return "/" + "/".join(reversed(words))

@@ -13,7 +13,8 @@ def geometry_files(draft: Draft) -> None:
         if visible is None:
             continue
         attached = draft.add(body, "attached_geometry", source=visible)
-        source = visible.find("geometry_files")
+        files = visible.find("geometry_files")
+        source = visible if files is None else files
         scale = text_of(visible, "scale_factors") or "1 1 1"
         for count, file in enumerate((text_of(visible, "geometry_files") or "").split()):
             mesh = draft.add(attached, "Mesh", source=source, name=f"{body.get('name', '')}_geom_{count}")

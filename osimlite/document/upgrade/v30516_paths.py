@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, plain, step, text_of
 
-MUSCLE_COLOR = ".8 .1 .1"
+_COLORS = {"Muscle": ".8 .1 .1", "Ligament": "0 1 0"}
+"""The colour of a path that says none, by what the path is of."""
 
 
 @step(below=30516)
 def path_appearance(draft: Draft) -> None:
-    """Colour and display preference of a path become its <Appearance>; muscles are red."""
-    of_muscles = {path for muscle in draft.every("Muscle") if (path := muscle.find("GeometryPath")) is not None}
+    """Colour and display preference of a path become its <Appearance>; muscles are red, ligaments green."""
+    usual = {
+        path: color
+        for family, color in _COLORS.items()
+        for owner in draft.every(family)
+        if (path := owner.find("GeometryPath")) is not None
+    }
     for path in draft.tagged("GeometryPath"):
         color = path.find("default_color")
         visible = path.find("VisibleObject")
@@ -22,8 +28,8 @@ def path_appearance(draft: Draft) -> None:
         if appearance.find("color") is None:
             if color is not None:
                 draft.add(appearance, "color", plain(color), source=color)
-            elif path in of_muscles:
-                draft.add(appearance, "color", MUSCLE_COLOR, source=path)
+            elif path in usual:
+                draft.add(appearance, "color", usual[path], source=path)
         for part in (color, visible):
             if part is not None:
                 draft.remove(part)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from osimlite.document.upgrade.draft import Draft, elements, plain, step
+from osimlite.document.upgrade.draft import Draft, Element, elements, members, path_of, plain, step
 
 _SUFFIX = re.compile(r"((?:socket|input)_.*)_connectee_names?")
 
@@ -46,3 +46,44 @@ def connectee_names(draft: Draft) -> None:
             if match is not None:
                 draft.rename(child, match[1])
                 draft.changed(component, number=draft.numbers[child])
+
+
+@step(below=30517)
+def set_levels(draft: Draft) -> None:
+    """Paths to bodies that leave out the sets on the way get them.
+
+    So they were written while version 4 was made; OpenSim 4.6 finds nothing there.
+    """
+    model = draft.model
+    bodies = None if model is None else model.find("BodySet")
+    paths = {"ground": "/ground"}
+    if bodies is not None:
+        paths.update((name, f"/bodyset/{name}") for body in members(bodies) if (name := body.get("name")))
+    for component in draft.every("Component"):
+        for child in elements(component):
+            if not child.tag.startswith("socket_"):
+                continue
+            text = plain(child)
+            last = text.rpartition("/")[2]
+            if last in paths and not text.startswith("/") and not _leads_somewhere(component, text, paths):
+                child.text = paths[last]
+                draft.changed(component, number=draft.numbers[child])
+
+
+def _leads_somewhere(component: Element, text: str, paths: dict[str, str]) -> bool:
+    """Whether a relative path leads to a body as it stands, or to a frame that the component has itself."""
+    here = path_of(component).split("/")[1:]
+    for word in text.split("/"):
+        if word != "..":
+            here.append(word)
+        elif here:
+            here.pop()
+    if "/" + "/".join(here) in paths.values():
+        return True
+    own = (piece for tag in ("frames", "components") for piece in _elements_of(component.find(tag)))
+    return any(piece.get("name") == text for piece in own)
+
+
+def _elements_of(parent: Element | None) -> list[Element]:
+    """The child elements of an element that may not be there."""
+    return [] if parent is None else elements(parent)

@@ -2,29 +2,58 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, elements, families, step
+from osimlite.document.upgrade.draft import Draft, Element, elements, families, plain, reals, step
 
-MEANINGLESS = {
-    "Coordinate": "initial_value keys max_restraint_function min_restraint_function restraint_active "
-    "restraint_function stiffness",
-    "Joint": "use_euler_angles",
-    "MovingPathPoint": "location",
+MEANINGLESS: dict[str, dict[str, str]] = {
+    "Coordinate": {
+        "initial_value": "",
+        "keys": "",
+        "max_restraint_function": "",
+        "min_restraint_function": "",
+        "restraint_active": "false",
+        "restraint_function": "",
+        "stiffness": "0",
+    },
+    "ForceSet": {"datafile": ""},
+    "Joint": {"use_euler_angles": ""},
+    "Model": {"angle_units": "radians"},
+    "MovingPathPoint": {"location": ""},
+    "SimmSpline": {f"{end}_{axis}": "" for end in ("max", "min") for axis in "xyz"},
+    "TransformAxis": {"is_rotation": ""},
+    "Schutte1993Muscle_Deprecated": {"force_velocity_curve": ""},
+    "Thelen2003Muscle": {"Vmax": "10", "Vmax0": "5", "damping": "0.05", "muscle_model": ""},
 }
-"""Elements that have lost their meaning, by the class they stand in."""
+"""Elements that have lost their meaning, by the class they stand in.
+
+Where a default is given, another value meant something once, and going without it counts as a loss.
+"""
 
 
 @step(below=40000)
 def meaningless(draft: Draft) -> None:
-    """Elements without a meaning in the current format go."""
+    """Elements without a meaning in the current format go.
+
+    In a document from before 10901 what would be a loss stays, and the document is refused for it.
+    """
     for visible in draft.tagged("VisibleObject"):
         parent = visible.getparent()
         if parent is not None and families(parent.tag):
             draft.changed(parent, number=draft.numbers[visible])
             draft.remove(visible)
-    for family, tags in MEANINGLESS.items():
-        names = frozenset(tags.split())
+    for family, usual in MEANINGLESS.items():
         for owner in draft.every(family):
             for child in elements(owner):
-                if child.tag in names:
-                    draft.changed(owner, number=draft.numbers[child])
-                    draft.remove(child)
+                if child.tag in usual:
+                    lost = _loss(child, usual[child.tag])
+                    if lost is None or draft.version >= 10901:
+                        draft.changed(owner, number=draft.numbers[child], lost=lost)
+                        draft.remove(child)
+
+
+def _loss(child: Element, usual: str) -> str | None:
+    text = plain(child)
+    if not usual or text == usual or not text:
+        return None
+    count = len(usual.split())
+    given, expected = reals(text, count), reals(usual, count)
+    return None if given is not None and given == expected else f"{child.tag} {text}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, families, members, plain, step
+from osimlite.document.upgrade.draft import Draft, members, path_of, plain, step
 
 
 @step(below=40600)
@@ -14,9 +14,9 @@ def controller_actuators(draft: Draft) -> None:
     listed = [c for c in draft.every("Controller") if c.find("actuator_list") is not None]
     if not listed:
         return
-    actuators = [(_path(actuator), actuator.get("name", "")) for actuator in draft.every("Actuator")]
+    actuators = [(path_of(actuator), actuator.get("name", "")) for actuator in draft.every("Actuator")]
     forces = [
-        (_path(force), force.get("name", ""))
+        (path_of(force), force.get("name", ""))
         for force_set in draft.tagged("ForceSet")
         for force in members(force_set)
     ]
@@ -34,17 +34,3 @@ def controller_actuators(draft: Draft) -> None:
         names.text = " ".join(dict.fromkeys(paths))
         draft.rename(names, "socket_actuators")
         draft.changed(controller)
-
-
-def _path(component: Element) -> str:
-    """The path of a component, by the rules of version 4."""
-    words: list[str] = []
-    here: Element | None = component
-    while here is not None and here.tag != "Model":
-        kinds = families(here.tag)
-        if "ModelComponentSet" in kinds:
-            words.append(here.tag.lower())
-        elif "Component" in kinds or here is component:
-            words.append(here.get("name") or here.tag.lower())
-        here = here.getparent()
-    return "/" + "/".join(reversed(words))

@@ -1,0 +1,165 @@
+"""Text that is not quite XML, read where its meaning is certain.
+
+No repair adds or removes a line or an element, so that every position stays what it was: each puts something else in
+place of characters of one line, or spaces in place of what stands in no element. What could mean two things is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html.entities import html5
+from typing import NamedTuple
+
+from lxml import etree
+
+from osimlite.document.notes import Note, NoteKind
+from osimlite.document.source import Source, markup
+from osimlite.errors import NotWellFormedError
+
+_MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
+_HYPHENS = re.compile(r"-{2,}|-\Z")
+_AMPERSAND = re.compile(r"&(?!#[0-9]+;|#x[0-9a-fA-F]+;)(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
+_OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
+_BLANK_CONTROLS = str.maketrans("\f\v", "  ")
+_ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
+_DECLARATION = re.compile(r"<\?xml\s")
+_EN_DASH = "\u2013"
+
+
+class Repair(NamedTuple):
+    """One thing read as what it must have meant: where it stands in the text, the word there, what it counts as."""
+
+    kind: NoteKind
+    offset: int
+    word: str
+    meant: str
+
+
+def read_repaired(
+    source: Source, fault: NotWellFormedError, parse: Callable[[Source], etree._Element]
+) -> tuple[etree._Element, list[Note]]:
+    """Parse a text that the parser has refused with `fault`, and note what had to be read as something else.
+
+    Raises:
+        NotWellFormedError: nothing certain can be done; with the line and column of what is wrong.
+    """
+    mark = _MARK.search(source.text)
+    if mark is not None:
+        line, column, _ = source.position(mark.start())
+        raise NotWellFormedError(
+            f"an unfinished merge: '{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out",
+            file=source.file, line=line, column=column,
+        )  # fmt: skip
+    text, repairs = repaired(source.text)
+    if not repairs:
+        raise fault
+    root = parse(Source(text.encode("utf-8", "replace"), source.file))
+    spans = source.spans
+    tags = [element.tag for element in root.iter(etree.Element)]
+    if len(tags) != len(spans) or any(_bare(span.tag) != _bare(tag) for span, tag in zip(spans, tags, strict=True)):
+        raise fault
+    notes = []
+    for repair in sorted(repairs, key=lambda repair: repair.offset):
+        line = source.position(repair.offset).line
+        notes.append(Note(repair.kind, element_at(source, repair.offset), repair.word, value=repair.meant, line=line))
+    return root, notes
+
+
+def element_at(source: Source, offset: int) -> int:
+    """The number of the innermost element around a character; 0, the root, outside all."""
+    found = 0
+    for number, span in enumerate(source.spans):
+        if span.start > offset:
+            break
+        if offset < span.end:
+            found = number
+    return found
+
+
+def repaired(text: str) -> tuple[str, list[Repair]]:
+    """The text with everything mended whose meaning is certain, and what was mended."""
+    repairs: list[Repair] = []
+    text = text.translate(_BLANK_CONTROLS)
+    pieces: list[str] = []
+    place = depth = 0
+    for kind, start, end, _ in markup(text):
+        gap, piece = text[place:start], text[start:end]
+        pieces.append(_outside(gap, place, repairs) if depth <= 0 else _ampersands(gap, place, repairs))
+        if kind == "comment":
+            piece = _comment(piece, start, repairs)
+        elif kind == "instruction":
+            if _DECLARATION.match(piece) and text[:start].strip("\ufeff \t\r\n"):
+                repairs.append(Repair("stray-text", start, piece, ""))
+                piece = _blanked(piece)
+        elif kind in ("open", "empty"):
+            depth += kind == "open"
+            piece = _ampersands(_attributes(piece, start, repairs), start, repairs)
+        elif kind == "close":
+            depth -= 1
+        pieces.append(piece)
+        place = end
+    pieces.append(_outside(text[place:], place, repairs) if depth <= 0 else text[place:])
+    return "".join(pieces), repairs
+
+
+def _bare(tag: str) -> str:
+    return tag.replace("::", "\u00b7")
+
+
+def _blanked(text: str) -> str:
+    """As many spaces, the line ends kept."""
+    return re.sub(r"[^\r\n]", " ", text)
+
+
+def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
+    """Text before or after the root: it belongs to nothing."""
+    stripped = text.strip("\ufeff \t\r\n")
+    if stripped and "<" not in stripped:
+        word = stripped.splitlines()[0][:40]
+        repairs.append(Repair("stray-text", offset + text.index(stripped), word, ""))
+    elif not stripped and "\ufeff" in text:
+        repairs.append(Repair("stray-text", offset + text.index("\ufeff"), "\ufeff", ""))
+    else:
+        return text
+    return _blanked(text)
+
+
+def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
+    """A comment may not have two hyphens in a row, nor end with one: dashes look the same."""
+    inner = piece[4:-3]
+    found = _HYPHENS.search(inner)
+    if found is None:
+        return piece
+    repairs.append(Repair("hyphens-in-comment", offset + 4 + found.start(), found[0], _EN_DASH * len(found[0])))
+    return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), inner)}-->"
+
+
+def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
+    """Of an attribute that stands twice the last one counts, as for OpenSim."""
+    given = list(_ATTRIBUTE.finditer(piece))
+    last = {match["name"]: match for match in given}
+    for match in given:
+        kept = last[match["name"]]
+        if match is not kept:
+            repairs.append(Repair("duplicate-attribute", offset + match.start(), match["name"], kept[0]))
+            piece = piece[: match.start()] + _blanked(match[0]) + piece[match.end() :]
+    return piece
+
+
+def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
+    """An ampersand that begins no reference stands for itself; HTML's references mean what they mean in HTML."""
+    if "&" not in text:
+        return text
+
+    def mend(match: re.Match[str]) -> str:
+        name = match[1]
+        if name in _OWN_ENTITIES:
+            return match[0]
+        meant = html5.get(f"{name};") if name else None
+        repairs.append(Repair("bare-ampersand", offset + match.start(), match[0], meant or match[0]))
+        if meant is None:
+            return "&amp;" + match[0][1:]
+        return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
+
+    return _AMPERSAND.sub(mend, text)
