@@ -87,7 +87,8 @@ def main() -> None:
         if len(big) > 2:
             print(f"our time grows as size to the power {exponent([s for s, _ in big], [t for _, t in big]):.2f}")
         largest = max(files, key=lambda path: path.stat().st_size)
-        print(f"{largest.stem}: peak memory {peak_memory(largest):.1f} MB for {largest.stat().st_size / 1e6:.2f} MB of text")
+        size = largest.stat().st_size / 1e6
+        print(f"{largest.stem}: peak memory {peak_memory(largest):.1f} MB for {size:.2f} MB of text")
         if options.processes:
             read = f"import osimlite; osimlite.read({str(largest)!r})"
             load = f"import opensim; opensim.Logger.setLevelString('off'); opensim.Model({str(largest)!r})"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from functools import cache, lru_cache
 from hashlib import blake2b
-from importlib.resources import files
+from pathlib import Path
 
 DIGEST_SIZE = 6
 
@@ -35,5 +35,5 @@ def digest(text: str) -> bytes:
 
 @cache
 def _known() -> frozenset[bytes]:
-    data = files("osimlite.document").joinpath("generated_comments.bin").read_bytes()
+    data = Path(__file__).with_name("generated_comments.bin").read_bytes()
     return frozenset(data[i : i + DIGEST_SIZE] for i in range(0, len(data), DIGEST_SIZE))

@@ -94,8 +94,8 @@ class _Extra:
 class ObjectReader:
     """Walks one element tree. `count` is the number of the next element in document order.
 
-    `included` reads the object of another file that a ``file`` attribute names, if the text has any. `defaults` is what the document's
-    own ``<defaults>`` block says, by class; it ends with the document.
+    `included` reads the object of another file that a ``file`` attribute names, if the text has any. `defaults` is
+    what the document's own ``<defaults>`` block says, by class; it ends with the document.
     """
 
     def __init__(self, included: Included | None = None) -> None:

@@ -1,7 +1,5 @@
 """Actuators: forces that a control sets."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Contact geometry: the surfaces that contact forces work on, each fixed in a physical frame."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
@@ -64,5 +62,3 @@ class ContactGeometrySet(ModelComponentSet):
 
     objects: LegacyMany[ContactGeometry] = none()
     groups: LegacyMany[ObjectGroup] = none()
-
-

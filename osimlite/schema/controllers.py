@@ -1,13 +1,8 @@
-"""Controllers: what sets the controls of actuators."""
+"""Controllers, which set the controls of actuators: what all have in common."""
 
-from __future__ import annotations
-
-from typing import Annotated
-
-from osimlite.schema.base import ModelComponent, Object, made, none
-from osimlite.schema.fields import Flag, LegacyMany, Many, Single, Value, Vector, real
-from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import ActuatorSockets, LegacyFileName, MaybeFileName, NumberInputs
+from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.fields import Flag, LegacyMany
+from osimlite.schema.references import ActuatorSockets
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
@@ -16,57 +11,6 @@ class Controller(ModelComponent, abstract=True):
 
     socket_actuators: ActuatorSockets = ()
     enabled: Flag = True
-
-
-class PrescribedController(Controller):
-    """Controls as functions of time, one for each actuator in order, or as columns of a file."""
-
-    ControlFunctions: Single[FunctionSet] = made(FunctionSet, name="ControlFunctions")
-    controls_file: MaybeFileName = None
-    interpolation_method: Annotated[int | None, Value("int", "optional")] = None
-
-
-class ControlSetController(Controller):
-    """Controls read from a file of control curves."""
-
-    controls_file: LegacyFileName = "Unassigned"
-
-
-class TrackingController(Controller, abstract=True):
-    """Follows a desired motion."""
-
-
-class CorrectionController(TrackingController):
-    """Tracks with accelerations `kp` times the error plus `kv` times its rate."""
-
-    kp: Annotated[float, real(legacy=True)] = 100.0
-    kv: Annotated[float, real(legacy=True)] = 20.0
-
-
-class CMC(TrackingController):
-    """Computed muscle control; the tool of the same name sets it up."""
-
-
-class InputController(Controller, abstract=True):
-    """Computes controls from the outputs of other components."""
-
-    input_controls: NumberInputs = ()
-
-
-class SynergyVector(Object):
-    """The weights with which one synergy drives the actuators, in their order."""
-
-    synergy_weights: Vector = ()
-
-
-class SynergyController(InputController):
-    """Drives many actuators from few inputs, each spread by its synergy vector."""
-
-    synergy_vectors: Many[SynergyVector] = none()
-
-
-class ControlDistributor(ModelComponent):
-    """Hands a vector of controls out as single outputs."""
 
 
 class ControllerSet(ModelComponentSet):

@@ -1,7 +1,5 @@
 """Generalized coordinates."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent

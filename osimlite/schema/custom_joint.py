@@ -1,7 +1,5 @@
 """The joint whose motion is made of six functions of its coordinates."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from osimlite.schema.base import Object, made

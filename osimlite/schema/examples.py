@@ -1,7 +1,5 @@
 """Components of OpenSim's own examples; files made with them exist."""
 
-from __future__ import annotations
-
 from osimlite.schema.base import ModelComponent
 from osimlite.schema.controllers import Controller
 from osimlite.schema.fields import Number

@@ -1,7 +1,5 @@
 """Frames and bodies: what can be attached to."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

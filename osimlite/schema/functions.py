@@ -1,7 +1,5 @@
 """Functions of time, of coordinates, or of whatever their owner says."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import Object, none

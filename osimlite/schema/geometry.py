@@ -1,7 +1,5 @@
 """Decorative geometry: what a frame looks like. It has no effect on the motion."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import Component, Object, made
@@ -124,5 +122,3 @@ class ModelVisualPreferences(Object):
     """Preferences of a viewer for this model."""
 
     model_display_hints: Unnamed[ModelDisplayHints] = made(ModelDisplayHints)
-
-

@@ -3,8 +3,6 @@
 The transform of M (child frame) in F (parent frame) is written X_FM; every class says what its coordinates are.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 

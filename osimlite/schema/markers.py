@@ -1,7 +1,5 @@
 """Points fixed in frames, and the sensors fixed there."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, none

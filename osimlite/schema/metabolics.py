@@ -1,7 +1,5 @@
 """Metabolic energy of muscles: heat rates and mechanical work (Umberger et al. 2003, Bhargava et al. 2004)."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 
@@ -62,8 +60,8 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
     include_negative_mechanical_work: Flag = True
     forbid_negative_total_power: Flag = True
     report_total_metabolics_only: Flag = True
-    metabolic_muscle_parameter_set: Unnamed[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet] = (
-        made(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
+    metabolic_muscle_parameter_set: Unnamed[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet] = made(
+        Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet
     )
 
 
@@ -112,8 +110,8 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     include_negative_mechanical_work: Flag = True
     forbid_negative_total_power: Flag = True
     report_total_metabolics_only: Flag = True
-    metabolic_muscle_parameter_set: Unnamed[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet] = (
-        made(Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
+    metabolic_muscle_parameter_set: Unnamed[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet] = made(
+        Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet
     )
 
 

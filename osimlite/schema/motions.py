@@ -1,7 +1,5 @@
 """Motions given beforehand, and forces that a program sets while it simulates."""
 
-from __future__ import annotations
-
 from osimlite.schema.base import ModelComponent, made
 from osimlite.schema.fields import Flag, Single
 from osimlite.schema.functions import FunctionSet

@@ -3,8 +3,6 @@
 A `curviness` lies between 0 (straight pieces) and 1 (as round as it gets). Numbers left out are chosen by OpenSim.
 """
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.fields import Number, maybe, real

@@ -1,7 +1,5 @@
 """Parts that muscle models share: activation dynamics and pennation."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent

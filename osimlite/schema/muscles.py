@@ -4,8 +4,6 @@ Forces are normalised by `max_isometric_force`, fibre lengths by `optimal_fiber_
 `tendon_slack_length`.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 
@@ -99,9 +97,7 @@ class Millard2012EquilibriumMuscle(Muscle):
         ActiveForceLengthCurve, name="ActiveForceLengthCurve"
     )
     force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(
-        FiberForceLengthCurve, name="FiberForceLengthCurve"
-    )
+    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
@@ -120,9 +116,7 @@ class Millard2012AccelerationMuscle(Muscle):
         ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
     )
     force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(
-        FiberForceLengthCurve, name="FiberForceLengthCurve"
-    )
+    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
@@ -177,6 +171,4 @@ class RigidTendonMuscle(Muscle):
     passive_force_length_curve: Single[Function] = Field(
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
-    force_velocity_curve: Single[Function] = Field(
-        default_factory=partial(force_velocity, "force_velocity_curve")
-    )
+    force_velocity_curve: Single[Function] = Field(default_factory=partial(force_velocity, "force_velocity_curve"))

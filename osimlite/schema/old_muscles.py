@@ -1,7 +1,5 @@
 """Muscle models that OpenSim keeps for old files only."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 

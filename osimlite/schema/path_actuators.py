@@ -1,7 +1,5 @@
 """Actuators that pull along a path."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

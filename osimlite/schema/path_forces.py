@@ -1,7 +1,5 @@
 """Springs and ligaments along a path: they pull without a control."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Annotated
@@ -49,9 +47,7 @@ class Ligament(ForceProducer):
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
     resting_length: Annotated[float, real("m", ">= 0")] = 0.0
     pcsa_force: Annotated[float, real("N", ">= 0")] = 0.0
-    force_length_curve: Single[Function] = Field(
-        default_factory=partial(passive_force_length, "force_length_curve")
-    )
+    force_length_curve: Single[Function] = Field(default_factory=partial(passive_force_length, "force_length_curve"))
 
 
 class Blankevoort1991Ligament(ForceProducer):

@@ -4,8 +4,6 @@ The property that holds a path is called ``path`` in a file. In Python it is `ge
 a component stands in the tree; the word ``path`` is understood when a component is made or a path is assigned.
 """
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, Object, made, none

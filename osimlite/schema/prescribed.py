@@ -1,7 +1,5 @@
 """Forces known beforehand: as functions of time, or as columns of a data file."""
 
-from __future__ import annotations
-
 from osimlite.schema.base import made, none
 from osimlite.schema.fields import Flag, LegacyMany, Single
 from osimlite.schema.forces import ForceProducer

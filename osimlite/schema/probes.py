@@ -1,12 +1,9 @@
-"""Probes: quantities a simulation reports."""
-
-from __future__ import annotations
+"""Probes, which report quantities of a simulation: what all have in common."""
 
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, none
 from osimlite.schema.fields import Flag, LegacyMany, Number, Reals, reals, word
-from osimlite.schema.references import ActuatorNames, JointNames
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
@@ -19,37 +16,6 @@ class Probe(ModelComponent, abstract=True):
     ] = "value"
     initial_conditions_for_integration: Annotated[Reals, reals()] = ()
     gain: Number = 1.0
-
-
-class ActuatorForceProbe(Probe):
-    """The forces of actuators, each to the power `exponent`; the one word `all` names every actuator."""
-
-    actuator_names: ActuatorNames = ()
-    sum_forces_together: Flag = False
-    exponent: Number = 1.0
-
-
-class ActuatorPowerProbe(Probe):
-    """The powers of actuators, each to the power `exponent`; the one word `all` names every actuator."""
-
-    actuator_names: ActuatorNames = ()
-    sum_powers_together: Flag = False
-    exponent: Number = 1.0
-
-
-class JointInternalPowerProbe(Probe):
-    """The powers of joint reactions, each to the power `exponent`; the one word `all` names every joint."""
-
-    joint_names: JointNames = ()
-    sum_powers_together: Flag = False
-    exponent: Number = 1.0
-
-
-class SystemEnergyProbe(Probe):
-    """The kinetic and potential energy of the model."""
-
-    compute_kinetic_energy: Flag = True
-    compute_potential_energy: Flag = True
 
 
 class ProbeSet(ModelComponentSet):

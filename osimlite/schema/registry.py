@@ -13,51 +13,55 @@ from osimlite.schema.base import Object
 
 _AREAS = {
     "actuators": (
-        "ActivationCoordinateActuator Actuator BodyActuator CoordinateActuator PointActuator "
-        "PointToPointActuator ScalarActuator TorqueActuator"
+        "ActivationCoordinateActuator Actuator BodyActuator CoordinateActuator PointActuator PointToPointActuator "
+        "ScalarActuator TorqueActuator"
     ),
     "base": "Component ModelComponent Object Unknown",
-    "constraints": (
-        "ConstantDistanceConstraint Constraint ConstraintSet CoordinateCouplerConstraint PointConstraint "
-        "PointOnLineConstraint RollingOnSurfaceConstraint UnilateralConstraint WeldConstraint"
+    "constraint_types": (
+        "ConstantDistanceConstraint CoordinateCouplerConstraint PointConstraint PointOnLineConstraint "
+        "RollingOnSurfaceConstraint UnilateralConstraint WeldConstraint"
     ),
+    "constraints": "Constraint ConstraintSet",
     "contact": (
         "ContactCylinder ContactEllipsoid ContactGeometry ContactGeometrySet ContactHalfSpace ContactMesh "
         "ContactSphere ContactTorus"
     ),
-    "controllers": (
-        "CMC ControlDistributor ControlSetController Controller ControllerSet CorrectionController "
-        "InputController PrescribedController SynergyController SynergyVector TrackingController"
+    "contact_forces": (
+        "ElasticFoundationContactParameters ElasticFoundationContactParametersSet ElasticFoundationForce "
+        "ExponentialContactForce MeyerFregly2016Force SmoothSphereHalfSpaceForce"
     ),
+    "controller_types": (
+        "CMC ControlDistributor ControlSetController CorrectionController InputController PrescribedController "
+        "SynergyController SynergyVector TrackingController"
+    ),
+    "controllers": "Controller ControllerSet",
     "coordinates": "Coordinate",
     "custom_joint": "CustomJoint SpatialTransform TransformAxis",
     "examples": "HopperDevice ToyPropMyoController ToyReflexController",
     "forces": (
-        "CoordinateLimitForce ElasticFoundationContactParameters ElasticFoundationContactParametersSet "
-        "ElasticFoundationForce ExponentialContactForce Force ForceProducer ForceSet "
-        "HuntCrossleyContactParameters HuntCrossleyContactParametersSet HuntCrossleyForce "
-        "MeyerFregly2016Force SmoothSphereHalfSpaceForce"
+        "CoordinateLimitForce Force ForceProducer ForceSet HuntCrossleyContactParameters "
+        "HuntCrossleyContactParametersSet HuntCrossleyForce"
     ),
     "frames": "Body BodySet Frame Ground PhysicalFrame PhysicalOffsetFrame StationDefinedFrame TwoFrameLinker",
     "functions": (
         "Constant ExpressionBasedFunction Function FunctionSet GCVSpline GCVSplineSet LinearFunction "
-        "MultiplierFunction MultivariatePolynomialFunction PiecewiseConstantFunction "
-        "PiecewiseLinearFunction PolynomialFunction SimmSpline Sine StepFunction"
+        "MultiplierFunction MultivariatePolynomialFunction PiecewiseConstantFunction PiecewiseLinearFunction "
+        "PolynomialFunction SimmSpline Sine StepFunction"
     ),
     "geometry": (
-        "AnalyticGeometry Appearance Arrow Brick Cone Cylinder Ellipsoid FrameGeometry Geometry "
-        "LineGeometry Mesh ModelDisplayHints ModelVisualPreferences Sphere SurfaceProperties Torus"
+        "AnalyticGeometry Appearance Arrow Brick Cone Cylinder Ellipsoid FrameGeometry Geometry LineGeometry Mesh "
+        "ModelDisplayHints ModelVisualPreferences Sphere SurfaceProperties Torus"
     ),
     "joints": (
-        "BallJoint ConstantCurvatureJoint EllipsoidJoint FreeJoint GimbalJoint Joint JointSet PinJoint "
-        "PlanarJoint ScapulothoracicJoint SliderJoint UniversalJoint WeldJoint"
+        "BallJoint ConstantCurvatureJoint EllipsoidJoint FreeJoint GimbalJoint Joint JointSet PinJoint PlanarJoint "
+        "ScapulothoracicJoint SliderJoint UniversalJoint WeldJoint"
     ),
     "markers": "IMU Marker MarkerSet Point Station",
     "metabolics": (
         "Bhargava2004MuscleMetabolicsProbe Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter "
-        "Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet "
-        "Bhargava2004SmoothedMuscleMetabolics Bhargava2004SmoothedMuscleMetabolics_MuscleParameters "
-        "Umberger2010MuscleMetabolicsProbe Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter "
+        "Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet Bhargava2004SmoothedMuscleMetabolics "
+        "Bhargava2004SmoothedMuscleMetabolics_MuscleParameters Umberger2010MuscleMetabolicsProbe "
+        "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter "
         "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet"
     ),
     "model": "Model",
@@ -68,9 +72,8 @@ _AREAS = {
     ),
     "muscle_parts": "MuscleFirstOrderActivationDynamicModel MuscleFixedWidthPennationModel",
     "muscles": (
-        "ActivationFiberLengthMuscle DeGrooteFregly2016Muscle MeyerFregly2016Muscle "
-        "Millard2012AccelerationMuscle Millard2012EquilibriumMuscle Muscle RigidTendonMuscle "
-        "Thelen2003Muscle"
+        "ActivationFiberLengthMuscle DeGrooteFregly2016Muscle MeyerFregly2016Muscle Millard2012AccelerationMuscle "
+        "Millard2012EquilibriumMuscle Muscle RigidTendonMuscle Thelen2003Muscle"
     ),
     "old_muscles": (
         "ActivationFiberLengthMuscle_Deprecated Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated "
@@ -79,15 +82,16 @@ _AREAS = {
     "path_actuators": "ClutchedPathSpring McKibbenActuator PathActuator",
     "path_forces": "Blankevoort1991Ligament ExpressionBasedPathForce Ligament PathSpring",
     "paths": (
-        "AbstractGeometryPath AbstractPathPoint ConditionalPathPoint FunctionBasedPath GeometryPath "
-        "MovingPathPoint PathPoint PathPointSet PathWrap PathWrapPoint PathWrapSet"
+        "AbstractGeometryPath AbstractPathPoint ConditionalPathPoint FunctionBasedPath GeometryPath MovingPathPoint "
+        "PathPoint PathPointSet PathWrap PathWrapPoint PathWrapSet"
     ),
     "prescribed": "ExternalForce ExternalLoads PrescribedForce",
-    "probes": "ActuatorForceProbe ActuatorPowerProbe JointInternalPowerProbe Probe ProbeSet SystemEnergyProbe",
+    "probe_types": "ActuatorForceProbe ActuatorPowerProbe JointInternalPowerProbe SystemEnergyProbe",
+    "probes": "Probe ProbeSet",
     "reporters": (
         "AbstractReporter ConsoleReporter__Vec3_ ConsoleReporter__double_ NumberReporter SignalGenerator "
-        "StatesTrajectoryReporter TableReporter__Vec3_ TableReporter__Vector_ TableReporter__double_ "
-        "TableSource TableSource__Vec3_ TableSource__double_ Vec3Reporter VectorReporter"
+        "StatesTrajectoryReporter TableReporter__Vec3_ TableReporter__Vector_ TableReporter__double_ TableSource "
+        "TableSource__Vec3_ TableSource__double_ Vec3Reporter VectorReporter"
     ),
     "scholz_paths": (
         "Scholz2015GeometryPath Scholz2015GeometryPathElement Scholz2015GeometryPathObstacle "
@@ -95,9 +99,8 @@ _AREAS = {
     ),
     "sets": "ComponentSet ModelComponentSet ObjectGroup",
     "springs": (
-        "BushingForce ExpressionBasedBushingForce ExpressionBasedCoordinateForce "
-        "ExpressionBasedPointToPointForce FunctionBasedBushingForce PointToPointSpring "
-        "SpringGeneralizedForce"
+        "BushingForce ExpressionBasedBushingForce ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce "
+        "FunctionBasedBushingForce PointToPointSpring SpringGeneralizedForce"
     ),
     "wrapping": "WrapCylinder WrapEllipsoid WrapObject WrapObjectSet WrapSphere WrapTorus",
 }

@@ -1,7 +1,5 @@
 """Reporters, which collect outputs during a simulation, and sources of data to put in."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import Component, made

@@ -1,7 +1,5 @@
 """Paths that run smoothly over contact surfaces (Scholz et al. 2015)."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Sets: the lists a model is made of, and named groups of their members."""
 
-from __future__ import annotations
-
 from osimlite.schema.base import ModelComponent, Object, none
 from osimlite.schema.fields import LegacyMany
 from osimlite.schema.references import SetMemberNames
@@ -22,5 +20,3 @@ class ComponentSet(ModelComponentSet):
 
     objects: LegacyMany[ModelComponent] = none()
     groups: LegacyMany[ObjectGroup] = none()
-
-

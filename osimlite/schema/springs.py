@@ -1,7 +1,5 @@
 """Springs between points, on coordinates and between frames."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import made

@@ -1,7 +1,5 @@
 """Surfaces that paths of muscles and springs wrap around."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
@@ -19,9 +17,9 @@ class WrapObject(ModelComponent, abstract=True):
     active: Flag = True
     xyz_body_rotation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    quadrant: Annotated[
-        str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")
-    ] = "Unassigned"
+    quadrant: Annotated[str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")] = (
+        "Unassigned"
+    )
     appearance: Unnamed[Appearance] = made(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
 
 

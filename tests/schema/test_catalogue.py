@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +18,9 @@ SCHEMAS = Path(__file__).resolve().parents[2] / "schemas"
 CATALOGUE = json.loads((SCHEMAS / "opensim-4.6.json").read_text())["classes"]
 REFERENCES = json.loads((SCHEMAS / "references.json").read_text())["references"]
 
-CONCRETE = sorted(name for name, entry in CATALOGUE.items() if entry.get("document") == "model" and not entry["abstract"])
+CONCRETE = sorted(
+    name for name, entry in CATALOGUE.items() if entry.get("document") == "model" and not entry["abstract"]
+)
 
 NOT_IN_FILES = {"PathWrapPoint"}
 """Concrete in OpenSim's C++ but never written to a file: declared as internal parts, without a tag."""
@@ -31,6 +35,13 @@ OUTSIDE_TARGETS = {"file": "file", "column": "column"}
 """What lies outside the model has one target per rule; the catalogue describes it in prose."""
 
 TARGETS = {"SimTK::Vector_<double>": "Vector", "object in the enclosing Set": "Object"}
+
+
+def declared(tag: str) -> Any:
+    """The class of an XML element; it must be there."""
+    cls = class_for(tag)
+    assert cls is not None, f"no class for <{tag}>"
+    return cls
 
 
 def references() -> dict[tuple[str, str], dict]:
@@ -59,7 +70,7 @@ def expected_default(prop: dict) -> str | None:
     return "" if prop["default"] is None else prop["default"]
 
 
-def printed(kind: Value, value: object) -> str:
+def printed(kind: Any, value: object) -> str:
     return formatter(kind, "opensim")(value).removeprefix(" " if kind.legacy else "")
 
 
@@ -87,8 +98,7 @@ def same_default_object(made: Object, wanted: dict, where: str) -> None:
 @pytest.mark.parametrize("name", CONCRETE)
 def test_class_equals_the_catalogue(name: str) -> None:
     entry = CATALOGUE[name]
-    cls = class_for(entry["xml_tag"])
-    assert cls is not None, f"no class for <{entry['xml_tag']}>"
+    cls = declared(entry["xml_tag"])
     specs = field_specs(cls)
     assert list(specs) == [prop["name"] for prop in entry["properties"]]
     plain = cls()
@@ -138,8 +148,7 @@ def test_class_equals_the_catalogue(name: str) -> None:
 @pytest.mark.parametrize("name", CONCRETE)
 def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None:
     entry = CATALOGUE[name]
-    cls = class_for(entry["xml_tag"])
-    assert cls is not None
+    cls = declared(entry["xml_tag"])
     for prop in entry["properties"]:
         if prop["declared_in"] in CATALOGUE and prop["name"] not in ("objects", "groups"):
             assert field_specs(cls)[prop["name"]].declared_in.tag == prop["declared_in"], prop["name"]
@@ -147,8 +156,7 @@ def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None
 
 @pytest.mark.parametrize("name", CONCRETE)
 def test_bases_are_opensims(name: str) -> None:
-    cls = class_for(CATALOGUE[name]["xml_tag"])
-    assert cls is not None
+    cls = declared(CATALOGUE[name]["xml_tag"])
     ours = {base.__name__ for base in cls.__mro__}
     theirs = {base for base in CATALOGUE[name]["bases"] if "<" not in base}
     assert theirs <= ours
@@ -157,7 +165,7 @@ def test_bases_are_opensims(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in CONCRETE if "coordinate_count" in CATALOGUE[name]])
 def test_joints_have_opensims_coordinates(name: str) -> None:
-    cls = class_for(name)
+    cls = declared(name)
     motions = CATALOGUE[name].get("coordinate_motion_types")
     assert cls.motion_types == (None if motions is None else tuple(word.lower() for word in motions))
     assert len(cls().coordinates) == (CATALOGUE[name]["coordinate_count"] or 0)
@@ -165,7 +173,7 @@ def test_joints_have_opensims_coordinates(name: str) -> None:
 
 @pytest.mark.parametrize("name", CONCRETE)
 def test_internal_parts_are_opensims(name: str) -> None:
-    cls = class_for(CATALOGUE[name]["xml_tag"])
+    cls = declared(CATALOGUE[name]["xml_tag"])
     wanted = [(part["name"], part["class"]) for part in CATALOGUE[name].get("internal_subcomponents", [])]
     assert [(part, kind.__name__) for part, kind in getattr(cls, "internal", ())] == wanted
 
@@ -181,7 +189,7 @@ def test_no_reference_is_forgotten() -> None:
     assert REFERENCE_OF.keys() - reached == named | others
     assert len(REFERENCE_OF) == 93
     for owner, _ in named:
-        rule = class_for(owner).name_reference
+        rule = declared(owner).name_reference
         entry = REFERENCE_OF[owner, "@name"]
         assert (rule.rule, rule.target, rule.required) == (entry["resolution"], entry["target"], entry["required"])
 
@@ -193,12 +201,10 @@ def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
 
 def test_bases_without_a_file_form_are_opensims_too() -> None:
     """What is declared and has no tag in files is an abstract base of OpenSim, or said here why not."""
-    ours_alone = {
-        "Object", "Unknown",  # the root, and what stands for classes nobody knows
-        "ModelComponentSet", "TwoFrameLinker", "NumberReporter", "Vec3Reporter", "VectorReporter", "TableSource",
-    }  # fmt: skip; the second line: templates in OpenSim
-    from importlib import import_module
-
+    root_and_unknown = {"Object", "Unknown"}
+    templates = {"ModelComponentSet", "TwoFrameLinker", "TableSource"}
+    templates |= {"NumberReporter", "Vec3Reporter", "VectorReporter"}
+    ours_alone = root_and_unknown | templates
     for name, module in MODULES.items():
         cls = getattr(import_module(module), name)
         if cls.abstract and name not in ours_alone | NOT_IN_FILES:

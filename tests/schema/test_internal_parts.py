@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.document.printer import to_text
-from osimlite.schema.forces import MeyerFregly2016Force
+from osimlite.schema.contact_forces import MeyerFregly2016Force
 from osimlite.schema.frames import Body
 from osimlite.schema.markers import Station
 from osimlite.schema.metabolics import (
@@ -41,7 +41,8 @@ def test_a_reference_to_one_outlives_changes_of_the_model(model: Model) -> None:
 
 
 def test_their_own_empty_sockets_are_no_references_of_the_model(model: Model) -> None:
-    assert [use.value.name for use in model.tree().uses() if use.spec.tag == "socket_parent_frame"] == ["upper"]
+    named = [use.value for use in model.tree().uses() if use.spec.tag == "socket_parent_frame"]
+    assert named == [model.find("/bodyset/upper")]
     assert model.tree().is_internal(model.find("/forceset/biceps/actMdl"))
     assert not model.tree().is_internal(model.find("/forceset/biceps"))
 
