@@ -179,6 +179,10 @@ class ObjectReader:
             else:
                 members = self._members(child, spec, late)
                 optional = isinstance(spec.kind, Held) and spec.kind.form == "optional"
+                if members and not optional:
+                    # The object of a property is called as the property is, also in the long form.
+                    members[0].__dict__["name"] = spec.tag
+                    members[0].model_fields_set.add("name")
                 values[field_name] = members[0] if members else None if optional else spec.factory()
             count = self.count
             if late:

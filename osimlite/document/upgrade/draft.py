@@ -33,6 +33,7 @@ class Change(NamedTuple):
 
     Attributes:
         step: the name of the step.
+        below: the version it leads to.
         what: what that step does, in one line.
         where: class and name of the component concerned.
         number: the element it was found at, in document order.
@@ -40,6 +41,7 @@ class Change(NamedTuple):
     """
 
     step: str
+    below: int
     what: str
     where: str
     number: int
@@ -106,9 +108,7 @@ class Draft:
     def __init__(self, root: Element, version: int) -> None:
         self.root = root
         self.version = version
-        self.numbers: dict[Element, int] = {
-            element: number for number, element in enumerate(root.iter(etree.Element))
-        }
+        self.numbers: dict[Element, int] = {element: number for number, element in enumerate(root.iter(etree.Element))}
         self.changes: list[Change] = []
         self.touched: dict[Element, None] = {}
         self.step: Step | None = None
@@ -196,7 +196,7 @@ class Draft:
         """Record that the current step changed something at an element, and what was lost."""
         assert self.step is not None
         number = self.numbers[element] if number is None else number
-        self.changes.append(Change(self.step.name, self.step.what, describe(element), number, lost))
+        self.changes.append(Change(self.step.name, self.step.below, self.step.what, describe(element), number, lost))
 
 
 def describe(element: Element) -> str:

@@ -14,9 +14,7 @@ def body_inertia(draft: Draft) -> None:
     for body in draft.tagged("Body"):
         parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
         given = [part for part in parts.values() if part is not None]
-        words = [
-            default if (part := parts[axes]) is None else plain(part) for axes, default in _INERTIA.items()
-        ]
+        words = [default if (part := parts[axes]) is None else plain(part) for axes, default in _INERTIA.items()]
         draft.add(body, "inertia", " ".join(words), source=given[0] if given else body)
         for part in given:
             draft.remove(part)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, families, plain, step
 
-_PROSE = frozenset("credits publications data_file datafile file_name filename geometry_file mesh_file".split())
+_PROSE = {"credits", "publications", "data_file", "datafile", "file_name", "filename", "geometry_file", "mesh_file"}
 """Elements whose text is never the name of a component."""
 
-_LISTS = frozenset(
-    "actuator_list coordinates geometry independent_coordinate_names members muscle_list".split()
-)
+_LISTS = {"actuator_list", "coordinates", "geometry", "independent_coordinate_names", "members", "muscle_list"}
 """Elements whose text may be several names."""
 
 
@@ -29,7 +27,8 @@ def names(draft: Draft) -> None:
                 draft.changed(component)
         elif any(space in name for space in " \t\n\r"):
             new = "".join(name.split())
-            taken = {sibling.get("name") for sibling in parent if sibling is not component} if parent is not None else ()
+            siblings = () if parent is None else (other for other in parent if other is not component)
+            taken = {sibling.get("name") for sibling in siblings}
             free, count = new, 0
             while free in taken:
                 free, count = f"{new}_{count}", count + 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, body_path, elements, members, plain, step
 
-_KEPT_BY_GROUND = frozenset("VisibleObject WrapObjectSet attached_geometry components geometry".split())
+_KEPT_BY_GROUND = {"VisibleObject", "WrapObjectSet", "attached_geometry", "components", "geometry"}
 
 
 @step(below=30501)

@@ -25,8 +25,8 @@ def wrap_appearance(draft: Draft) -> None:
             if part is not None:
                 draft.remove(part)
         if set_by is not None or visible is not None:
-            placed = visible is not None and any(reals(text_of(visible, "transform"), 6) or ())
-            draft.changed(wrap, lost="where the shown surface stood off the wrap object" if placed else None)
+            lost = "where the shown surface stood off the wrap object" if _stands_off(wrap, visible) else None
+            draft.changed(wrap, lost=lost)
 
 
 def _appearance(
@@ -40,3 +40,11 @@ def _appearance(
     draft.add(appearance, "opacity", "0.5", source=source)
     surface = draft.add(appearance, "SurfaceProperties", source=source)
     draft.add(surface, "representation", representation, source=source)
+
+
+def _stands_off(wrap: Element, visible: Element | None) -> bool:
+    """Whether the surface was shown elsewhere than where the wrap object is."""
+    shown = None if visible is None else reals(text_of(visible, "transform"), 6)
+    angles, place = (reals(text_of(wrap, tag), 3) or [0.0] * 3 for tag in ("xyz_body_rotation", "translation"))
+    here = [*angles, *place]
+    return shown is not None and any(shown) and any(abs(a - b) > 1e-4 for a, b in zip(shown, here, strict=True))

@@ -1,0 +1,91 @@
+"""``osimlite upgrade``: an old model file in the current format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from osimlite.document.reader import Document
+    from osimlite.document.upgrade import Change
+
+
+def upgrade(
+    file: Annotated[Path, typer.Argument(help="A model file of any version.", show_default=False)],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="File to write, which may be FILE itself; default is <name>_<version>.osim beside it.",
+            show_default=False,
+        ),
+    ] = None,
+    numbers: Annotated[
+        str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")
+    ] = "shortest",
+) -> None:
+    """Write a model file of an older version in the current format, and list what changed and what was lost.
+
+    Components get the names and paths that OpenSim gives them. Comments and numbers stay as they are.
+
+    Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
+    """
+    from rich.console import Console
+
+    from osimlite.document.printer import write
+    from osimlite.document.reader import read_document
+    from osimlite.document.source import Source
+    from osimlite.errors import OsimliteError
+    from osimlite.schema.model import CURRENT_VERSION
+
+    if numbers not in ("shortest", "opensim"):
+        raise OsimliteError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
+    document = read_document(Source.of_file(file))
+    mended = document.fault is not None
+    if document.version >= CURRENT_VERSION and output is None and not mended:
+        typer.echo(f"{file}: already version {document.version}, nothing to do")
+        return
+    target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}.osim")
+    if output is None and target.exists():
+        raise OsimliteError(f"'{target}' is there already; name the file to write with -o", file=str(file))
+    write(document.model, target, numbers="opensim" if numbers == "opensim" else "shortest")
+    _report(Console(), document)
+    typer.echo(f"{target}: version {document.version} to {CURRENT_VERSION}, {_count(len(document.changes), 'change')}")
+
+
+def _report(console: Console, document: Document) -> None:
+    """Print what was done, one line for each step, then every loss."""
+    from rich.table import Table
+
+    steps: dict[str, list[Change]] = {}
+    for change in document.changes:
+        steps.setdefault(change.what, []).append(change)
+    if steps:
+        table = Table("What changed", box=None, pad_edge=False, header_style="bold")
+        table.add_column("Places", justify="right")
+        table.add_column("First line", justify="right")
+        for what, changes in sorted(steps.items(), key=lambda item: item[1][0].below):
+            line = document.source.of_tag(changes[0].number).line
+            table.add_row(what, str(len(changes)), str(line))
+        console.print(table)
+    for note in document.notes:
+        if note.line is not None:
+            meant = "as nothing" if not note.value else "as it stands" if note.value == note.word else f"as '{note.value}'"
+            console.print(f"line {note.line}: '{note.word}' is no XML and was read {meant}", markup=False)
+    lost: dict[str, list[Change]] = {}
+    for change in document.changes:
+        if change.lost is not None:
+            lost.setdefault(change.lost, []).append(change)
+    for what, changes in lost.items():
+        first = document.source.of_tag(changes[0].number).line
+        more = f" and {_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
+        console.print(f"lost: {what} (line {first}, {changes[0].where}{more})", markup=False)
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}" + ("" if number == 1 else "s")
