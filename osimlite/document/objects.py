@@ -15,6 +15,7 @@ from osimlite.document.lexical import ABSENT, Unclean, converter
 from osimlite.document.notes import Note, NoteKind
 from osimlite.schema.base import (
     FieldSpec,
+    Home,
     Include,
     Layout,
     Object,
@@ -25,6 +26,7 @@ from osimlite.schema.base import (
     object_specs,
 )
 from osimlite.schema.fields import Held, ObjectList
+from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for
 
 Read = TypeVar("Read", bound=Object)
@@ -103,6 +105,7 @@ class ObjectReader:
         self.notes: list[Note] = []
         self.defaults: dict[type[Object], Object] = {}
         self.included = included
+        self.home = Home()
 
     def top(self, element: etree._Element, cls: type[Read]) -> Read:
         """Read the object of a document; only there may a ``<defaults>`` block stand."""
@@ -114,6 +117,7 @@ class ObjectReader:
             found = self._block(block)
             self.count = start
         top = self.object(element, cls, skip=block)
+        self.home.model = top if isinstance(top, Model) else None
         if found:
             layout_of(top).defaults = found
         return top
@@ -204,7 +208,7 @@ class ObjectReader:
             values["name"] = name
             present.add("name")
         inherited = self._inherit(cls, values) if self.defaults else None
-        built = cls.build(values, present, number)
+        built = cls.build(values, present, number, self.home)
         if inherited:
             layout_of(built).inherited = inherited
         return built if extra is None else self._finish(built, extra)
@@ -240,6 +244,7 @@ class ObjectReader:
         item, include, notes = found
         for part in item.walk():
             object.__setattr__(part, "_index", number)
+            object.__setattr__(part, "_model", self.home)
         if name:
             object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
         layout_of(item).include = include
@@ -311,7 +316,7 @@ class ObjectReader:
         self.count += size(element)
         name = element.get("name") or ""
         values = {"name": name, "class_name": element.tag.replace(STAND_IN, "::"), "content": content}
-        return Unknown.build(values, {"name"} if name else set(), number)
+        return Unknown.build(values, {"name"} if name else set(), number, self.home)
 
     def _text_of(self, element: etree._Element, number: int, spec: FieldSpec, extra: _Extra) -> str:
         """The text of a value element that has comments or, wrongly, elements inside."""

@@ -98,6 +98,15 @@ class Remark(NamedTuple):
 _SLOTS = ("_model", "_index", "_layout")
 
 
+class Home:
+    """Stands for the model that the objects of one text belong to, until the model itself is made."""
+
+    __slots__ = ("model",)
+
+    def __init__(self) -> None:
+        self.model: Model | None = None
+
+
 def none() -> Any:
     """The default of a property that holds a list of objects: none yet."""
     return Field(default_factory=ObjectList)
@@ -156,7 +165,9 @@ class Object(BaseModel):
         _set(self, "_layout", None)
 
     @classmethod
-    def build(cls, values: dict[str, Any], present: set[str], index: int | None = None) -> Self:
+    def build(
+        cls, values: dict[str, Any], present: set[str], index: int | None = None, home: Home | None = None
+    ) -> Self:
         """Make an instance from values already of the stored form, without validation.
 
         `values` may leave out properties, `present` names those the text gave; the rest take their defaults. This is
@@ -173,7 +184,7 @@ class Object(BaseModel):
         _put_present(self, present)
         _put_extra(self, None)
         _put_private(self, None)
-        _put_model(self, None)
+        _put_model(self, home)
         _put_index(self, index)
         _put_layout(self, None)
         return self
@@ -308,21 +319,21 @@ class Component(Object, abstract=True):
     @property
     def model(self) -> Model | None:
         """The model this component was last seen in."""
-        return cast("Model | None", self._model)
+        known = self._model
+        return known.model if type(known) is Home else cast("Model | None", known)
 
     @property
     def parent(self) -> Component | None:
         """The component above in the tree; None for the model, or while the component is in no model."""
-        return None if self._model is None else self._model.tree().parent_of(self)
+        model = self.model
+        return None if model is None else model.tree().parent_of(self)
 
     @property
     def path(self) -> str:
         """The absolute path as OpenSim writes it; the name alone while the component is in no model."""
-        if self._model is not None:
-            path = self._model.tree().path_of(self)
-            if path is not None:
-                return path  # type: ignore[no-any-return]
-        return self.name
+        model = self.model
+        path = None if model is None else model.tree().path_of(self)
+        return self.name if path is None else path
 
 
 class ModelComponent(Component, abstract=True):

@@ -135,7 +135,7 @@ def marker(model: Model) -> Marker:
 def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:
     document = read_document(Source.of_file(folder / "model.osim"))
     assert marker(document.model).location == (1.0, 2.0, 3.0)
-    assert document.model.find("/markerset/mk") is marker(document.model)
+    assert marker(document.model).path == "/markerset/mk"
     # What is wrong in the other file is told at the place that names it.
     assert [(note.kind, document.source.spans[note.number].tag) for note in document.notes] == [
         ("unknown-tag", "MarkerSet")

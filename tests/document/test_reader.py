@@ -175,3 +175,11 @@ def test_positions_survive_the_double_colon() -> None:
     with pytest.raises(DocumentError, match="HuntCrossleyForce::ContactParameters") as caught:
         osimlite.read_text(text)
     assert caught.value.line == 1
+
+
+def test_what_was_just_read_knows_its_place() -> None:
+    text = '<OpenSimDocument Version="40600"><Model name="m"><BodySet><objects><Body name="b"/></objects></BodySet>'
+    model = osimlite.read_text(text + "</Model></OpenSimDocument>")
+    (body,) = model.body_set.objects
+    assert (body.path, body.model, body.parent) == ("/bodyset/b", model, model.body_set)
+    assert body.copy_deep().model is None
