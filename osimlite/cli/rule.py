@@ -1,0 +1,33 @@
+"""``osimlite rule``: the page of a rule, or the table of all."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def rule(
+    code: Annotated[
+        str | None, typer.Argument(help="Code or name of a rule; without it, all rules are listed.", show_default=False)
+    ] = None,
+) -> None:
+    """Print what a rule finds, why that is bad, and an example with its mend.
+
+    Example: osimlite rule OSIM301
+    """
+    from osimlite.errors import OsimliteError
+    from osimlite.lint.engine import all_rules
+    from osimlite.text import did_you_mean
+
+    rules = all_rules()
+    if code is None:
+        width = max(len(known.name) for known in rules)
+        for known in rules:
+            typer.echo(f"{known.code}  {known.name:{width}}  {known.severity.value:7}  {known.summary}")
+        return
+    found = next((known for known in rules if code.upper() == known.code or code == known.name), None)
+    if found is None:
+        names = [word for known in rules for word in (known.code, known.name)]
+        raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)} `osimlite rule` lists all rules")
+    typer.echo(f"# {found.name} ({found.code}, {found.severity.value})\n\n{found.page}")

@@ -1,0 +1,75 @@
+"""Reading for a check: as much of a text as can be read, and every reason why the rest cannot."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from osimlite.document.reader import Document, document_of, parse, read_document
+from osimlite.document.source import Source
+from osimlite.errors import DocumentError, NotWellFormedError, VersionError
+from osimlite.schema.model import CURRENT_VERSION
+
+
+@dataclass(slots=True)
+class Survey:
+    """What could be read of a text.
+
+    `document` is None if nothing could. `faults` are the errors the reader would have raised. Of a text that is not
+    well-formed only what stands before line `sure_until` was certainly understood.
+    """
+
+    source: Source
+    document: Document | None = None
+    faults: list[DocumentError] = field(default_factory=list)
+    sure_until: int | None = None
+
+
+def survey(source: Source) -> Survey:
+    """Read as much of `source` as can be read; raises nothing for what is wrong with the text."""
+    try:
+        return Survey(source, read_document(source))
+    except NotWellFormedError as fault:
+        return _recovered(source, fault)
+    except VersionError as fault:
+        # Without a version the document is taken for a current one; an older format would give false findings.
+        if fault.version is not None:
+            return Survey(source, None, [fault])
+        return _assembled(Survey(source, None, [fault]), parse(source))
+    except DocumentError as fault:
+        return Survey(source, None, [fault])
+
+
+def _recovered(source: Source, fault: NotWellFormedError) -> Survey:
+    found = Survey(source, None, [fault], fault.line)
+    unclosed = re.search(r"of line (\d+) is not closed", fault.message)
+    if unclosed:
+        found.sure_until = int(unclosed[1])
+    try:
+        root = parse(source, recover=True)
+    except NotWellFormedError:
+        return found
+    if root.tag != "OpenSimDocument" or not _same_elements(source, root, found.sure_until):
+        return found
+    return _assembled(found, root)
+
+
+def _assembled(found: Survey, root: etree._Element) -> Survey:
+    try:
+        found.document = document_of(found.source, root, CURRENT_VERSION)
+    except DocumentError as fault:
+        found.faults.append(fault)
+    return found
+
+
+def _same_elements(source: Source, root: etree._Element, sure_until: int | None) -> bool:
+    """Whether the recovered tree numbers its elements as the text does, as far as that matters."""
+    numbered = zip(source.spans, root.iter(etree.Element), strict=False)
+    for number, (span, element) in enumerate(numbered):
+        if sure_until is not None and source.of_tag(number).line >= sure_until:
+            return True
+        if span.tag.replace("::", "\u00b7") != element.tag:
+            return False
+    return True

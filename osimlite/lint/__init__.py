@@ -1,0 +1,46 @@
+"""What is wrong with a model: rules over the text, the typed model and its component tree; nothing is simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from osimlite.document.source import Source
+from osimlite.lint.config import Config, checked_words
+from osimlite.lint.diagnostic import Finding, Report, Severity
+from osimlite.lint.engine import all_rules, check_model, check_source
+from osimlite.schema.model import Model
+
+__all__ = ["Config", "Finding", "Report", "Severity", "all_rules", "assert_valid", "checked_words", "validate"]
+
+
+def validate(
+    model: Model | str | Path | Source,
+    *,
+    select: tuple[str, ...] | list[str] | str | None = None,
+    ignore: tuple[str, ...] | list[str] | str | None = None,
+    config: Config | None = None,
+) -> Report:
+    """Check a model, or a file, against every rule.
+
+    Args:
+        model: a Model, the path of a file, or a Source. Only of a text do findings know line and column.
+        select: codes, beginnings of codes, or names of rules to run; all if not given.
+        ignore: the same, of rules to leave out.
+        config: everything that can be set; `select` and `ignore` take its place.
+
+    Raises:
+        MissingFileError: the file is missing or cannot be read. What is wrong inside a file is a finding.
+        OsimliteError: no rule has a code in `select` or `ignore`.
+    """
+    if config is None:
+        config = Config(checked_words(select), checked_words(ignore))
+    if isinstance(model, Model):
+        return check_model(model, config)
+    return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
+
+
+def assert_valid(model: Model | str | Path, *, ignore: tuple[str, ...] | list[str] | str | None = None) -> None:
+    """Fail a test with all findings unless a model has neither errors nor warnings."""
+    report = validate(model, ignore=ignore)
+    bad = report.at_least(Severity.WARNING)
+    assert not bad, "\n".join(map(str, bad))

@@ -1,0 +1,162 @@
+"""Findings: what a rule has to say about one place of a model."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Severity(StrEnum):
+    """How bad a finding is.
+
+    ERROR: OpenSim refuses the model, crashes, computes NaN, or does something other than what the text says.
+    WARNING: physically or numerically doubtful. INFO: tidiness, or something worth knowing.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+    @property
+    def rank(self) -> int:
+        """0 for errors, more for what is less bad."""
+        return _RANKS[self]
+
+
+_RANKS = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """Replace the characters from `start` to `end` of the text by `text`."""
+
+    start: int
+    end: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """A mend as text edits; `safe` if OpenSim then reads the same model, or certainly the one that was meant."""
+
+    edits: tuple[Edit, ...]
+    safe: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One finding.
+
+    `line` and `column` are 1-based and None for a model made in Python; `length` characters are concerned.
+    `component` is the absolute path of the component, empty where there is none. `suggestion` is the text that would
+    be right in this place.
+    """
+
+    code: str
+    name: str
+    severity: Severity
+    message: str
+    file: str | None = None
+    line: int | None = None
+    column: int | None = None
+    length: int = 1
+    component: str = ""
+    suggestion: str | None = None
+    fix: Fix | None = field(default=None, compare=False)
+
+    @property
+    def fixable(self) -> bool:
+        """Whether the finding comes with a mend that is certainly right."""
+        return self.fix is not None and self.fix.safe
+
+    @property
+    def place(self) -> str:
+        """``file:line:column``, as much of it as is known, else the path of the component."""
+        parts = [str(part) for part in (self.file, self.line, self.column) if part is not None]
+        return ":".join(parts) or self.component
+
+    def as_dict(self) -> dict[str, Any]:
+        """The finding as JSON has it."""
+        return {
+            "code": self.code,
+            "name": self.name,
+            "severity": self.severity.value,
+            "message": self.message,
+            "file": self.file,
+            "line": self.line,
+            "column": self.column,
+            "length": self.length,
+            "component": self.component,
+            "suggestion": self.suggestion,
+            "fixable": self.fixable,
+        }
+
+    def __str__(self) -> str:
+        hint = f" (did you mean '{self.suggestion}'?)" if self.suggestion is not None else ""
+        return f"{self.place}: {self.severity} {self.code} {self.message}{hint}"
+
+
+@dataclass(slots=True)
+class Report:
+    """Everything found in one or several models, sorted by file and place.
+
+    `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the models.
+    """
+
+    findings: list[Finding] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
+    checked: int = 1
+
+    @property
+    def errors(self) -> list[Finding]:
+        """The findings that are errors."""
+        return self._of(Severity.ERROR)
+
+    @property
+    def warnings(self) -> list[Finding]:
+        """The findings that are warnings."""
+        return self._of(Severity.WARNING)
+
+    @property
+    def infos(self) -> list[Finding]:
+        """The findings that are for information."""
+        return self._of(Severity.INFO)
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no error."""
+        return not self.errors
+
+    @property
+    def codes(self) -> Counter[str]:
+        """How often each code was found."""
+        return Counter(finding.code for finding in self.findings)
+
+    def at_least(self, severity: Severity) -> list[Finding]:
+        """The findings that are as bad as `severity` or worse."""
+        return [finding for finding in self.findings if finding.severity.rank <= severity.rank]
+
+    def __iter__(self) -> Iterator[Finding]:
+        return iter(self.findings)
+
+    def __len__(self) -> int:
+        return len(self.findings)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.findings)) or "nothing found"
+
+    def _of(self, severity: Severity) -> list[Finding]:
+        return [finding for finding in self.findings if finding.severity is severity]
+
+
+def merged(reports: Iterable[Report]) -> Report:
+    """One report of several, in the order given."""
+    whole = Report(checked=0)
+    for report in reports:
+        whole.findings.extend(report.findings)
+        whole.texts.update(report.texts)
+        whole.checked += report.checked
+    return whole

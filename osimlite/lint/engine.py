@@ -1,0 +1,186 @@
+"""The registry of rules, and running them.
+
+A rule is a function of the subject and of `found`, which it calls once per finding. Its docstring is its page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from inspect import cleandoc
+from typing import Protocol
+
+from osimlite.document.source import Position, Source
+from osimlite.document.survey import survey
+from osimlite.lint.config import Config
+from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
+from osimlite.lint.subject import Subject
+from osimlite.schema.base import Object
+from osimlite.schema.model import Model
+
+ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
+
+FAMILIES = {
+    "0": "text",
+    "1": "structure",
+    "2": "values",
+    "3": "references",
+    "4": "topology",
+    "5": "physics",
+    "6": "muscles",
+    "7": "files",
+}
+"""The families of rules by the first digit of their codes."""
+
+_MODULES = ("text", "structure", "values", "references", "names", "contact", "topology", "physics", "files")
+
+
+class Found(Protocol):
+    """What a rule calls for each finding."""
+
+    def __call__(
+        self,
+        message: str,
+        item: Object | None = None,
+        *,
+        tag: str | None = None,
+        word: str | None = None,
+        nth: int = 0,
+        attribute: str | None = None,
+        number: int | None = None,
+        at: Position | None = None,
+        severity: Severity | None = None,
+        suggestion: str | None = None,
+        fix: Fix | None = None,
+    ) -> None:
+        """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`."""
+
+
+Check = Callable[[Subject, Found], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One registered rule."""
+
+    code: str
+    name: str
+    severity: Severity
+    check: Check
+
+    @property
+    def family(self) -> str:
+        """The family the code belongs to."""
+        return FAMILIES[self.code[4]]
+
+    @property
+    def page(self) -> str:
+        """The docstring: what it does, why it is bad, an example and the same mended."""
+        return cleandoc(self.check.__doc__ or "")
+
+    @property
+    def summary(self) -> str:
+        """The first line of the page."""
+        return self.page.partition("\n")[0].rstrip(".")
+
+    def matches(self, word: str) -> bool:
+        """Whether `word` is this rule's code, the beginning of it, its name or its family."""
+        return bool(word) and (self.code.startswith(word.upper()) or word in (self.name, self.family, "ALL"))
+
+
+_RULES: dict[str, Rule] = {}
+
+
+def rule(code: str, name: str, *, severity: Severity) -> Callable[[Check], Check]:
+    """Register a function as the rule `code`."""
+
+    def register(check: Check) -> Check:
+        if code in _RULES or any(known.name == name for known in _RULES.values()):
+            raise ValueError(f"rule {code} {name} is registered twice")
+        _RULES[code] = Rule(code, name, severity, check)
+        return check
+
+    return register
+
+
+@cache
+def all_rules() -> tuple[Rule, ...]:
+    """Every rule, by code."""
+    for module in _MODULES:
+        import_module(f"osimlite.lint.rules.{module}")
+    return tuple(_RULES[code] for code in sorted(_RULES))
+
+
+def check_source(source: Source, config: Config | None = None) -> Report:
+    """Check a text."""
+    return run(Subject(survey(source), config))
+
+
+def check_model(model: Model, config: Config | None = None) -> Report:
+    """Check a model made in Python."""
+    return run(Subject(model, config))
+
+
+def run(subject: Subject) -> Report:
+    """Run every rule that is wanted, and return all findings sorted by place."""
+    findings: list[Finding] = []
+    for known in all_rules():
+        if subject.config.wants(known) and _applies(known, subject):
+            known.check(subject, _collector(known, subject, findings))
+    if subject.sure_until is not None:
+        limit = subject.sure_until
+        findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
+    unique = list(dict.fromkeys(findings))
+    unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
+    report = Report(unique)
+    if unique and subject.source is not None and subject.source.file is not None:
+        report.texts[subject.source.file] = subject.source.text
+    return report
+
+
+def _applies(known: Rule, subject: Subject) -> bool:
+    if known.code[4] == "0":
+        return subject.source is not None
+    if subject.model is None:
+        return False
+    # Of a text with a syntax error only what is said in one place can be judged.
+    return subject.sure_until is None or known.code[4] in "12"
+
+
+def _collector(known: Rule, subject: Subject, findings: list[Finding]) -> Found:
+    def found(
+        message: str,
+        item: Object | None = None,
+        *,
+        tag: str | None = None,
+        word: str | None = None,
+        nth: int = 0,
+        attribute: str | None = None,
+        number: int | None = None,
+        at: Position | None = None,
+        severity: Severity | None = None,
+        suggestion: str | None = None,
+        fix: Fix | None = None,
+    ) -> None:
+        if at is None and (item is not None or number is not None):
+            at = subject.position(item, tag=tag, word=word, nth=nth, attribute=attribute, number=number)
+        line, column, length = at if at is not None else (None, None, 1)
+        findings.append(
+            Finding(
+                known.code,
+                known.name,
+                subject.config.severity_of(known, severity or known.severity),
+                message,
+                subject.file,
+                line,
+                column,
+                max(1, length),
+                subject.path(item),
+                suggestion,
+                fix,
+            )
+        )
+
+    return found

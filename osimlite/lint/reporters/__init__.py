@@ -1,0 +1,34 @@
+"""Formats of a report, one small module each. A reporter turns a report into a text."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from osimlite.errors import OsimliteError
+from osimlite.lint.diagnostic import Report
+
+FORMATS = ("full", "concise", "json", "github", "sarif", "junit")
+
+
+def render(report: Report, name: str = "full", *, colour: bool = False, width: int = 80) -> str:
+    """The report in a format.
+
+    Args:
+        report: what was found.
+        name: one of `FORMATS`.
+        colour: whether to write the colours of a terminal, in the formats that people read.
+        width: columns to keep to, in the full format.
+
+    Raises:
+        OsimliteError: there is no such format.
+    """
+    if name not in FORMATS:
+        from osimlite.text import listed
+
+        raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{name}'")
+    module = import_module(f"osimlite.lint.reporters.{name}")
+    if name == "full":
+        return str(module.render(report, colour=colour, width=width))
+    if name == "concise":
+        return str(module.render(report, colour=colour))
+    return str(module.render(report))

@@ -1,0 +1,72 @@
+"""Each finding with the line it is about and a caret under the exact text."""
+
+from __future__ import annotations
+
+import textwrap
+
+from osimlite.lint.diagnostic import Finding, Report
+from osimlite.lint.reporters.style import painted, summary
+
+_ELLIPSIS = "..."
+
+
+def render(report: Report, *, colour: bool = False, width: int = 80) -> str:
+    """The report as text of at most `width` columns (but for places, which are never broken)."""
+    lines = {file: text.splitlines() for file, text in report.texts.items()}
+    blocks = [_block(finding, lines.get(finding.file or ""), colour, width) for finding in report.findings]
+    return "\n\n".join([*blocks, summary(report, colour)]) + "\n"
+
+
+def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) -> str:
+    head = f"{painted(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
+    place = painted(finding.place, "strong", colour)
+    rows = [f"{place}: {head}" if finding.place else head]
+    rows += [f"  {row}" for row in textwrap.wrap(finding.message, width - 4, break_on_hyphens=False)]
+    if finding.line is not None and lines is not None and finding.line <= len(lines):
+        rows += _snippet(finding, lines[finding.line - 1], colour, width)
+    notes = []
+    if finding.suggestion is not None:
+        notes.append(f"did you mean '{finding.suggestion}'?" if "\n" not in finding.suggestion else finding.suggestion)
+    if finding.component and finding.line is not None:
+        notes.append(f"in {finding.component}")
+    margin = " " * len(str(finding.line or ""))
+    for note in notes:
+        rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(note, 'hint', colour)}")
+    return "\n".join(rows)
+
+
+def _snippet(finding: Finding, line: str, colour: bool, width: int) -> list[str]:
+    """The line and the caret under it; a long line is cut around the caret."""
+    assert finding.line is not None and finding.column is not None
+    start = min(finding.column - 1, len(line))
+    indent = len(line) - len(line.lstrip())
+    # The indentation of a deep file would push everything out of sight.
+    skipped = min(indent, start)
+    shown = line[skipped:].replace("\t", " ").rstrip()
+    start -= skipped
+    length = max(1, min(finding.length, len(shown) - start))
+    margin = len(str(finding.line))
+    room = max(20, width - margin - 3)
+    if len(shown) > room:
+        shown, start, length = _cut(shown, start, length, room)
+    bar = painted("|", "dim", colour)
+    caret = painted("^" * length, finding.severity, colour)
+    return [
+        f"{' ' * margin} {bar}",
+        f"{painted(str(finding.line), 'dim', colour)} {bar} {shown}",
+        f"{' ' * margin} {bar} {' ' * start}{caret}",
+    ]
+
+
+def _cut(shown: str, start: int, length: int, room: int) -> tuple[str, int, int]:
+    """The part of a long line around the caret, with dots where it was cut."""
+    first = 0
+    if start + length > room - len(_ELLIPSIS):
+        first = min(start, max(0, start + min(length, room // 2) - room // 2))
+    part = shown[first:]
+    if first:
+        part = _ELLIPSIS + part[len(_ELLIPSIS) :] if start - first >= len(_ELLIPSIS) else _ELLIPSIS + part
+        start = start - first if start - first >= len(_ELLIPSIS) else start - first + len(_ELLIPSIS)
+    if len(part) > room:
+        part = part[: room - len(_ELLIPSIS)] + _ELLIPSIS
+    return part, start, max(1, min(length, room - start))

@@ -1,0 +1,66 @@
+"""SARIF 2.1.0, the exchange format of static analysis tools (OASIS standard)."""
+
+from __future__ import annotations
+
+from json import dumps
+from pathlib import PurePath
+from typing import Any
+from urllib.parse import quote
+
+from osimlite import __version__
+from osimlite.lint.diagnostic import Finding, Report, Severity
+from osimlite.lint.engine import Rule, all_rules
+
+_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
+
+
+def render(report: Report) -> str:
+    """One run with the rules that were broken and a result for each finding."""
+    broken = [rule for rule in all_rules() if rule.code in report.codes]
+    places = {rule.code: index for index, rule in enumerate(broken)}
+    driver = {"name": "osimlite", "version": __version__, "rules": [_rule(rule) for rule in broken]}
+    run = {
+        "tool": {"driver": driver},
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(finding, places[finding.code]) for finding in report.findings],
+    }
+    return dumps({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False) + "\n"
+
+
+def _rule(rule: Rule) -> dict[str, Any]:
+    return {
+        "id": rule.code,
+        "name": "".join(word.capitalize() for word in rule.name.split("-")),
+        "shortDescription": {"text": rule.summary},
+        "help": {"text": rule.page, "markdown": rule.page},
+        "defaultConfiguration": {"level": _LEVELS[rule.severity]},
+        "properties": {"category": rule.family},
+    }
+
+
+def _result(finding: Finding, index: int) -> dict[str, Any]:
+    result: dict[str, Any] = {
+        "ruleId": finding.code,
+        "ruleIndex": index,
+        "level": _LEVELS[finding.severity],
+        "message": {"text": finding.message},
+    }
+    location: dict[str, Any] = {}
+    if finding.file is not None:
+        path = PurePath(finding.file)
+        uri = path.as_uri() if path.is_absolute() else quote(path.as_posix())
+        location["physicalLocation"] = {"artifactLocation": {"uri": uri}}
+        if finding.line is not None and finding.column is not None:
+            location["physicalLocation"]["region"] = {
+                "startLine": finding.line,
+                "startColumn": finding.column,
+                "endColumn": finding.column + finding.length,
+            }
+    if finding.component:
+        location["logicalLocations"] = [{"fullyQualifiedName": finding.component}]
+    if location:
+        result["locations"] = [location]
+    if finding.suggestion is not None:
+        result["properties"] = {"suggestion": finding.suggestion}
+    return result

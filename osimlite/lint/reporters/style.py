@@ -1,0 +1,40 @@
+"""Colours of a terminal and the closing line, shared by the formats that people read."""
+
+from __future__ import annotations
+
+from osimlite.lint.diagnostic import Report, Severity
+
+_CODES = {
+    Severity.ERROR: "1;31",
+    Severity.WARNING: "1;33",
+    Severity.INFO: "1;34",
+    "strong": "1",
+    "dim": "2",
+    "good": "32",
+    "hint": "36",
+}
+
+
+def painted(text: str, style: Severity | str, colour: bool) -> str:
+    """The text in a colour, or as it is."""
+    return f"\033[{_CODES[style]}m{text}\033[0m" if colour and text else text
+
+
+def summary(report: Report, colour: bool = False) -> str:
+    """``3 errors, 1 warning in 2 files``."""
+    counts = (
+        (Severity.ERROR, len(report.errors)),
+        (Severity.WARNING, len(report.warnings)),
+        (Severity.INFO, len(report.infos)),
+    )
+    parts = [
+        painted(f"{count} {_plural(severity.value, count)}", severity, colour) for severity, count in counts if count
+    ]
+    models = f"{report.checked} {_plural('model', report.checked)}"
+    if not parts:
+        return painted(f"Nothing found in {models}.", "good", colour)
+    return f"Found {', '.join(parts)} in {models}."
+
+
+def _plural(noun: str, count: int) -> str:
+    return noun if count == 1 or noun == "info" else f"{noun}s"

@@ -1,0 +1,192 @@
+"""OSIM32x: lists of contact geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.rules.references import broken_references
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called
+from osimlite.schema.base import Component, Object, reference_specs
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.fields import Reference
+from osimlite.schema.forces import Force
+from osimlite.schema.tree import Use
+
+
+@rule("OSIM321", "contact-without-partner", severity=WARNING)
+def contact_without_partner(subject: Subject, found: Found) -> None:
+    """A contact force has fewer than two surfaces.
+
+    ## What it does
+    Reports contact forces that list no contact geometry, or only one, over all their parameter sets together.
+
+    ## Why is this bad
+    Such a force never acts, and OpenSim does not mention it.
+
+    ## Example
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>heel</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+    """
+    for force, holders, uses in _contact_lists(subject):
+        if len(uses) > 1:
+            continue
+        listed_one = f"one surface, '{_text(uses[0])}'" if uses else "no contact geometry"
+        message = f"{called(force)} lists {listed_one}: it never acts"
+        if holders:
+            found(message, holders[0], tag="geometry")
+        else:
+            found(message, force)
+
+
+@rule("OSIM322", "contact-listed-twice", severity=ERROR)
+def contact_listed_twice(subject: Subject, found: Found) -> None:
+    """A contact force lists the same surface twice.
+
+    ## What it does
+    Reports every mention of a contact geometry after the first within one force.
+
+    ## Why is this bad
+    OpenSim counts the surface twice, and the force is doubled.
+
+    ## Example
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>heel heel floor</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+    """
+    tree = subject.tree
+    for force, _, uses in _contact_lists(subject):
+        seen: set[int] = set()
+        words: dict[tuple[int, str], int] = {}
+        for use in uses:
+            target = tree.resolve(use).target
+            nth = words.get((id(use.holder), _text(use)), 0)
+            words[id(use.holder), _text(use)] = nth + 1
+            if target is None:
+                continue
+            if id(target) in seen:
+                found(
+                    f"{called(force)} lists '{target.name}' again: OpenSim counts it twice and the force is doubled",
+                    use.holder,
+                    tag=use.spec.tag,
+                    word=_text(use),
+                    nth=nth,
+                )
+            seen.add(id(target))
+
+
+@rule("OSIM323", "unused-contact-geometry", severity=INFO)
+def unused_contact_geometry(subject: Subject, found: Found) -> None:
+    """A contact geometry is used by nothing.
+
+    ## What it does
+    Reports contact geometry that no force and no path names.
+
+    ## Why is this bad
+    It has no effect; often a force was meant to list it.
+
+    ## Example
+    ```xml
+    <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
+    ```
+
+    ## Use instead
+    ```xml
+    <HuntCrossleyForce name="toe_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>toe floor</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
+    ```
+    """
+    surfaces = list(subject.each(ContactGeometry))
+    if not surfaces or subject.has_unknown:
+        return
+    if any(broken.use.reference.target in _SURFACES for broken in broken_references(subject)):
+        # A misspelt name may mean any of them.
+        return
+    if any(len(uses) < 2 for _, _, uses in _contact_lists(subject)):
+        return
+    tree = subject.tree
+    used = {id(tree.resolve(use).target) for use in tree.uses() if use.reference.target in _SURFACES}
+    for surface in surfaces:
+        if id(surface) not in used:
+            found(f"no force uses {called(surface)}", surface, attribute="name")
+
+
+_SURFACES = {"ContactGeometry", "ContactSphere", "ContactHalfSpace"}
+
+
+def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], list[Use]]]:
+    """Each force that works through lists of contact geometry: the force, its parameter objects, what they name."""
+    forces: dict[int, tuple[Component, list[Object], list[Use]]] = {}
+    for force in subject.each(Force):
+        parameters = getattr(force, "contact_parameters", None)
+        if parameters is not None:
+            forces[id(force)] = (force, list(parameters.objects), [])
+    if not forces:
+        return
+    for use in subject.tree.uses():
+        if id(use.owner) in forces and use.reference.rule == "contactgeometry-path-or-name":
+            forces[id(use.owner)][2].append(use)
+    for owner, holders, uses in forces.values():
+        yield owner, [holder for holder in holders if _lists_contacts(holder)], uses
+
+
+def _lists_contacts(holder: Object) -> bool:
+    return any(
+        isinstance(s.kind, Reference) and s.kind.target == "ContactGeometry" for s in reference_specs(type(holder))
+    )
+
+
+def _text(use: Use) -> str:
+    return use.value if isinstance(use.value, str) else use.value.name

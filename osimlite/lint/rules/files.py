@@ -1,0 +1,117 @@
+"""OSIM7xx: files that a model needs beside its own."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from osimlite.lint.engine import INFO, WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called
+from osimlite.schema.base import Object
+from osimlite.schema.contact import ContactMesh
+from osimlite.schema.geometry import Mesh
+from osimlite.text import listed
+
+
+@rule("OSIM701", "missing-mesh", severity=WARNING)
+def missing_mesh(subject: Subject, found: Found) -> None:
+    """A mesh file is not there.
+
+    ## What it does
+    Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry` beside it, and in
+    the folders that the configuration names. A file of the same name in other letter case is pointed out.
+
+    ## Why is this bad
+    OpenSim draws nothing for such a mesh. A contact mesh that is missing makes it refuse the model. A name in the wrong
+    case is found on Windows and macOS and missing on Linux.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <attached_geometry> <Mesh name="bone"> <mesh_file>no_such_bone.vtp</mesh_file> </Mesh>
+        </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <attached_geometry> <Cylinder name="bone"> <radius>0.02</radius> <half_height>0.2</half_height>
+        </Cylinder> </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    folder = subject.folder
+    if folder is None:
+        return
+    items: list[tuple[Object, str, str]] = [(mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)]
+    items += [(mesh, "filename", mesh.filename) for mesh in subject.each(ContactMesh)]
+    places = [folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths)]
+    for item, tag, name in items:
+        if not name:
+            found(f"{called(item)} names no file", item, tag=tag)
+            continue
+        if any(_is_file(place, name) for place in places):
+            continue
+        twin = next((twin for place in places if (twin := _in_other_case(place, name)) is not None), None)
+        tried = listed(dict.fromkeys(str(place) for place in places))
+        message = f"the file '{name}' of {called(item)} is not there; looked in {tried}"
+        if twin is not None:
+            message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
+        found(message, item, tag=tag, suggestion=twin)
+
+
+@rule("OSIM702", "included-file", severity=INFO)
+def included_file(subject: Subject, found: Found) -> None:
+    """An object is kept in another file.
+
+    ## What it does
+    Reports `file=` on an object: for information, or as a warning if that file is not there.
+
+    ## Why is this bad
+    OpenSim reads the object from the other file, and writes that file anew when it saves the model; if it is missing,
+    it goes on with an empty object. What is in it is not checked here.
+
+    ## Example
+    ```xml
+    <MarkerSet file="markers.xml" />
+    ```
+
+    ## Use instead
+    ```xml
+    <MarkerSet>
+        <objects>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+        </objects>
+    </MarkerSet>
+    ```
+    """
+    for note in subject.notes:
+        if note.kind != "include" or note.owner is None:
+            continue
+        there = subject.folder is None or (subject.folder / str(note.value)).is_file()
+        state = "is read from" if there else "should be read from"
+        found(
+            f"{called(note.owner)} {state} '{note.value}'" + ("" if there else ", which is not there: it stays empty"),
+            note.owner,
+            number=note.number,
+            attribute="file",
+            severity=None if there else WARNING,
+        )
+
+
+def _is_file(place: Path, name: str) -> bool:
+    try:
+        return (place / name).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _in_other_case(place: Path, name: str) -> str | None:
+    path = Path(name)
+    return _lowered(place / path.parent).get(path.name.lower())
+
+
+@cache
+def _lowered(folder: Path) -> dict[str, str]:
+    try:
+        return {entry.name.lower(): entry.name for entry in folder.iterdir()}
+    except OSError:
+        return {}

@@ -1,0 +1,174 @@
+"""OSIM31x: what components are called."""
+
+from __future__ import annotations
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.rules.references import broken_references
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, times
+from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.joints import Joint
+from osimlite.schema.model import Model
+from osimlite.schema.sets import ModelComponentSet
+from osimlite.schema.tree import ILLEGAL_CHARACTERS
+from osimlite.text import listed
+
+
+@rule("OSIM311", "duplicate-name", severity=ERROR)
+def duplicate_name(subject: Subject, found: Found) -> None:
+    """Two components beside each other have the same name.
+
+    ## What it does
+    Reports the second of two siblings with one name, with the name OpenSim gives it and with those who name it.
+
+    ## Why is this bad
+    OpenSim renames the second and adds a number. Everything that was meant to name it leads to the first: both feet
+    then touch the ground with the same sphere.
+
+    ## Example
+    ```xml
+    <MarkerSet>
+        <objects>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Marker>
+        </objects>
+    </MarkerSet>
+    ```
+
+    ## Use instead
+    ```xml
+    <MarkerSet>
+        <objects>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+            <Marker name="trochanter"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Marker>
+        </objects>
+    </MarkerSet>
+    ```
+    """
+    tree = subject.tree
+    for renamed in tree.renamed:
+        item = renamed.component
+        if not item.name or isinstance(item, Unknown) or (item._index is None and subject.source is not None):
+            continue
+        users = _who_names(subject, renamed.first)
+        message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"
+        if users:
+            message += f", and {listed(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the first"
+        found(message, item, attribute="name", suggestion=None)
+
+
+@rule("OSIM312", "illegal-name", severity=ERROR)
+def illegal_name(subject: Subject, found: Found) -> None:
+    """The name of a component has a character that names cannot have.
+
+    ## What it does
+    Reports white space, `/`, `\\`, `*` and `+` in the names of components.
+
+    ## Why is this bad
+    Names are the parts of paths; OpenSim refuses to load the file.
+
+    ## Example
+    ```xml
+    <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="right_asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+    """
+    for component in subject.tree.components:
+        bad = [character for character in dict.fromkeys(component.name) if character in ILLEGAL_CHARACTERS]
+        if bad and not isinstance(component, ModelComponentSet):
+            shown = listed(["white space" if character.isspace() else f"'{character}'" for character in bad])
+            better = "".join("_" if character in bad else character for character in component.name)
+            found(
+                f"the name of {called(component)} has {shown} in it: OpenSim refuses to load the file",
+                component,
+                attribute="name",
+                suggestion=better,
+            )
+
+
+@rule("OSIM313", "missing-name", severity=WARNING)
+def missing_name(subject: Subject, found: Found) -> None:
+    """A component that others name by its name has none.
+
+    ## What it does
+    Reports members of sets, and coordinates, without a name or with an empty one. It is an error if something names a
+    component that is missing, which may be this one.
+
+    ## Why is this bad
+    OpenSim calls such a component after its class, in lower case. Nothing can name it by what the author had in mind,
+    and the columns of results are called `body` or `pinjoint`.
+
+    ## Example
+    ```xml
+    <Marker> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+    """
+    tree = subject.tree
+    for component in tree.components:
+        if (
+            component.name
+            or isinstance(component, (Model, ModelComponentSet))
+            or not _should_have_name(subject, component)
+        ):
+            continue
+        wanted = _wanted_names(subject, component)
+        path = tree.path_of(component) or ""
+        message = f"this {called(component)} has no name; OpenSim calls it '{path.rpartition('/')[2]}'"
+        if wanted:
+            count = times(len([b for b in broken_references(subject) if _last(b.text) == wanted[0]]), "reference")
+            message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
+        found(
+            message,
+            component,
+            attribute="name",
+            severity=ERROR if wanted else None,
+            suggestion=wanted[0] if len(wanted) == 1 else None,
+        )
+
+
+def _should_have_name(subject: Subject, component: Component) -> bool:
+    if subject.source is not None and component._index is None:
+        return False
+    parent = subject.tree.parent_of(component)
+    if isinstance(component, Coordinate):
+        return isinstance(parent, Joint)
+    return isinstance(parent, ModelComponentSet)
+
+
+def _wanted_names(subject: Subject, component: Component) -> list[str]:
+    """Names that are missing and that a component of this class would bear."""
+    names: dict[str, None] = {}
+    for broken in broken_references(subject):
+        use = broken.use
+        if broken.why != "missing" or not any(
+            base.__name__ == use.reference.target for base in type(component).__mro__
+        ):
+            continue
+        name = _last(broken.text)
+        beside = f"{subject.path(component).rpartition('/')[0]}/{name}"
+        if "/" not in broken.text or broken.text == beside:
+            names[name] = None
+    return list(names)
+
+
+def _last(text: str) -> str:
+    return text.rpartition("/")[2]
+
+
+def _who_names(subject: Subject, target: Object) -> list[str]:
+    """Who holds a reference that leads to a component."""
+    tree = subject.tree
+    holders = [
+        called(use.owner) for use in tree.uses() if use.reference.rule != "file" and tree.resolve(use).target is target
+    ]
+    return list(dict.fromkeys(holders))

@@ -1,0 +1,531 @@
+"""OSIM5xx: masses, inertias, ranges and units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, quantity
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyContactParameters
+from osimlite.schema.frames import Body
+from osimlite.schema.joints import Joint
+from osimlite.schema.tree import Use
+
+_SLACK = 1e-6
+"""Relative excess below which an inertia counts as on the edge of what is possible; files have rounded numbers."""
+
+
+@rule("OSIM501", "missing-mass", severity=ERROR)
+def missing_mass(subject: Subject, found: Found) -> None:
+    """A body has no mass.
+
+    ## What it does
+    Reports bodies whose mass is not given.
+
+    ## Why is this bad
+    The default is NaN, so that nobody can forget it: OpenSim refuses to load the file.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    mass = Body.field_specs()["mass"]
+    for body in subject.each(Body):
+        if body.mass != body.mass and "mass" not in body.model_fields_set and not subject.noted(body, mass):
+            found(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
+
+
+@rule("OSIM502", "impossible-inertia", severity=WARNING)
+def impossible_inertia(subject: Subject, found: Found) -> None:
+    """No distribution of mass has this inertia.
+
+    ## What it does
+    Reports inertias of which one principal moment is larger than the other two together, and by how much.
+
+    ## Why is this bad
+    Such a body cannot exist. OpenSim computes with it all the same, and accelerations about that axis are too small.
+    Often two numbers are swapped, or the inertia was scaled axis by axis.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    for body, moments in _inertias(subject):
+        small, middle, large = moments
+        if small >= 0 and large > (small + middle) * (1 + _SLACK):
+            excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
+            found(
+                f"the inertia of {called(body)} is impossible: its largest principal moment, {quantity(large)}, is "
+                f"more than the sum of the others, {quantity(small + middle)}"
+                + (f", by {excess:.3g} %" if math.isfinite(excess) else ""),
+                body,
+                tag="inertia",
+            )
+
+
+@rule("OSIM503", "inertia-not-positive", severity=WARNING)
+def inertia_not_positive(subject: Subject, found: Found) -> None:
+    """An inertia has a negative principal moment.
+
+    ## What it does
+    Reports inertias that are negative about some axis: a negative moment, or products that are too large for the
+    moments.
+
+    ## Why is this bad
+    A torque about that axis turns the body the other way. OpenSim does not check, and the simulation blows up or
+    quietly shows nonsense.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.003 0 0</inertia> </Body>
+    ```
+    """
+    for body, moments in _inertias(subject):
+        if moments[0] < -_SLACK * max(map(abs, moments)):
+            cause = "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
+            found(
+                f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}",
+                body,
+                tag="inertia",
+            )
+
+
+@rule("OSIM504", "no-inertia", severity=WARNING)
+def no_inertia(subject: Subject, found: Found) -> None:
+    """A body has mass and no inertia.
+
+    ## What it does
+    Reports bodies with a mass whose inertia is zero or not given.
+
+    ## Why is this bad
+    All the mass is then in one point. A joint that turns about this point has no resistance at all, and the integrator
+    takes ever smaller steps.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    inertia = Body.field_specs()["inertia"]
+    for body in subject.each(Body):
+        if body.mass > 0 and not any(body.inertia) and not subject.noted(body, inertia):
+            state = "is zero" if "inertia" in body.model_fields_set else "is not given"
+            found(
+                f"the inertia of {called(body)} {state} though its mass is {quantity(body.mass, 'kg')}",
+                body,
+                tag="inertia",
+            )
+
+
+@rule("OSIM505", "strange-gravity", severity=WARNING)
+def strange_gravity(subject: Subject, found: Found) -> None:
+    """Gravity is far from that of the Earth.
+
+    ## What it does
+    Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that points up along Y.
+
+    ## Why is this bad
+    OpenSim works in metres, kilograms and seconds, with Y up. Lengths in millimetres make a model that falls a thousand
+    times too fast.
+
+    ## Example
+    ```xml
+    <gravity>0 -9806.65 0</gravity>
+    ```
+
+    ## Use instead
+    ```xml
+    <gravity>0 -9.80665 0</gravity>
+    ```
+    """
+    model = subject.model
+    assert model is not None
+    size = math.sqrt(sum(part * part for part in model.gravity))
+    if not math.isfinite(size):
+        return
+    if size > 30:
+        unit = "; in millimetres?" if 9000 < size < 11000 else ""
+        found(f"gravity is {quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
+    elif model.gravity[1] > 1e-9 * size and model.gravity[1] > 0.9 * size:
+        found("gravity points up: Y is the upward axis in OpenSim", model, tag="gravity")
+
+
+@rule("OSIM506", "friction-order", severity=WARNING)
+def friction_order(subject: Subject, found: Found) -> None:
+    """Static friction is smaller than dynamic friction.
+
+    ## What it does
+    Reports contact materials whose static coefficient is below the dynamic one.
+
+    ## Why is this bad
+    No material resists sliding more than sticking; usually the two numbers are swapped.
+
+    ## Example
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+                    <static_friction>0.4</static_friction> <dynamic_friction>0.8</dynamic_friction>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+                    <static_friction>0.8</static_friction> <dynamic_friction>0.4</dynamic_friction>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+    """
+    for material in subject.each(HuntCrossleyContactParameters):
+        if 0 <= material.static_friction < material.dynamic_friction:
+            found(
+                f"static friction of {subject.called(material)}, {quantity(material.static_friction)}, is smaller than "
+                f"dynamic friction, {quantity(material.dynamic_friction)}",
+                material,
+                tag="static_friction",
+            )
+
+
+@rule("OSIM507", "limits-swapped", severity=WARNING)
+def limits_swapped(subject: Subject, found: Found) -> None:
+    """The upper limit of a limit force lies below its lower limit.
+
+    ## What it does
+    Reports limit forces whose upper limit is smaller than the lower one.
+
+    ## Why is this bad
+    Between the two both springs push against each other, at every pose of the joint that was meant to be free.
+
+    ## Example
+    ```xml
+    <CoordinateLimitForce name="stop">
+        <coordinate>hip_flexion</coordinate> <upper_limit>-30</upper_limit> <lower_limit>90</lower_limit>
+    </CoordinateLimitForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <CoordinateLimitForce name="stop">
+        <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
+    </CoordinateLimitForce>
+    ```
+    """
+    for force in subject.each(CoordinateLimitForce):
+        if force.upper_limit < force.lower_limit:
+            found(
+                f"the upper limit of {called(force)}, {quantity(force.upper_limit)}, is below the lower limit, "
+                f"{quantity(force.lower_limit)}: both act at once",
+                force,
+                tag="upper_limit",
+            )
+
+
+@rule("OSIM508", "limit-outside-range", severity=INFO)
+def limit_outside_range(subject: Subject, found: Found) -> None:
+    """A limit force begins beyond the range of its coordinate.
+
+    ## What it does
+    Reports limits that lie outside the range of the coordinate by more than the transition.
+
+    ## Why is this bad
+    The range does not stop the motion, the limit force does; the model then moves further than its range says. Note
+    that limits are in degrees and ranges in radians.
+
+    ## Example
+    ```xml
+    <CoordinateLimitForce name="stop">
+        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-170</lower_limit>
+    </CoordinateLimitForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <CoordinateLimitForce name="stop">
+        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-120</lower_limit>
+    </CoordinateLimitForce>
+    ```
+    """
+    for force in subject.each(CoordinateLimitForce):
+        coordinate, motion = _limited(subject, force)
+        if coordinate is None or motion is None or "range" not in coordinate.model_fields_set:
+            continue
+        scale, unit = (180 / math.pi, "deg") if motion == "rotational" else (1.0, "m")
+        low, high = sorted(bound * scale for bound in coordinate.range)
+        slack = abs(force.transition) + 1e-6
+        for tag, limit, outside in (
+            ("upper_limit", force.upper_limit, force.upper_limit > high + slack),
+            ("lower_limit", force.lower_limit, force.lower_limit < low - slack),
+        ):
+            if outside:
+                found(
+                    f"{tag} of {called(force)} is {quantity(limit, unit)}, beyond the range of '{coordinate.name}' "
+                    f"({quantity(low)} to {quantity(high, unit)})",
+                    force,
+                    tag=tag,
+                )
+
+
+@rule("OSIM511", "inverted-range", severity=WARNING)
+def inverted_range(subject: Subject, found: Found) -> None:
+    """The range of a coordinate ends before it begins.
+
+    ## What it does
+    Reports ranges whose first number is larger than the second; an error if the coordinate is clamped.
+
+    ## Why is this bad
+    OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders and solvers that
+    use the range misbehave.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>0 -2.1</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>-2.1 0</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        low, high = coordinate.range
+        if low > high:
+            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
+            found(
+                f"the range of {called(coordinate)} runs from {quantity(low)} down to {quantity(high)}{refused}",
+                coordinate,
+                tag="range",
+                severity=ERROR if coordinate.clamped else None,
+                suggestion=f"{quantity(high)} {quantity(low)}",
+            )
+
+
+@rule("OSIM512", "default-outside-range", severity=WARNING)
+def default_outside_range(subject: Subject, found: Found) -> None:
+    """The default value of a coordinate lies outside its range.
+
+    ## What it does
+    Reports such defaults; an error if the coordinate is clamped.
+
+    ## Why is this bad
+    OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose that its own range
+    rules out; often the range or the default is in degrees.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        low, high = coordinate.range
+        slack = 1e-9 * max(abs(low), abs(high), 1.0) if math.isfinite(low) and math.isfinite(high) else 0.0
+        if low <= high and not low - slack <= coordinate.default_value <= high + slack:
+            if not math.isfinite(coordinate.default_value):
+                continue
+            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
+            found(
+                f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is outside its "
+                f"range, {quantity(low)} to {quantity(high)}{refused}",
+                coordinate,
+                tag="default_value",
+                severity=ERROR if coordinate.clamped else None,
+            )
+
+
+@rule("OSIM513", "prescribed-without-function", severity=ERROR)
+def prescribed_without_function(subject: Subject, found: Found) -> None:
+    """A coordinate is prescribed and has no function.
+
+    ## What it does
+    Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
+
+    ## Why is this bad
+    OpenSim switches the prescription off in silence, and the coordinate moves freely.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <prescribed>true</prescribed> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        if coordinate.prescribed and coordinate.prescribed_function is None:
+            found(
+                f"{called(coordinate)} is prescribed without a prescribed_function: OpenSim lets it move freely",
+                coordinate,
+                tag="prescribed",
+            )
+
+
+@rule("OSIM514", "degrees-for-radians", severity=WARNING)
+def degrees_for_radians(subject: Subject, found: Found) -> None:
+    """An angle looks as if it were in degrees.
+
+    ## What it does
+    Reports rotational coordinates whose default value or range goes beyond five turns, in radians.
+
+    ## Why is this bad
+    Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is more than fourteen
+    turns.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>-120 0</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>-2.0943951 0</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+    """
+    turns = 10 * math.pi
+    for joint in subject.each(Joint):
+        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
+            if motion != "rotational":
+                continue
+            largest = max((abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0)
+            # 99999.9 and the like stand for "no bound".
+            if turns < largest < 1000:
+                found(
+                    f"the range of {called(coordinate)}, {quantity(coordinate.range)}, is in radians; in degrees?",
+                    coordinate,
+                    tag="range",
+                    suggestion=" ".join(f"{math.radians(bound):.6g}" for bound in coordinate.range),
+                )
+            if turns < abs(coordinate.default_value) < math.inf:
+                found(
+                    f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is in radians; "
+                    "in degrees?",
+                    coordinate,
+                    tag="default_value",
+                    suggestion=f"{math.radians(coordinate.default_value):.6g}",
+                )
+
+
+def _inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:
+    """Each body with a finite inertia that is not zero, and its principal moments in rising order."""
+    return [
+        (body, principal_moments(body.inertia))
+        for body in subject.each(Body)
+        if any(body.inertia) and all(map(math.isfinite, body.inertia))
+    ]
+
+
+def principal_moments(inertia: Sequence[float]) -> tuple[float, float, float]:
+    """Eigenvalues, in rising order, of a symmetric matrix given as xx yy zz xy xz yz.
+
+    The roots of the characteristic polynomial in trigonometric form (O. K. Smith, Commun. ACM 4, 168, 1961).
+    """
+    xx, yy, zz, xy, xz, yz = inertia
+    off = xy * xy + xz * xz + yz * yz
+    if off == 0:
+        low, middle, high = sorted((xx, yy, zz))
+        return low, middle, high
+    mean = (xx + yy + zz) / 3
+    spread = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * off) / 6)
+    a, b, c = (xx - mean) / spread, (yy - mean) / spread, (zz - mean) / spread
+    d, e, f = xy / spread, xz / spread, yz / spread
+    half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / 2
+    angle = math.acos(max(-1.0, min(1.0, half))) / 3
+    high = mean + 2 * spread * math.cos(angle)
+    low = mean + 2 * spread * math.cos(angle + 2 * math.pi / 3)
+    return low, 3 * mean - high - low, high
+
+
+def _limited(subject: Subject, force: CoordinateLimitForce) -> tuple[Coordinate | None, str | None]:
+    """The coordinate a limit force acts on, and the motion it stands for (None if the joint's functions decide)."""
+    spec = CoordinateLimitForce.field_specs()["coordinate"]
+    coordinate = subject.tree.resolve(Use(force, force, spec, force.coordinate)).target
+    if not isinstance(coordinate, Coordinate):
+        return None, None
+    joint = subject.tree.parent_of(coordinate)
+    if not isinstance(joint, Joint) or joint.motion_types is None:
+        return coordinate, None
+    place = joint.coordinates.index(coordinate)
+    return coordinate, joint.motion_types[place] if place < len(joint.motion_types) else None

@@ -1,0 +1,359 @@
+"""OSIM30x: one component names another that is not there, or not in the way its property wants it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, cast
+
+from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import a, called
+from osimlite.schema.base import Component, Object, Unknown, reference_specs
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.fields import Reference
+from osimlite.schema.geometry import Geometry
+from osimlite.schema.tree import Resolution, Use, is_a, normalised
+from osimlite.text import listed, nearest
+
+
+@rule("OSIM301", "unresolved-reference", severity=ERROR)
+def unresolved_reference(subject: Subject, found: Found) -> None:
+    """A component names another component that does not exist.
+
+    ## What it does
+    Follows every reference by OpenSim's own rule for that property and reports those that lead nowhere, with the force,
+    joint or other component that holds them and the nearest name that exists.
+
+    ## Why is this bad
+    OpenSim refuses the model when it is connected, and its message names neither the line nor, for a contact, the
+    force. A group that names a missing member loses it in silence.
+
+    ## Example
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>floor heal</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <HuntCrossleyForce name="foot_ground">
+        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+            <objects>
+                <HuntCrossleyForce::ContactParameters>
+                    <geometry>floor heel</geometry> <stiffness>1e6</stiffness>
+                </HuntCrossleyForce::ContactParameters>
+            </objects>
+        </HuntCrossleyForce::ContactParametersSet>
+    </HuntCrossleyForce>
+    ```
+    """
+    for broken in _broken(subject, "missing"):
+        use = broken.use
+        text = broken.text
+        message = f"{_names(subject, use)} '{text}', but there is no such {use.reference.target}"
+        if broken.hint == "comma":
+            message += "; the words of a list are separated by blanks, without commas"
+        elif broken.hint == "illegal":
+            message += "; a path has no white space and none of \\ * +"
+        _report(subject, found, broken, message)
+
+
+@rule("OSIM302", "reference-to-wrong-type", severity=ERROR)
+def reference_to_wrong_type(subject: Subject, found: Found) -> None:
+    """A reference leads to a component of a class that the property cannot use.
+
+    ## What it does
+    Reports references to something that exists and is of another kind: a joint as the parent frame, a body where a
+    contact geometry belongs.
+
+    ## Why is this bad
+    OpenSim says that the component does not exist, and refuses the model.
+
+    ## Example
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/jointset/hip</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+    """
+    for broken in _broken(subject, "wrong-type"):
+        other = broken.other
+        assert other is not None
+        kind = other.class_name if isinstance(other, Unknown) else type(other).tag
+        message = (
+            f"{_names(subject, broken.use)} '{broken.text}', which is {a(kind)}, not {a(broken.use.reference.target)}"
+        )
+        fixed = _contacts_on(subject, other) if broken.use.reference.target == "ContactGeometry" else []
+        if fixed:
+            message += f"; contact geometry fixed to it: {listed(fixed)}"
+        _report(subject, found, broken, message)
+
+
+@rule("OSIM303", "missing-reference", severity=ERROR)
+def missing_reference(subject: Subject, found: Found) -> None:
+    """A property that must name a component names none.
+
+    ## What it does
+    Reports sockets and names that are empty or not given.
+
+    ## Why is this bad
+    OpenSim refuses the model when it is connected.
+
+    ## Example
+    ```xml
+    <Marker name="asis"> <location>0 0 0</location> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>0 0 0</location> </Marker>
+    ```
+    """
+    for broken in _broken(subject, "empty"):
+        use = broken.use
+        given = use.spec.name in use.holder.model_fields_set
+        state = "is empty" if given else "is not given"
+        found(
+            f"{use.spec.tag} of {_holder(subject, use)} {state}; it must name {a(use.reference.target)}",
+            use.holder,
+            tag=use.spec.tag,
+        )
+
+
+@rule("OSIM304", "reference-form", severity=ERROR)
+def reference_form(subject: Subject, found: Found) -> None:
+    """A component is named by its path where a bare name belongs, or by its name where a path belongs.
+
+    ## What it does
+    Reports references that would be right in another form: a bare name in a socket, a path without its leading slash,
+    a path where OpenSim looks a bare name up.
+
+    ## Why is this bad
+    OpenSim does not search. A bare name in a socket means a child of the component itself; a path in
+    `<coordinate>` of a limit force means a coordinate with slashes in its name. It refuses the model.
+
+    ## Example
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+    """
+    for broken in _broken(subject, "form"):
+        wanted = "a bare name" if broken.suggestion and "/" not in broken.suggestion else "a path"
+        if wanted == "a path" and "/" in broken.text and not broken.text.startswith("/"):
+            wanted = "a path that begins with a slash"
+        message = f"{_names(subject, broken.use)} '{broken.text}'; this property wants {wanted}"
+        _report(subject, found, broken, message)
+
+
+@rule("OSIM305", "reference-case", severity=ERROR)
+def reference_case(subject: Subject, found: Found) -> None:
+    """A reference is right but for upper and lower case.
+
+    ## What it does
+    Reports references that lead to a component once case is ignored.
+
+    ## Why is this bad
+    Names are compared exactly; OpenSim refuses the model.
+
+    ## Example
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+    """
+    for broken in _broken(subject, "case"):
+        _report(subject, found, broken, f"{_names(subject, broken.use)} '{broken.text}'; upper and lower case count")
+
+
+class Broken(NamedTuple):
+    """A reference that does not work: why, what it leads to instead, and what would be right."""
+
+    use: Use
+    text: str
+    why: str
+    other: Component | None = None
+    suggestion: str | None = None
+    hint: str = ""
+
+
+def _broken(subject: Subject, why: str) -> Iterator[Broken]:
+    """The broken references of one kind."""
+    return (broken for broken in broken_references(subject) if broken.why == why)
+
+
+def broken_references(subject: Subject) -> list[Broken]:
+    """Every broken reference of the model; they are looked for once."""
+    if "broken references" not in subject.kept:
+        subject.kept["broken references"] = list(_find(subject))
+    return cast("list[Broken]", subject.kept["broken references"])
+
+
+def _find(subject: Subject) -> Iterator[Broken]:
+    tree = subject.tree
+    for use in _uses(subject):
+        resolution = tree.resolve(use)
+        if resolution.failure is None or _overwritten(subject, use):
+            continue
+        value = use.value
+        text = value if isinstance(value, str) else value.name
+        if isinstance(value, str) and (resolution.failure == "empty" or value == "UNASSIGNED"):
+            if use.reference.required and use.position is None:
+                yield Broken(use, text, "empty")
+        elif not _undecided(subject, use, text) and not _special(use, text):
+            yield _explained(subject, use, text, resolution)
+
+
+def _uses(subject: Subject) -> Iterator[Use]:
+    """Every reference, but those that lead nowhere by their nature (files, columns, outputs)."""
+    for use in subject.tree.uses():
+        if use.reference.rule not in ("file", "column", "input", "positional", "point-index"):
+            yield use
+    # An optional reference that OpenSim insists on all the same is not among the uses when it is left out.
+    for cls, items in subject.by_class.items():
+        for spec in reference_specs(cls):
+            kind = spec.kind
+            if isinstance(kind, Reference) and kind.shape == "optional" and kind.required:
+                for item in items:
+                    if getattr(item, spec.name) is None:
+                        yield Use(item, subject.owner(item), spec, "")
+
+
+def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) -> Broken:
+    tree, reference = subject.tree, use.reference
+    stripped = text.strip(",;")
+    if stripped != text and tree.lookup(reference, stripped, use.owner).target is not None:
+        return Broken(use, text, "missing", None, stripped, "comma")
+    right = tree.spellings(use)
+    last = text.rstrip("/").rpartition("/")[2]
+    same_name = [word for word in right if word.rpartition("/")[2] == last]
+    if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
+        return Broken(use, text, "form", None, _closest(text, same_name))
+    other = resolution.found or _elsewhere(subject, use, text)
+    if other is not None and not same_name:
+        return Broken(use, text, "wrong-type", other, nearest(text, right, cutoff=75))
+    if same_name and resolution.failure == "wrong-type":
+        if other is not None and text.startswith("/"):
+            return Broken(use, text, "wrong-type", other, _closest(text, same_name))
+        return Broken(use, text, "form", None, _closest(text, same_name))
+    lowered = [word for word in right if word.lower() == text.lower()]
+    if lowered:
+        return Broken(use, text, "case", None, lowered[0])
+    hint = "illegal" if resolution.failure == "illegal" else ""
+    return Broken(use, text, "missing", None, _nearest_name(text, right), hint)
+
+
+def _same_place(text: str, candidates: list[str]) -> bool:
+    """Whether the text differs from a right one in form alone: parts of the path are left out or added."""
+    if "/" not in text.strip("/") or any("/" not in word for word in candidates):
+        return True
+    return any(word.strip("/") == text.strip("/") for word in candidates)
+
+
+def _nearest_name(text: str, right: list[str]) -> str | None:
+    """The nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
+    whole = nearest(text, right, cutoff=70)
+    last = text.rstrip("/").rpartition("/")[2]
+    by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
+    near = nearest(last, by_last, cutoff=70)
+    if near is None:
+        return whole
+    if whole is not None and whole.rpartition("/")[2] == near:
+        return whole
+    return by_last[near]
+
+
+def _closest(text: str, right: list[str]) -> str:
+    return right[0] if len(right) == 1 else nearest(text, right, cutoff=0) or right[0]
+
+
+def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
+    """A component of another class that goes by this name or path."""
+    tree = subject.tree
+    at_path = tree.by_path.get(normalised("/" + text) or "")
+    if at_path is not None and not is_a(at_path, use.reference.target):
+        return at_path
+    if "/" in text:
+        return None
+    for component in tree.components:
+        if component.name == text and not is_a(component, use.reference.target):
+            return component
+    return None
+
+
+def _overwritten(subject: Subject, use: Use) -> bool:
+    """Whether OpenSim sets this reference itself: the frame of the geometry that a frame draws."""
+    return isinstance(use.holder, Geometry) and use.spec.tag == "socket_frame" and _drawn_by_frame(subject, use.holder)
+
+
+def _drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
+    parent = subject.tree.parent_of(geometry)
+    return parent is not None and is_a(parent, "Frame")
+
+
+def _undecided(subject: Subject, use: Use, text: str) -> bool:
+    """Whether the reference may lead into an object of a class that is not known."""
+    if not subject.has_unknown:
+        return False
+    tree = subject.tree
+    if use.reference.rule not in ("socket", "owner-path", "model-path"):
+        return True
+    if isinstance(use.owner, Unknown):
+        return True
+    base = tree.path_of(use.owner) or "/"
+    path = normalised(text if text.startswith("/") else f"{base}/{text}") or ""
+    while path.count("/") > 1:
+        path = path.rpartition("/")[0]
+        if isinstance(tree.by_path.get(path), Unknown):
+            return True
+    return False
+
+
+def _special(use: Use, text: str) -> bool:
+    """Words that stand for every component: ``all`` in the lists of a probe, ``ALL`` of an old controller."""
+    return use.position == 0 and text.lower() == "all" and use.reference.rule in ("actuator-name", "joint-name")
+
+
+def _names(subject: Subject, use: Use) -> str:
+    """``HuntCrossleyForce 'foot': geometry names``."""
+    return f"{_holder(subject, use)}: {use.spec.tag} names"
+
+
+def _holder(subject: Subject, use: Use) -> str:
+    return called(use.holder) if use.holder.name else subject.called(use.holder)
+
+
+def _contacts_on(subject: Subject, frame: Object) -> list[str]:
+    """Names of the contact geometry that is fixed to a frame."""
+    tree = subject.tree
+    return [
+        use.owner.name
+        for use in tree.uses()
+        if isinstance(use.owner, ContactGeometry) and tree.resolve(use).target is frame
+    ]
+
+
+def _report(subject: Subject, found: Found, broken: Broken, message: str) -> None:
+    use = broken.use
+    value = getattr(use.holder, use.spec.name)
+    before = value[: use.position] if isinstance(value, tuple) and use.position else ()
+    nth = sum(1 for word in before if word == broken.text)
+    found(message, use.holder, tag=use.spec.tag, word=broken.text, nth=nth, suggestion=broken.suggestion)

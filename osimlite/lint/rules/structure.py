@@ -1,0 +1,451 @@
+"""OSIM1xx: elements and attributes that OpenSim passes over, or that stand in the wrong place."""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.document.notes import Note
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import a, called, shown
+from osimlite.schema.base import FieldSpec, Object, field_specs
+from osimlite.schema.fields import Held
+from osimlite.schema.model import Model
+from osimlite.schema.registry import class_for, tags
+from osimlite.text import listed, nearest
+
+
+@rule("OSIM101", "unknown-tag", severity=ERROR)
+def unknown_tag(subject: Subject, found: Found) -> None:
+    """An element is no property of the object it stands in.
+
+    ## What it does
+    Reports child elements that their class does not have: misspelt, in the wrong case, of another class, or of another
+    version. Names the nearest right tag.
+
+    ## Why is this bad
+    OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of a contact is 0, and
+    the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <mass_centre>0 -0.2 0</mass_centre> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <mass_center>0 -0.2 0</mass_center> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    for note, owner in _of_kind(subject, "unknown-tag"):
+        if _other_rule(note, owner):
+            continue
+        specs = field_specs(type(owner))
+        suggestion = nearest(note.word, specs)
+        message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
+        if suggestion is not None:
+            kept = _default_of(specs[suggestion])
+            message += f" and keeps the default of {suggestion}{kept}" if suggestion not in _present(owner) else ""
+        elif note.value is not None:
+            message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
+        else:
+            homes = _homes(note.word)
+            message += f": it is a property of {listed(homes, most=3)}" if homes else ""
+        found(message, owner, number=note.number, suggestion=suggestion)
+
+
+@rule("OSIM102", "unknown-class", severity=ERROR)
+def unknown_class(subject: Subject, found: Found) -> None:
+    """An object is of a class that OpenSim does not have.
+
+    ## What it does
+    Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the wrong case, or of a
+    plug-in. Names the nearest class that may stand there.
+
+    ## Why is this bad
+    In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the object out. Of a
+    plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same.
+
+    ## Example
+    ```xml
+    <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
+    ```
+
+    ## Use instead
+    ```xml
+    <MarkerSet>
+        <objects>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+        </objects>
+    </MarkerSet>
+    ```
+    """
+    for note, owner in _of_kind(subject, "unknown-class"):
+        fate = _fate(owner, note.spec)
+        accepted = _acceptable(note.spec)
+        suggestion = nearest(note.word, accepted) or nearest(note.word, tags(), cutoff=80)
+        message = f"OpenSim has no class '{note.word}' and {fate}"
+        if suggestion is None:
+            message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
+        found(message, owner, number=note.number, suggestion=suggestion)
+
+
+@rule("OSIM103", "wrong-class", severity=ERROR)
+def wrong_class(subject: Subject, found: Found) -> None:
+    """An object of a known class stands where that class may not stand.
+
+    ## What it does
+    Reports members of a set, or of another property, that are of a class the property does not take.
+
+    ## Why is this bad
+    In a set OpenSim refuses to load the file; elsewhere it leaves the object out.
+
+    ## Example
+    ```xml
+    <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
+    ```
+
+    ## Use instead
+    ```xml
+    <MarkerSet>
+        <objects>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+        </objects>
+    </MarkerSet>
+    ```
+    """
+    for note, owner in _of_kind(subject, "wrong-class"):
+        assert note.spec is not None and note.spec.accepts is not None
+        kinds = note.spec.accepts.__name__
+        home = _set_for(note.value)
+        where = f"; it belongs in the {home}" if home else ""
+        holder = f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
+        found(
+            f"{holder} takes {a(kinds)}, not {a(note.word)}: {_fate(owner, note.spec).removeprefix('it ')}{where}",
+            owner,
+            number=note.number,
+        )
+
+
+@rule("OSIM104", "duplicate-tag", severity=ERROR)
+def duplicate_tag(subject: Subject, found: Found) -> None:
+    """A property is given twice.
+
+    ## What it does
+    Reports every element after the first of the same property in one object.
+
+    ## Why is this bad
+    OpenSim takes the first and ignores the rest, while a reader expects the last one to hold.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    for note, owner in _of_kind(subject, "duplicate-tag"):
+        assert note.spec is not None
+        value = getattr(owner, note.spec.name)
+        taken = "" if isinstance(note.spec.kind, Held) else f", {shown(value)},"
+        found(
+            f"{called(owner)} has <{note.word}> more than once; OpenSim takes the first{taken} and ignores this one",
+            owner,
+            number=note.number,
+        )
+
+
+@rule("OSIM105", "unknown-attribute", severity=ERROR)
+def unknown_attribute(subject: Subject, found: Found) -> None:
+    """An element has an attribute that means nothing.
+
+    ## What it does
+    Reports attributes of objects other than `name` and `file`.
+
+    ## Why is this bad
+    OpenSim ignores them: properties are elements, not attributes.
+
+    ## Example
+    ```xml
+    <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
+    ```
+    """
+    for note, owner in _of_kind(subject, "unknown-attribute"):
+        message = f"OpenSim ignores the attribute '{note.word}' of {called(owner)}"
+        if note.word in field_specs(type(owner)):
+            message += f"; write <{note.word}>{note.value}</{note.word}> inside"
+        suggestion = "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
+        found(message, owner, at=subject.attribute_name(note.number, note.word), suggestion=suggestion)
+
+
+@rule("OSIM106", "stray-text", severity=WARNING)
+def stray_text(subject: Subject, found: Found) -> None:
+    """There is text between elements.
+
+    ## What it does
+    Reports text that stands beside elements, where only elements have a meaning.
+
+    ## Why is this bad
+    OpenSim drops it in silence. It is often what is left of a tag: a value that lost its element, or half a comment.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    source = subject.source
+    for note in subject.notes:
+        if note.kind == "stray-text" and source is not None:
+            start = source.text.find(note.word, source.line_start(note.line or 1))
+            found(f"OpenSim ignores the text '{note.word}' outside the document", at=source.position(max(start, 0)))
+    if source is None or not (_AFTER.search(source.text) or _BEFORE.search(source.text)):
+        return
+    plain = _REMARKS.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source.text)
+    texts = {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}
+    in_values = [
+        (source.spans[note.number].start, source.spans[note.number].end)
+        for note in subject.notes
+        if note.kind == "child-in-value"
+    ]
+    for start, end in sorted(texts):
+        if any(first < start < last for first, last in in_values):
+            continue
+        text = plain[start:end].strip().splitlines()[0]
+        found(f"OpenSim ignores the text '{text}' between elements", at=source.position(start, len(text)))
+
+
+@rule("OSIM107", "element-in-value", severity=ERROR)
+def element_in_value(subject: Subject, found: Found) -> None:
+    """A value has an element inside.
+
+    ## What it does
+    Reports elements inside a number, a switch, a text or a reference.
+
+    ## Why is this bad
+    OpenSim refuses to load the file.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass><value>8</value></mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    for note, owner in _of_kind(subject, "child-in-value"):
+        assert note.spec is not None
+        found(
+            f"<{note.spec.tag}> of {called(owner)} is a value and cannot hold <{note.word}>: OpenSim refuses the file",
+            owner,
+            number=note.number,
+        )
+
+
+@rule("OSIM108", "wrong-part-name", severity=ERROR)
+def wrong_part_name(subject: Subject, found: Found) -> None:
+    """A part of an object has a name other than that of its property.
+
+    ## What it does
+    Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it by its name.
+
+    ## Why is this bad
+    OpenSim does not take the object and goes on with the default: everything inside is lost.
+
+    ## Example
+    ```xml
+    <Body name="thigh">
+        <FrameGeometry name="axes"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
+        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh">
+        <FrameGeometry name="frame_geometry"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
+        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    </Body>
+    ```
+    """
+    for note, owner in _of_kind(subject, "unknown-tag"):
+        spec = _part_for(note, owner)
+        if spec is not None:
+            assert subject.source is not None
+            found(
+                f"{called(owner)} takes its {spec.tag} by that name; OpenSim ignores this {note.word}",
+                owner,
+                number=note.number,
+                attribute="name",
+                suggestion=spec.tag,
+            )
+
+
+@rule("OSIM109", "missing-wrapper", severity=ERROR)
+def missing_wrapper(subject: Subject, found: Found) -> None:
+    """Members of a set do not stand in its `<objects>`.
+
+    ## What it does
+    Reports objects that stand directly in a set or in the object that should list them.
+
+    ## Why is this bad
+    OpenSim looks for members inside `<objects>` only, and ignores these.
+
+    ## Example
+    ```xml
+    <MarkerSet>
+        <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    </MarkerSet>
+    ```
+
+    ## Use instead
+    ```xml
+    <MarkerSet>
+        <objects>
+            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+        </objects>
+    </MarkerSet>
+    ```
+    """
+    reported = set()
+    for note, owner in _of_kind(subject, "unknown-tag"):
+        wrapper = _wrapper_for(note, owner)
+        if wrapper is None or id(owner) in reported:
+            continue
+        reported.add(id(owner))
+        found(
+            f"{called(owner)} holds {note.word} objects inside <{wrapper}> only; OpenSim ignores this one"
+            + (" and the others" if _more_without_wrapper(subject, owner) else ""),
+            owner,
+            number=note.number,
+            suggestion=f"<{wrapper}>",
+        )
+
+
+@rule("OSIM110", "defaults", severity=WARNING)
+def defaults_block(subject: Subject, found: Found) -> None:
+    """The file has a `<defaults>` block.
+
+    ## What it does
+    Reports `<defaults>`: a warning if there is something in it, else for information.
+
+    ## Why is this bad
+    Each object inside replaces the defaults of its class in the whole running program, for this file and for all that
+    are loaded later. What a model means then depends on what was loaded before. Here the block counts for its own file.
+
+    ## Example
+    ```xml
+    <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
+    ```
+    """
+    model, source = subject.model, subject.source
+    if model is None or source is None or b"<defaults" not in source.data:
+        return
+    number = subject.element_of(model, "defaults")
+    if number is not None and source.children(number):
+        found("<defaults> changes the defaults of every model loaded from now on", model, number=number)
+    elif number is not None:
+        found("<defaults> is empty and can go", model, number=number, severity=INFO)
+
+
+_AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
+_BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")
+_REMARKS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
+
+
+def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:
+    return [(note, note.owner) for note in subject.notes if note.kind == kind and note.owner is not None]
+
+
+def _other_rule(note: Note, owner: Object) -> bool:
+    return _wrapper_for(note, owner) is not None or _part_for(note, owner) is not None
+
+
+def _wrapper_for(note: Note, owner: Object) -> str | None:
+    """The list of `owner` that an object standing directly in it belongs in."""
+    if note.value is None or _part_for(note, owner) is not None:
+        return None
+    lists = (s for s in field_specs(type(owner)).values() if isinstance(s.kind, Held) and s.kind.form == "list")
+    best = next((s for s in lists if s.accepts and issubclass(note.value, s.accepts) and s.tag != "components"), None)
+    return best.tag if best is not None else None
+
+
+def _part_for(note: Note, owner: Object) -> FieldSpec | None:
+    """The one-object property that takes the class of this element, if it would only be called right."""
+    if note.value is None:
+        return None
+    for spec in field_specs(type(owner)).values():
+        free = isinstance(spec.kind, Held) and spec.kind.form == "single" and spec.name not in owner.model_fields_set
+        if free and spec.accepts is not None and issubclass(note.value, spec.accepts):
+            return spec
+    return None
+
+
+def _more_without_wrapper(subject: Subject, owner: Object) -> bool:
+    return sum(1 for note, other in _of_kind(subject, "unknown-tag") if other is owner and note.value is not None) > 1
+
+
+def _present(owner: Object) -> set[str]:
+    return {spec.tag for spec in field_specs(type(owner)).values() if spec.name in owner.model_fields_set}
+
+
+def _default_of(spec: FieldSpec) -> str:
+    if isinstance(spec.kind, Held) or spec.default in ("", (), None):
+        return ""
+    return f" ({shown(spec.default)})"
+
+
+def _homes(tag: str) -> list[str]:
+    """Classes that have a property `tag`; a class is left out where one it derives from has it."""
+    homes = set()
+    for name in tags():
+        cls = class_for(name)
+        spec = field_specs(cls).get(tag) if cls is not None else None
+        if spec is not None:
+            homes.add(spec.declared_in.__name__)
+    return sorted(homes)
+
+
+def _fate(owner: Object, spec: FieldSpec | None) -> str:
+    """What OpenSim does with an object it cannot take."""
+    refused = spec is not None and (
+        spec.tag == "objects" or (isinstance(spec.kind, Held) and spec.kind.form == "single")
+    )
+    return "refuses to load the file" if refused else "leaves the object out"
+
+
+def _acceptable(spec: FieldSpec | None) -> list[str]:
+    if spec is None or spec.accepts is None:
+        return tags()
+    return [tag for tag in tags() if (cls := class_for(tag)) is not None and issubclass(cls, spec.accepts)]
+
+
+def _set_for(cls: type[Object] | None) -> str | None:
+    """The set of a model that takes objects of a class."""
+    if cls is None:
+        return None
+    for spec in field_specs(Model).values():
+        members = field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
+        taken = members.accepts if members is not None and spec.tag != "ComponentSet" else None
+        if taken is not None and issubclass(cls, taken):
+            return spec.tag
+    return None

@@ -1,0 +1,343 @@
+"""OSIM0xx: the text itself, before anything in it has a meaning."""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.document.source import Source
+from osimlite.errors import NotWellFormedError, VersionError
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.schema.model import CURRENT_VERSION
+
+_CONFLICT = re.compile(r"^(<{7}|>{7})(?= |$)[^\n]*", re.MULTILINE)
+_SOCKETS = 30505
+"""The version in which joints, points and forces got sockets."""
+_SOCKET = re.compile(r"<(socket_(?:parent|child)_frame)>")
+_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
+
+
+@rule("OSIM001", "syntax-error", severity=ERROR)
+def syntax_error(subject: Subject, found: Found) -> None:
+    """The text is not well-formed XML.
+
+    ## What it does
+    Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that was cut off.
+
+    ## Why is this bad
+    OpenSim cannot load the file. What stands before the place is still checked; what follows is not, since nobody can
+    tell which element it belongs to.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    if subject.source is None or _conflicts(subject.source):
+        return
+    for fault in subject.faults:
+        if isinstance(fault, NotWellFormedError):
+            _found_at(subject.source, found, fault.message, fault.line, fault.column)
+
+
+@rule("OSIM009", "lenient-xml", severity=WARNING)
+def lenient_xml(subject: Subject, found: Found) -> None:
+    """The text is not XML in a way that OpenSim overlooks.
+
+    ## What it does
+    Reports a bare `&`, and two hyphens inside a comment.
+
+    ## Why is this bad
+    OpenSim's parser reads such a file, and most other XML readers refuse it.
+
+    ## Example
+    ```xml
+    <credits>Anna & Bert</credits>
+    ```
+
+    ## Use instead
+    ```xml
+    <credits>Anna &amp; Bert</credits>
+    ```
+    """
+    meant = {"bare-ampersand": "&amp;", "hyphens-in-comment": "-"}
+    offset = -1
+    for note in subject.notes:
+        if note.kind in meant and subject.source is not None:
+            offset = _word_behind(subject.source, max(offset + 1, subject.source.line_start(note.line or 1)), note.word)
+            found(
+                f"'{note.word}' is not XML here; OpenSim reads it, others refuse the file",
+                at=subject.source.position(offset, len(note.word)),
+                suggestion=meant[note.kind],
+            )
+
+
+def _word_behind(source: Source, start: int, word: str) -> int:
+    place = source.text.find(word, start)
+    return place if place >= 0 else start
+
+
+@rule("OSIM002", "encoding", severity=WARNING)
+def encoding(subject: Subject, found: Found) -> None:
+    """The bytes are not in the encoding that the file declares.
+
+    ## What it does
+    Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then read as Windows
+    text (cp1252).
+
+    ## Why is this bad
+    OpenSim copies the bytes unseen, but every other XML reader refuses the file, and names with accents differ
+    between programs. Save the file as UTF-8.
+
+    ## Example
+    ```latin-1
+    <credits>Müller, 2016</credits>
+    ```
+
+    ## Use instead
+    ```xml
+    <credits>Müller, 2016</credits>
+    ```
+    """
+    source = subject.source
+    if source is None or source.encoding not in ("cp1252", "latin-1"):
+        return
+    declared = re.match(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)", source.data)
+    name = declared[1].decode() if declared else "UTF-8"
+    try:
+        source.data.decode(name)
+    except UnicodeDecodeError as error:
+        found(
+            f"byte 0x{source.data[error.start]:02X} is not {name}; the text is read as {source.encoding}",
+            at=source.position(error.start),
+        )
+    except LookupError:
+        found(f"the encoding '{name}' is not known; the text is read as {source.encoding}", at=source.position(0))
+
+
+@rule("OSIM003", "not-a-model", severity=ERROR)
+def not_a_model(subject: Subject, found: Found) -> None:
+    """The document is XML, but no OpenSim model.
+
+    ## What it does
+    Reports a root element other than `<OpenSimDocument>`, and a document that holds something else than a `<Model>`.
+
+    ## Why is this bad
+    OpenSim fails with a message about a missing node, or makes an empty model without a word.
+
+    ## Example
+    ```document
+    <OpenSimDokument Version="40600">
+        <Model name="empty" />
+    </OpenSimDokument>
+    ```
+
+    ## Use instead
+    ```document
+    <OpenSimDocument Version="40600">
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+    """
+    if subject.source is None:
+        return
+    for fault in subject.faults:
+        if not isinstance(fault, (NotWellFormedError, VersionError)):
+            _found_at(subject.source, found, fault.message, fault.line, fault.column)
+
+
+@rule("OSIM004", "document-version", severity=ERROR)
+def document_version(subject: Subject, found: Found) -> None:
+    """The document has no version, or none that is read.
+
+    ## What it does
+    Reports a `Version` that is missing, no whole number, too old to be read here, or newer than OpenSim 4.6 writes.
+
+    ## Why is this bad
+    OpenSim reads each file by the rules of its version. Without one it fails; from a version it does not know it
+    silently takes what it happens to understand (a warning).
+
+    ## Example
+    ```document
+    <OpenSimDocument>
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```document
+    <OpenSimDocument Version="40600">
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+    """
+    if subject.source is None:
+        return
+    for fault in subject.faults:
+        if isinstance(fault, VersionError):
+            wanted = None if fault.version is not None else str(CURRENT_VERSION)
+            found(fault.message, number=0, attribute="Version", suggestion=wanted)
+    if subject.version is not None and subject.version < _SOCKETS and (word := _SOCKET.search(subject.source.text)):
+        found(
+            f"the document says version {subject.version} and holds <{word[1]}>, which came later: OpenSim reads it by "
+            "the rules of the old format and fails",
+            number=0,
+            attribute="Version",
+            suggestion=str(CURRENT_VERSION),
+        )
+    if subject.version is not None and subject.version > CURRENT_VERSION:
+        found(
+            f"version {subject.version} is newer than {CURRENT_VERSION}, the format of OpenSim 4.6: "
+            "what was added since is passed over in silence",
+            number=0,
+            attribute="Version",
+            severity=WARNING,
+            suggestion=str(CURRENT_VERSION),
+        )
+
+
+@rule("OSIM005", "merge-conflict", severity=ERROR)
+def merge_conflict(subject: Subject, found: Found) -> None:
+    """The file holds the marks of a merge that was not finished.
+
+    ## What it does
+    Reports every line that begins with seven `<` or seven `>`.
+
+    ## Why is this bad
+    OpenSim cannot load the file, and its message points somewhere else.
+
+    ## Example
+    ```xml
+    <<<<<<< HEAD
+    <credits>Anna</credits>
+    =======
+    <credits>Bert</credits>
+    >>>>>>> feature
+    ```
+
+    ## Use instead
+    ```xml
+    <credits>Anna and Bert</credits>
+    ```
+    """
+    if subject.source is not None:
+        for start, end in _conflicts(subject.source):
+            found(
+                "unfinished merge: keep one side and take the marks out", at=subject.source.position(start, end - start)
+            )
+
+
+@rule("OSIM006", "duplicate-attribute", severity=ERROR)
+def duplicate_attribute(subject: Subject, found: Found) -> None:
+    """An element has the same attribute twice.
+
+    ## What it does
+    Reports two attributes with the same name.
+
+    ## Why is this bad
+    It is not XML. OpenSim takes the last one without a word; every other reader refuses the file.
+
+    ## Example
+    ```xml
+    <Marker name="hip" name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+    """
+    for note in subject.notes:
+        if note.kind == "duplicate-attribute":
+            found(
+                f"the attribute '{note.word}' stands here twice; OpenSim takes the last one",
+                at=subject.attribute_name(note.number, note.word),
+            )
+
+
+@rule("OSIM007", "second-object", severity=ERROR)
+def second_object(subject: Subject, found: Found) -> None:
+    """The document holds more than one object.
+
+    ## What it does
+    Reports every element of the document after the first.
+
+    ## Why is this bad
+    OpenSim reads the first object and passes over the others in silence.
+
+    ## Example
+    ```document
+    <OpenSimDocument Version="40600">
+        <Model name="walker" />
+        <Model name="runner" />
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```document
+    <OpenSimDocument Version="40600">
+        <Model name="walker" />
+    </OpenSimDocument>
+    ```
+    """
+    for note in subject.notes:
+        if note.kind == "second-object":
+            found(f"OpenSim reads one object of a document and ignores this <{note.word}>", number=note.number)
+
+
+@rule("OSIM008", "character-reference", severity=ERROR)
+def character_reference(subject: Subject, found: Found) -> None:
+    """A numeric character reference stands for a character beyond ASCII.
+
+    ## What it does
+    Reports references such as `&#233;` with a number above 127.
+
+    ## Why is this bad
+    OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it becomes invalid
+    UTF-8, and `&#8364;` becomes another character. Write the character itself.
+
+    ## Example
+    ```xml
+    <credits>Ren&#233;</credits>
+    ```
+
+    ## Use instead
+    ```xml
+    <credits>René</credits>
+    ```
+    """
+    source = subject.source
+    if source is None or "&#" not in source.text:
+        return
+    for match in _NUMBERED.finditer(source.text):
+        number = int(match[1], 16) if match[1] else int(match[2])
+        if 127 < number < 0x110000:
+            found(
+                f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character itself",
+                at=source.position(match.start(), len(match[0])),
+                suggestion=chr(number),
+            )
+
+
+def _conflicts(source: Source) -> list[tuple[int, int]]:
+    if "<<<<<<<" not in source.text and ">>>>>>>" not in source.text:
+        return []
+    return [match.span() for match in _CONFLICT.finditer(source.text)]
+
+
+def _found_at(source: Source, found: Found, message: str, line: int | None, column: int | None) -> None:
+    found(message, at=source.position(_offset(source, line, column)))
+
+
+def _offset(source: Source, line: int | None, column: int | None) -> int:
+    """The character at a line and column, no further than the end of that line."""
+    line = line or 1
+    lines = source.lines
+    if line > len(lines):
+        return len(source.text)
+    return source.line_start(line) + min(max((column or 1) - 1, 0), max(0, len(lines[line - 1]) - 1))

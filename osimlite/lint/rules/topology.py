@@ -1,0 +1,418 @@
+"""OSIM4xx: how bodies and joints hang together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.skeleton import Skeleton, has_unknown_joints, skeleton
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, times
+from osimlite.schema.base import Component, Object
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import Body, Ground
+from osimlite.schema.joints import Joint, WeldJoint
+from osimlite.text import listed
+
+
+@rule("OSIM401", "unconnected-body", severity=ERROR)
+def unconnected_body(subject: Subject, found: Found) -> None:
+    """A body is not connected to ground.
+
+    ## What it does
+    Reports bodies that no chain of joints connects to ground.
+
+    ## Why is this bad
+    OpenSim says that it adds a free joint and then crashes, or ends with an invalid body index, as soon as the model
+    has two joints. With fewer the body falls freely, which the file does not say.
+
+    ## Example
+    ```xml
+    <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
+    <FreeJoint name="ball_free">
+        <socket_parent_frame>/ground</socket_parent_frame>
+        <socket_child_frame>/bodyset/ball</socket_child_frame>
+        <coordinates>
+            <Coordinate name="ball_rx" /> <Coordinate name="ball_ry" /> <Coordinate name="ball_rz" />
+            <Coordinate name="ball_tx" /> <Coordinate name="ball_ty" /> <Coordinate name="ball_tz" />
+        </coordinates>
+    </FreeJoint>
+    ```
+    """
+    bones = skeleton(subject)
+    if not bones.complete or has_unknown_joints(subject):
+        return
+    groups = _Groups()
+    for link in bones.links:
+        groups.join(link.parent_base, link.child_base)
+    for body in bones.bodies:
+        if groups.of(body) == groups.of(bones.ground):
+            continue
+        own = bones.of(body)
+        message = (
+            f"{called(body)} is not connected to ground: only joints among themselves reach it"
+            if own
+            else f"no joint connects {called(body)}"
+        )
+        if len(bones.links) > 1:
+            found(f"{message}; OpenSim crashes or refuses the model", body, attribute="name")
+        else:
+            found(f"{message}; OpenSim adds a FreeJoint to ground", body, attribute="name", severity=WARNING)
+
+
+@rule("OSIM402", "joint-to-itself", severity=ERROR)
+def joint_to_itself(subject: Subject, found: Found) -> None:
+    """A joint connects a body to itself.
+
+    ## What it does
+    Reports joints whose two frames are the same or are fixed to the same body.
+
+    ## Why is this bad
+    OpenSim refuses the model.
+
+    ## Example
+    ```xml
+    <WeldJoint name="strange">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+    </WeldJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    <WeldJoint name="ankle">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/foot</socket_child_frame>
+    </WeldJoint>
+    ```
+    """
+    for link in skeleton(subject).links:
+        if link.child_base is not None and link.parent_base is link.child_base:
+            found(
+                f"both frames of {called(link.joint)} are fixed to {called(link.child_base)}; OpenSim refuses this",
+                link.joint,
+                tag="socket_child_frame",
+            )
+
+
+@rule("OSIM403", "closed-loop", severity=ERROR)
+def closed_loop(subject: Subject, found: Found) -> None:
+    """Joints form a closed loop.
+
+    ## What it does
+    Reports each joint that connects bodies which earlier joints have connected already.
+
+    ## Why is this bad
+    OpenSim cuts the loop: it splits a body and welds the halves with a constraint, which adds coordinates and
+    multipliers that the file does not mention. If the loop does not close in the default pose, it refuses the model.
+    Say what is meant with a constraint.
+
+    ## Example
+    ```xml
+    <WeldJoint name="strut">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+    </WeldJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <WeldConstraint name="strut">
+        <socket_frame1>/bodyset/pelvis</socket_frame1>
+        <socket_frame2>/bodyset/shank</socket_frame2>
+    </WeldConstraint>
+    ```
+    """
+    groups = _Groups()
+    moved_by: dict[int, Joint] = {}
+    pairs: set[frozenset[int]] = set()
+    for link in skeleton(subject).links:
+        if link.parent_base is None or link.child_base is None or link.parent_base is link.child_base:
+            continue
+        pair = frozenset((id(link.parent_base), id(link.child_base)))
+        closes = groups.of(link.parent_base) == groups.of(link.child_base)
+        if closes and pair not in pairs:
+            before = moved_by.get(id(link.child_base))
+            other = f", which {called(before)} has placed already" if before is not None else ""
+            found(
+                f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; "
+                "OpenSim splits a body and adds a constraint, or refuses the model",
+                link.joint,
+                tag="socket_child_frame",
+            )
+        groups.join(link.parent_base, link.child_base)
+        pairs.add(pair)
+        moved_by.setdefault(id(link.child_base), link.joint)
+
+
+@rule("OSIM404", "parallel-joints", severity=ERROR)
+def parallel_joints(subject: Subject, found: Found) -> None:
+    """Two joints connect the same two bodies.
+
+    ## What it does
+    Reports the second joint between one pair of bodies.
+
+    ## Why is this bad
+    OpenSim adds a hidden body and welds it with a constraint: more coordinates, and a joint that is much stiffer than
+    either.
+
+    ## Example
+    ```xml
+    <PinJoint name="hip_again">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/bodyset/thigh</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion_again" /> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="trunk"> <mass>30</mass> <inertia>1 1 1 0 0 0</inertia> </Body>
+    <PinJoint name="back">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/bodyset/trunk</socket_child_frame>
+        <coordinates> <Coordinate name="lumbar_extension" /> </coordinates>
+    </PinJoint>
+    ```
+    """
+    first: dict[frozenset[int], Joint] = {}
+    for link in skeleton(subject).links:
+        if link.parent_base is None or link.child_base is None or link.parent_base is link.child_base:
+            continue
+        pair = frozenset((id(link.parent_base), id(link.child_base)))
+        if pair in first:
+            found(
+                f"{called(link.joint)} connects the same two bodies as {called(first[pair])}: OpenSim welds a hidden "
+                "body between them",
+                link.joint,
+                attribute="name",
+            )
+        first.setdefault(pair, link.joint)
+
+
+@rule("OSIM405", "wrong-coordinate-count", severity=ERROR)
+def wrong_coordinate_count(subject: Subject, found: Found) -> None:
+    """A joint has not as many coordinates as it needs.
+
+    ## What it does
+    Reports joints with more or fewer coordinates than their class moves by, and (as a warning) with none at all.
+
+    ## Why is this bad
+    OpenSim refuses the model. Without any it makes coordinates up, with a name such as `_coord_0` and the value 0.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle" /> <Coordinate name="knee_twist" /> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle" /> </coordinates>
+    </PinJoint>
+    ```
+    """
+    for joint in subject.each(Joint):
+        if joint.motion_types is None:
+            continue
+        wanted, given = len(joint.motion_types), len(joint.coordinates)
+        declared = "coordinates" in joint.model_fields_set and given > 0
+        if not declared and wanted and subject.source is not None:
+            found(
+                f"{called(joint)} gives no coordinates; OpenSim makes {wanted} up, called '_coord_0'"
+                + (f" to '_coord_{wanted - 1}'" if wanted > 1 else ""),
+                joint,
+                severity=WARNING,
+            )
+        elif given != wanted and (declared or given):
+            found(
+                f"{called(joint)} has {times(given, 'coordinate')}, {a_joint(joint)} has {wanted}: "
+                "OpenSim refuses the model",
+                joint,
+                number=subject.element_of(joint, "coordinates"),
+            )
+
+
+@rule("OSIM406", "shared-coordinate-name", severity=ERROR)
+def shared_coordinate_name(subject: Subject, found: Found) -> None:
+    """Two joints have a coordinate of the same name.
+
+    ## What it does
+    Reports the second coordinate of a name, with the forces and others that look the name up. Without any it is a
+    warning.
+
+    ## Why is this bad
+    Forces, actuators and constraints find a coordinate by its bare name, and always find the first: two limit forces
+    then act on one knee, and none on the other.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+    </PinJoint>
+    <CoordinateLimitForce name="knee_limit"> <coordinate>hip_flexion</coordinate> </CoordinateLimitForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle" /> </coordinates>
+    </PinJoint>
+    ```
+    """
+    first: dict[str, Coordinate] = {}
+    tree = subject.tree
+    for component in tree.components:
+        if not isinstance(component, Coordinate):
+            continue
+        joint = tree.parent_of(component)
+        known = first.setdefault(component.name, component)
+        if known is component or not component.name or tree.parent_of(known) is joint:
+            continue
+        users = [
+            called(use.owner) for use in tree.uses() if use.value == component.name and _by_name(use.reference.rule)
+        ]
+        message = f"{called(component)} has the name of a coordinate of {called(tree.parent_of(known) or known)}"
+        if users:
+            message += f"; {listed(dict.fromkeys(users), most=3)} {'finds' if len(users) == 1 else 'all find'} that one"
+        found(message, component, attribute="name", severity=None if users else WARNING)
+
+
+@rule("OSIM407", "massless-leaf", severity=ERROR)
+def massless_leaf(subject: Subject, found: Found) -> None:
+    """A body without mass is the last of its chain.
+
+    ## What it does
+    Reports bodies of mass 0 that move and carry nothing with mass.
+
+    ## Why is this bad
+    A force on such a body would accelerate it without bounds: the mass matrix is singular, and OpenSim refuses the
+    model. Between two bodies with mass, or welded to one, a massless body is fine.
+
+    ## Example
+    ```xml
+    <Body name="shank"> <mass>0</mass> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia> </Body>
+    ```
+    """
+    bones = skeleton(subject)
+    if not bones.complete or has_unknown_joints(subject):
+        return
+    for body, members in _massless_leaves(bones):
+        welded = f" with the bodies welded to it ({listed(item.name for item in members)})" if members else ""
+        found(
+            f"{called(body)}{welded} has no mass and is the end of its chain: OpenSim refuses the model",
+            body,
+            tag="mass",
+        )
+
+
+@rule("OSIM408", "ground-as-child", severity=INFO)
+def ground_as_child(subject: Subject, found: Found) -> None:
+    """A joint has ground as its child.
+
+    ## What it does
+    Reports joints whose child frame is fixed to ground.
+
+    ## Why is this bad
+    It is allowed: OpenSim turns the joint round inside, and the coordinate keeps its meaning from parent to child. But
+    other programs expect chains that start at ground.
+
+    ## Example
+    ```xml
+    <PlanarJoint name="ground_pelvis">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/ground</socket_child_frame>
+        <coordinates>
+            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" /> <Coordinate name="pelvis_ty" />
+        </coordinates>
+    </PlanarJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PlanarJoint name="ground_pelvis">
+        <socket_parent_frame>/ground</socket_parent_frame>
+        <socket_child_frame>/bodyset/pelvis</socket_child_frame>
+        <coordinates>
+            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" /> <Coordinate name="pelvis_ty" />
+        </coordinates>
+    </PlanarJoint>
+    ```
+    """
+    for link in skeleton(subject).links:
+        if isinstance(link.child_base, Ground) and link.parent_base is not link.child_base:
+            found(
+                f"the child of {called(link.joint)} is ground; OpenSim turns the joint round",
+                link.joint,
+                tag="socket_child_frame",
+            )
+
+
+class _Groups:
+    """Which components belong together (a union-find by identity)."""
+
+    def __init__(self) -> None:
+        self._up: dict[int, int] = {}
+
+    def of(self, item: Object) -> int:
+        key = id(item)
+        while self._up.get(key, key) != key:
+            key = self._up[key]
+        return key
+
+    def join(self, one: Object | None, other: Object | None) -> None:
+        if one is not None and other is not None:
+            self._up[self.of(one)] = self.of(other)
+
+
+def a_joint(joint: Joint) -> str:
+    """``a PinJoint``."""
+    return f"a {type(joint).tag}"
+
+
+def _by_name(rule_name: str) -> bool:
+    return rule_name == "coordinate-name"
+
+
+def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body]]]:
+    """Each rigid group of bodies that has no mass and hangs on one moving joint: its first body and the others."""
+    groups = _Groups()
+    for link in bones.links:
+        if isinstance(link.joint, WeldJoint):
+            groups.join(link.parent_base, link.child_base)
+    members: dict[int, list[Component]] = {}
+    for base in (bones.ground, *bones.bodies):
+        members.setdefault(groups.of(base), []).append(base)
+    for key, group in members.items():
+        bodies = [base for base in group if isinstance(base, Body)]
+        if len(bodies) != len(group) or any(body.mass != 0 for body in bodies):
+            continue
+        moving = [
+            link
+            for link in bones.links
+            if not isinstance(link.joint, WeldJoint)
+            and key in {groups.of(base) for base in (link.parent_base, link.child_base) if base is not None}
+        ]
+        if len(moving) == 1:
+            yield bodies[0], bodies[1:]

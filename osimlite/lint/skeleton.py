@@ -1,0 +1,80 @@
+"""The bodies and joints of a model as a graph, as far as the references between them lead anywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from osimlite.lint.subject import Subject
+from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.frames import Body, Ground
+from osimlite.schema.joints import Joint
+from osimlite.schema.tree import Use
+
+
+@dataclass(slots=True)
+class Link:
+    """A joint with the frames it connects and the bodies (or ground) these are fixed to; None where unresolved."""
+
+    joint: Joint
+    parent: Component | None
+    child: Component | None
+    parent_base: Component | None
+    child_base: Component | None
+
+
+@dataclass(slots=True)
+class Skeleton:
+    """Bodies, ground, and the joints between them in document order."""
+
+    bodies: list[Body]
+    ground: Ground
+    links: list[Link] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every joint's frames lead to a body."""
+        return all(link.parent_base is not None and link.child_base is not None for link in self.links)
+
+    def of(self, base: Component) -> list[Link]:
+        """The joints at a body."""
+        return [link for link in self.links if base is link.parent_base or base is link.child_base]
+
+
+def skeleton(subject: Subject) -> Skeleton:
+    """The skeleton of a model; made once per subject."""
+    known = subject.kept.get("skeleton")
+    if isinstance(known, Skeleton):
+        return known
+    assert subject.model is not None
+    bones = Skeleton([*subject.each(Body)], subject.model.ground)
+    for joint in subject.each(Joint):
+        parent = _follow(subject, joint, "socket_parent_frame")
+        child = _follow(subject, joint, "socket_child_frame")
+        bones.links.append(Link(joint, parent, child, base_of(subject, parent), base_of(subject, child)))
+    subject.kept["skeleton"] = bones
+    return bones
+
+
+def has_unknown_joints(subject: Subject) -> bool:
+    """Whether a joint or a body is of a class that is not known, so that the graph has gaps."""
+    model = subject.model
+    assert model is not None
+    members: list[Object] = [*model.joint_set.objects, *model.body_set.objects, *model.subcomponents]
+    return any(isinstance(item, Unknown) for item in [*members, *model.component_set.objects])
+
+
+def base_of(subject: Subject, frame: Component | None) -> Component | None:
+    """The body or ground that a frame is fixed to, through any number of offset frames."""
+    seen: set[int] = set()
+    while frame is not None and not isinstance(frame, (Body, Ground)):
+        if id(frame) in seen or "socket_parent" not in type(frame).field_specs():
+            return None
+        seen.add(id(frame))
+        frame = _follow(subject, frame, "socket_parent")
+    return frame
+
+
+def _follow(subject: Subject, owner: Component, tag: str) -> Component | None:
+    spec = type(owner).field_specs()[tag]
+    value = getattr(owner, spec.name)
+    return subject.tree.resolve(Use(owner, owner, spec, value)).target if value else None

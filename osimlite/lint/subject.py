@@ -1,0 +1,166 @@
+"""What is checked: a model with, where there is one, the text it came from; and the answers rules ask for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar, cast
+
+from osimlite.document.notes import Note
+from osimlite.document.source import Position, Source
+from osimlite.document.survey import Survey
+from osimlite.errors import DocumentError
+from osimlite.lint.config import Config
+from osimlite.lint.words import called
+from osimlite.schema.base import Component, FieldSpec, Object, Unknown
+from osimlite.schema.model import Model
+from osimlite.schema.tree import Tree
+
+T = TypeVar("T", bound=Object)
+
+
+class Subject:
+    """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read."""
+
+    def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
+        self.config = config or Config()
+        self.source: Source | None = None
+        self.model: Model | None
+        self.faults: list[DocumentError] = []
+        self.notes: list[Note] = []
+        self.sure_until: int | None = None
+        self.version: int | None = None
+        self.kept: dict[str, object] = {}
+        if isinstance(found, Model):
+            self.model = found
+        else:
+            self.source = found.source
+            self.faults = found.faults
+            self.sure_until = found.sure_until
+            self.model = found.document.model if found.document else None
+            self.notes = found.document.notes if found.document else []
+            self.version = found.document.version if found.document else None
+
+    @property
+    def file(self) -> str | None:
+        """The file the text came from."""
+        return self.source.file if self.source is not None else None
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of the file, None for a model that is in no file."""
+        return Path(self.file).parent if self.file is not None and Path(self.file).is_file() else None
+
+    @cached_property
+    def tree(self) -> Tree:
+        """The component tree."""
+        assert self.model is not None
+        return self.model.tree()
+
+    @cached_property
+    def by_class(self) -> dict[type[Object], list[Object]]:
+        """Every object of the model by its exact class, in document order."""
+        found: dict[type[Object], list[Object]] = {}
+        if self.model is not None:
+            for item in self.model.walk():
+                found.setdefault(type(item), []).append(item)
+        return found
+
+    def each(self, cls: type[T]) -> Iterator[T]:
+        """Every object of a class or of one derived from it."""
+        for known, items in self.by_class.items():
+            if issubclass(known, cls):
+                yield from cast("list[T]", items)
+
+    @cached_property
+    def has_unknown(self) -> bool:
+        """Whether parts of the model are of classes that are not known, so that its tree has gaps."""
+        return Unknown in self.by_class
+
+    def owner(self, item: Object) -> Component:
+        """The component an object belongs to."""
+        return self.tree.owner_of(item)
+
+    def path(self, item: Object | None) -> str:
+        """The absolute path of the component an object belongs to."""
+        if item is None or self.model is None:
+            return ""
+        return self.tree.path_of(self.owner(item)) or ""
+
+    def called(self, item: Object) -> str:
+        """What people call an object: ``Body 'pelvis'``; a part without a name goes by its owner."""
+        owner = self.owner(item)
+        return called(item if item.name and item is not owner else owner)
+
+    def noted(self, item: Object, spec: FieldSpec) -> bool:
+        """Whether the reader noticed something about the text of this property."""
+        return (id(item), spec.name) in self._noted
+
+    @cached_property
+    def _noted(self) -> set[tuple[int, str]]:
+        return {(id(note.owner), note.spec.name) for note in self.notes if note.owner is not None and note.spec}
+
+    def element_of(self, item: Object, tag: str) -> int | None:
+        """The number of the element that gives a property of an object."""
+        if self.source is None or item._index is None:
+            return None
+        return self.source.child(item._index, tag)
+
+    def position(
+        self,
+        item: Object | None,
+        *,
+        tag: str | None = None,
+        word: str | None = None,
+        nth: int = 0,
+        attribute: str | None = None,
+        number: int | None = None,
+    ) -> Position | None:
+        """Where something is in the text.
+
+        Args:
+            item: the object concerned; alone, its start tag.
+            tag: a property of it: its text, or the object's start tag where the property is not given.
+            word: the `nth` occurrence of this word in that text.
+            attribute: the value of an attribute instead.
+            number: the number of an element, in place of `item`.
+        """
+        if self.source is None:
+            return None
+        if number is None:
+            number = self._given(item)
+            if number is None:
+                return None
+            if tag is not None:
+                inner = self.source.child(number, tag)
+                if inner is None:
+                    return self.source.of_tag(number)
+                return self.source.of_text(inner, word, nth)
+        if number >= len(self.source.spans):
+            return None
+        if attribute is not None:
+            return self.source.of_attribute(number, attribute)
+        if word is not None:
+            return self.source.of_text(number, word, nth)
+        return self.source.of_tag(number)
+
+    def attribute_name(self, number: int, name: str) -> Position | None:
+        """Where the name of an attribute stands."""
+        if self.source is None:
+            return None
+        span = self.source.spans[number]
+        head = self.source.text[span.start : span.tag_end]
+        match = re.search(rf"\s({re.escape(name)})\s*=", head)
+        return self.source.position(span.start + match.start(1), len(name)) if match else self.source.of_tag(number)
+
+    def _given(self, item: Object | None) -> int | None:
+        """The element of an object; of one the text does not give, that of the component above it."""
+        while item is not None:
+            number = cast("int | None", item._index)
+            if number is not None:
+                return number
+            owner = self.owner(item)
+            item = owner if owner is not item else self.tree.parent_of(owner)
+        return None

@@ -1,0 +1,42 @@
+"""How findings speak of things."""
+
+from __future__ import annotations
+
+from osimlite.document.lexical import shortest
+from osimlite.schema.base import Object, Unknown
+
+
+def called(item: Object) -> str:
+    """``Body 'pelvis'``, or ``Body`` for one without a name."""
+    kind = item.class_name if isinstance(item, Unknown) else type(item).tag
+    return f"{kind} '{item.name}'" if item.name else kind
+
+
+def a(noun: str) -> str:
+    """The noun with its article."""
+    return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
+
+
+def quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
+    """A number, or several, in few digits and with the unit."""
+    values = value if isinstance(value, tuple) else (value,)
+    text = " ".join(f"{item:.6g}" if item == item and abs(item) != float("inf") else shortest(item) for item in values)
+    return f"{text} {unit}" if unit else text
+
+
+def shown(value: object) -> str:
+    """A value as a file would have it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return quantity(value)
+    if isinstance(value, tuple):
+        return " ".join(map(shown, value)) or "an empty list"
+    return str(value) if value not in (None, "") else "nothing"
+
+
+def times(count: int, noun: str) -> str:
+    """``1 body``, ``2 bodies``."""
+    if count == 1:
+        return f"1 {noun}"
+    return f"{count} {noun[:-1] + 'ies' if noun.endswith('y') else noun + 's'}"
