@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,8 @@ COMMANDS = ("build", "validate", "rule", "format", "upgrade", "diff", "info", "t
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>`` is its function."""
 
 
-def app() -> Typer:
-    """Assemble the command line."""
+def app(names: Sequence[str] = COMMANDS) -> Typer:
+    """Assemble the command line of these commands."""
     import typer
 
     application = typer.Typer(
@@ -26,7 +27,7 @@ def app() -> Typer:
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for name in COMMANDS:
+    for name in names:
         application.command(name)(getattr(import_module(f"osimlite.cli.{name}"), name))
 
     @application.callback(invoke_without_command=True)
@@ -44,8 +45,11 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exits with 0 (done), 1 (the answer is no) or 2 (could not be carried out)."""
     from osimlite.errors import OsimliteError
 
+    words = sys.argv[1:] if arguments is None else arguments
+    # Only the command that is asked for is loaded; without one, all are, for the help.
+    names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:
-        app()(args=arguments, prog_name="osimlite")
+        app(names)(args=words, prog_name="osimlite")
     except OsimliteError as error:
         print(f"osimlite: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
