@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from osimlite.lint import validate as validate
     from osimlite.multibody import mechanism as mechanism
     from osimlite.schema.model import Model as Model
-    from osimlite.simulate import simulate as simulate
+    from osimlite.simulation import simulate as simulate
     from osimlite.translate import to_urdf as to_urdf
 
 _FUNCTIONS = {
@@ -32,7 +32,7 @@ _FUNCTIONS = {
     "validate": "osimlite.lint",
     "mechanism": "osimlite.multibody",
     "to_urdf": "osimlite.translate",
-    "simulate": "osimlite.simulate",
+    "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",
 }
 

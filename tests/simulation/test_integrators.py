@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.simulate.integrators import (
+from osimlite.simulation.integrators import (
     IntegrationError,
     RungeKuttaMerson,
     SemiImplicitEuler,
