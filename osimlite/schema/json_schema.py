@@ -1,0 +1,154 @@
+"""The JSON Schema of models written as YAML or JSON, generated from the declarations.
+
+``python -m osimlite.schema.json_schema > schemas/osim-4.6.schema.json`` writes the file that editors use; a test
+keeps it current. :mod:`osimlite.document.data` reads what the schema describes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from importlib import import_module
+from typing import Any
+
+from osimlite.schema.base import FieldSpec, Object, Unknown, field_specs
+from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.registry import MODULES
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+_NOT_FINITE = {"enum": ["NaN", "Inf", "-Inf"]}
+_SCALARS: dict[str, dict[str, Any]] = {
+    "double": {"anyOf": [{"type": "number"}, _NOT_FINITE]},
+    "int": {"type": "integer"},
+    "bool": {"type": "boolean"},
+    "string": {"type": "string"},
+}
+
+
+def json_schema() -> dict[str, Any]:
+    """The schema of a model: one definition per class that a file can hold, and one per kind of component."""
+    classes = _classes()
+    definitions: dict[str, Any] = {"Unknown": _unknown()}
+    for cls in classes:
+        definitions[cls.tag] = _definition(cls, classes)
+    for cls in {spec.accepts for each in classes for spec in field_specs(each).values() if spec.accepts is not None}:
+        if cls.abstract:
+            definitions[cls.tag] = {"description": _summary(cls), **_any_of(cls, classes)}
+    return {
+        "$schema": DIALECT,
+        "title": "An OpenSim 4.6 model, as osimlite reads it from YAML and JSON",
+        "$ref": "#/$defs/Model",
+        "$defs": dict(sorted(definitions.items())),
+    }
+
+
+def _classes() -> list[type[Object]]:
+    found: list[type[Object]] = [getattr(import_module(module), name) for name, module in MODULES.items()]
+    return sorted((cls for cls in found if not cls.abstract), key=lambda cls: cls.tag)
+
+
+def _definition(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
+    properties: dict[str, Any] = {"class": {"const": cls.tag}, "name": {"type": "string"}}
+    if cls.tag == "Model":
+        properties["$schema"] = {"type": "string"}
+    for spec in field_specs(cls).values():
+        properties[spec.name] = _property(spec, classes)
+    properties["unknown"] = {
+        "description": "Elements that no class knows, as XML.",
+        "type": "array",
+        "items": {"type": "string"},
+    }
+    return {
+        "description": _summary(cls),
+        "type": "object",
+        "properties": properties,
+        "additionalProperties": False,
+    }
+
+
+def _unknown() -> dict[str, Any]:
+    names = ("class", "name", "class_name", "content")
+    return {
+        "description": _summary(Unknown),
+        "type": "object",
+        "properties": {name: {"const": "Unknown"} if name == "class" else {"type": "string"} for name in names},
+        "required": ["class", "class_name"],
+        "additionalProperties": False,
+    }
+
+
+def _property(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
+    if isinstance(spec.kind, Held):
+        return _held(spec, spec.kind, classes)
+    if isinstance(spec.kind, Reference):
+        listed = {"type": "array", "items": {"type": "string"}}
+        return {**_about_reference(spec.kind), **(listed if spec.kind.shape == "list" else {"type": "string"})}
+    assert isinstance(spec.kind, Value)
+    found = {**_about_value(spec.kind), **_value(spec.kind)}
+    if _is_plain(spec.default):
+        found["default"] = spec.default
+    return found
+
+
+def _held(spec: FieldSpec, kind: Held, classes: list[type[Object]]) -> dict[str, Any]:
+    assert spec.accepts is not None
+    one = _one(spec.accepts, classes)
+    if kind.form == "list":
+        return {"type": "array", "items": one}
+    members = field_specs(spec.accepts).get("objects")
+    if members is None:
+        return one
+    # A set that is nothing but its members may be given as the list of them.
+    return {"anyOf": [one, _property(members, classes)]}
+
+
+def _one(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
+    """An object where a property takes a `cls`; only of that very class it may leave its class unsaid."""
+    exact = {"$ref": f"#/$defs/{cls.tag}"}
+    if cls.abstract:
+        return exact
+    kinds = [_said(other) for other in classes if issubclass(other, cls) and other is not cls]
+    return {"anyOf": [exact, *kinds]} if kinds else exact
+
+
+def _any_of(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
+    return {"anyOf": [*(_said(other) for other in classes if issubclass(other, cls)), {"$ref": "#/$defs/Unknown"}]}
+
+
+def _said(cls: type[Object]) -> dict[str, Any]:
+    return {"$ref": f"#/$defs/{cls.tag}", "required": ["class"]}
+
+
+def _value(kind: Value) -> dict[str, Any]:
+    scalar = {"enum": list(kind.choices)} if kind.choices else _SCALARS[kind.scalar]
+    if kind.shape == "single":
+        return scalar
+    if kind.shape == "optional":
+        return {"anyOf": [scalar, {"type": "null"}]}
+    bounds = {"minItems": kind.size or kind.least, "maxItems": kind.size or kind.most}
+    return {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
+
+
+def _about_value(kind: Value) -> dict[str, str]:
+    words = ", ".join(word for word in (kind.unit, kind.domain) if word)
+    return {"description": words} if words else {}
+
+
+def _about_reference(kind: Reference) -> dict[str, str]:
+    return {"description": f"names a {kind.target} ({kind.rule})"}
+
+
+def _summary(cls: type[Object]) -> str:
+    return (cls.__doc__ or "").split("\n")[0]
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether JSON can say the value."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return all(map(_is_plain, value)) if isinstance(value, tuple) else value is not None
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=1))

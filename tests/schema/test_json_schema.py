@@ -1,0 +1,56 @@
+"""The JSON Schema in `schemas/` is the one the declarations give, and it judges as the reader of data does."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from osimlite.document.data import to_data
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.json_schema import json_schema
+from osimlite.schema.registry import tags
+
+jsonschema = pytest.importorskip("jsonschema")
+
+
+@pytest.fixture(scope="module")
+def validator() -> Any:
+    schema = json_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def test_the_file_is_current(repo: Path) -> None:
+    written = json.loads((repo / "schemas" / "osim-4.6.schema.json").read_text())
+    assert written == json.loads(json.dumps(json_schema())), "run: python -m osimlite.schema.json_schema > schemas/..."
+
+
+def test_every_class_has_its_definition() -> None:
+    assert set(tags()) <= json_schema()["$defs"].keys()
+
+
+def test_a_model_is_valid(validator: Any) -> None:
+    validator.validate(to_data(dynamic_walker()))
+
+
+@pytest.mark.parametrize(
+    ("damage", "word"),
+    [
+        ({"gravty": [0, 0, 0]}, "gravty"),
+        ({"gravity": [0, 0]}, "gravity"),
+        ({"body_set": [{"class": "PinJoint", "name": "x"}]}, "body_set"),
+        ({"body_set": [{"mass": "heavy"}]}, "body_set"),
+        ({"joint_set": [{"name": "x"}]}, "joint_set"),
+        ({"class": "Body"}, "Body"),
+    ],
+)
+def test_what_the_reader_refuses_the_schema_refuses(validator: Any, damage: dict[str, Any], word: str) -> None:
+    from osimlite.document.data import from_data
+    from osimlite.errors import ModelError
+
+    assert word in str(next(iter(validator.iter_errors({"name": "m", **damage}))))
+    with pytest.raises(ModelError):
+        from_data({"name": "m", **damage})
