@@ -1,38 +1,21 @@
 """Real files of old versions, upgraded, equal OpenSim's own conversion: every component, every property.
 
-Where the two differ OpenSim loses something or adds what it only computes; each such case is a function below, and
-holds exactly what OpenSim does.
+Where the two differ OpenSim loses something or adds what it only computes; `comparison.excepted` has every such case.
 """
 
 from __future__ import annotations
 
 import gzip
 import json
-import math
-from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
 from osimlite.document.printer import to_text
 from osimlite.document.reader import Document, read_document, read_text
 from osimlite.document.source import Source
-from osimlite.schema.base import FieldSpec, Object
-from osimlite.schema.fields import Held, Reference
 from osimlite.schema.model import CURRENT_VERSION, Model
-from osimlite.schema.tree import Tree, Use
 from tests.conftest import CorpusModel
-
-SIX_DIGITS = 1e-5
-"""What is left of a number after OpenSim has printed it with six digits."""
-
-ROUNDED = {
-    ("Body", "inertia"),
-    ("Mesh", "scale_factors"),
-    ("PhysicalOffsetFrame", "translation"),
-    ("PhysicalOffsetFrame", "orientation"),
-}
-"""Properties that OpenSim's upgrade writes with six digits; so does its printer with the arrays of functions."""
+from tests.document.upgrade.comparison import differences
 
 
 def old(corpus_model: CorpusModel) -> Document:
@@ -62,13 +45,7 @@ def test_components_are_opensims(corpus_model: CorpusModel) -> None:
 def test_properties_are_opensims(corpus_model: CorpusModel) -> None:
     converted = conversion(corpus_model)
     model = old(corpus_model).model
-    ours, theirs = model.tree(), converted.tree()
-    differences = [
-        f"{mine.tag} {mine.name}.{spec.name}: {getattr(mine, spec.name)!r} is {getattr(other, spec.name)!r} to OpenSim"
-        for mine, other, spec in properties(model, converted)
-        if not equal(mine, other, spec, ours, theirs) and not excepted(mine, other, spec, model)
-    ]
-    assert differences == []
+    assert differences(model, converted) == []
 
 
 def test_a_file_upgraded_is_read_again_equal(corpus_model: CorpusModel) -> None:
@@ -88,68 +65,3 @@ def test_references_lead_where_opensim_finds_them(corpus_model: CorpusModel) -> 
     broken = [use for use in tree.uses() if tree.resolve(use).failure and use.spec.name != "members"]
     if document.version < 40000 or str(truth["load"]["stage"]).startswith("ok"):
         assert [(use.holder.name, use.spec.name, use.value) for use in broken] == []
-
-
-def properties(ours: Object, theirs: Object) -> Iterator[tuple[Object, Object, FieldSpec]]:
-    """Every property of two objects and of what they hold, side by side; classes and numbers of objects are equal."""
-    assert type(ours) is type(theirs), f"{ours!r} is {theirs!r} to OpenSim"
-    for spec in type(ours).field_specs().values():
-        if not isinstance(spec.kind, Held):
-            yield ours, theirs, spec
-            continue
-        mine, other = held(ours, spec), held(theirs, spec)
-        assert len(mine) == len(other), f"{ours!r} holds {len(mine)} in {spec.name}, {len(other)} for OpenSim"
-        for one, two in zip(mine, other, strict=True):
-            yield from properties(one, two)
-
-
-def held(item: Object, spec: FieldSpec) -> list[Object]:
-    value = getattr(item, spec.name)
-    return value if isinstance(value, list) else [] if value is None else [value]
-
-
-def equal(mine: Object, other: Object, spec: FieldSpec, ours: Tree, theirs: Tree) -> bool:
-    left, right = getattr(mine, spec.name), getattr(other, spec.name)
-    if isinstance(spec.kind, Reference) and spec.name.startswith("socket_") and left != right:
-        # OpenSim writes every path in one spelling; what counts is where it leads.
-        return led(mine, spec, ours) == led(other, spec, theirs)
-    rounded = (type(mine).__name__, spec.name) in ROUNDED or (spec.legacy and isinstance(left, tuple))
-    return same(left, right, SIX_DIGITS if rounded else 0.0)
-
-
-def led(item: Object, spec: FieldSpec, tree: Tree) -> str | None:
-    target = tree.resolve(Use(item, tree.owner_of(item), spec, getattr(item, spec.name))).target
-    return None if target is None else tree.path_of(target)
-
-
-def same(left: Any, right: Any, tolerance: float) -> bool:
-    if isinstance(left, tuple) and isinstance(right, tuple):
-        return len(left) == len(right) and all(same(a, b, tolerance) for a, b in zip(left, right, strict=True))
-    if isinstance(left, float) and isinstance(right, float):
-        near = math.isclose(left, right, rel_tol=tolerance, abs_tol=1e-12 if tolerance else 0.0)
-        return near or (left != left and right != right)
-    return bool(left == right)
-
-
-def excepted(mine: Object, other: Object, spec: FieldSpec, model: Model) -> bool:
-    """Whether OpenSim differs for a reason of its own, which is the same for files of the current version."""
-    left, right = getattr(mine, spec.name), getattr(other, spec.name)
-    match type(mine).__name__, spec.name:
-        case "FrameGeometry", "socket_frame":
-            # Connecting sets it, whatever the file says.
-            return (left, right) == ("", "..")
-        case "WrapTorus" | "WrapCylinder" | "WrapSphere" | "WrapEllipsoid", "quadrant":
-            # OpenSim writes out what the default stands for.
-            return (left, right) == ("Unassigned", "all")
-        case "ActiveForceLengthCurve", "minimum_value":
-            # An equilibrium muscle with damping sets its own curve's floor.
-            return (left, right) == (0.1, 0.0)
-        case "Appearance", "color":
-            # OpenSim paints every ligament green, whatever colour the file gives it; we keep the file's.
-            paths = [force.geometry_path for force in model.components() if type(force).__name__ == "Ligament"]
-            return right == (0.0, 1.0, 0.0) and any(mine is path.appearance for path in paths)
-        case "ObjectGroup", "members":
-            # OpenSim drops, without a word, members that the set does not have.
-            names = {force.name for force in model.force_set.objects}
-            return right == tuple(name for name in left if name in names)
-    return False

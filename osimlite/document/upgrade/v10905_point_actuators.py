@@ -12,7 +12,11 @@ _RENAMED = {
 
 @step(below=10905)
 def actuator_bodies(draft: Draft) -> None:
-    """Point and torque actuators say where they act, with the opposite direction."""
+    """Point and torque actuators say where they act, with the opposite direction.
+
+    The direction was one in the frame of the body reacted from, which is ground unless the document says otherwise.
+    OpenSim sets force_is_global for that too, but leaves it out when it prints the model.
+    """
     for actuator in draft.tagged(*_RENAMED):
         names = _RENAMED[actuator.tag]
         touched = False
@@ -23,11 +27,17 @@ def actuator_bodies(draft: Draft) -> None:
                 if child.tag == "direction_A":
                     child.text = _opposite(child)
                 draft.rename(child, new)
-        if actuator.tag == "PointActuator" and actuator.find("force_is_global") is None:
-            draft.add(actuator, "force_is_global", "true", source=actuator)
-            touched = True
+        lost = None
+        if actuator.tag == "PointActuator":
+            reacting = actuator.find("body_A")
+            if reacting is not None:
+                name = plain(reacting)
+                lost = None if name in ("", "ground") else f"that the force reacts on '{name}'"
+                draft.remove(reacting)
+            if touched and actuator.find("force_is_global") is None:
+                draft.add(actuator, "force_is_global", "true", source=actuator)
         if touched:
-            draft.changed(actuator)
+            draft.changed(actuator, lost=lost)
 
 
 def _opposite(element: Element) -> str:

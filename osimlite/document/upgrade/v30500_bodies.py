@@ -25,5 +25,5 @@ def body_inertia(draft: Draft) -> None:
 def joint_child_places(draft: Draft) -> None:
     """<location> and <orientation> of a joint are those in the child."""
     for joint in draft.every("Joint"):
-        for old, new in _JOINT.items():
-            draft.rename_child(joint, old, new)
+        if any([draft.rename_child(joint, old, new) for old, new in _JOINT.items()]):
+            draft.changed(joint)
