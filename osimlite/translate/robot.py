@@ -22,7 +22,8 @@ from typing import Literal
 import numpy as np
 
 from osimlite.multibody.functions import IDENTITY, Constant, Function, Linear, Scaled
-from osimlite.multibody.mechanism import GROUND, Mechanism, MobileBody, Values
+from osimlite.multibody.joints import Mobilizer
+from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.motions import AxisMotion, Fixed
 from osimlite.multibody.spatial import Array, rotation_about, transform
 from osimlite.translate.shapes import Visual
@@ -194,16 +195,16 @@ class _Builder:
 
     def robot(self, visuals: Mapping[str, Sequence[Visual]]) -> Robot:
         self.links.append(Link(WORLD, visuals=tuple(visuals.get("/ground", ())), bodies={"/ground": np.eye(4)}))
-        # Link and frame in it, of every body so far; GROUND (-1) reaches the last.
-        placed: dict[int, tuple[str, Array]] = {GROUND: (WORLD, np.eye(4))}
+        # Link and frame in it, of ground (-1) and every body so far.
+        placed: dict[int, tuple[str, Array]] = {-1: (WORLD, np.eye(4))}
         for index, body in enumerate(self.mechanism.bodies):
-            placed[index] = self._body(index, body, *placed[body.parent], tuple(visuals.get(body.path, ())))
+            placed[index] = self._body(index, *placed[body.parent], tuple(visuals.get(body.path, ())))
         return Robot(self.mechanism.name, tuple(self.links), tuple(self.joints), self.mechanism)
 
-    def _body(
-        self, index: int, body: MobileBody, parent: str, start: Array, visuals: tuple[Visual, ...]
-    ) -> tuple[str, Array]:
-        motions, frames = self._split(body, start)
+    def _body(self, index: int, parent: str, start: Array, visuals: tuple[Visual, ...]) -> tuple[str, Array]:
+        body = self.mechanism.bodies[index]
+        mobilizer = body.mobilizer
+        motions, frames = self._split(mobilizer, start)
         name = self.body_names[index]
         if motions and self.body_frames:
             _carry_back(motions, frames)
@@ -211,15 +212,15 @@ class _Builder:
         off_axis = bool(motions) and self.body_frames and not np.array_equal(last, np.eye(4))
         for place, (motion, origin) in enumerate(zip(motions, frames, strict=True)):
             carries_body = place == len(motions) - 1 and not off_axis
-            joint = self._joint(motion, body, origin, parent, "" if carries_body else None, name)
+            joint = self._joint(motion, mobilizer, origin, parent, "" if carries_body else None, name)
             if not carries_body:
                 self.links.append(Link(joint.child))
             self.joints.append(joint)
             parent = joint.child
         if not motions or off_axis:
             suffix = "_frame" if off_axis else ""
-            joint_name = self._unique(body.mobilizer.joint.rsplit("/", 1)[1] + suffix)
-            self.joints.append(RobotJoint(joint_name, "fixed", parent, name, last, source=body.mobilizer.joint))
+            joint_name = self._unique(mobilizer.joint.rsplit("/", 1)[1] + suffix)
+            self.joints.append(RobotJoint(joint_name, "fixed", parent, name, last, source=mobilizer.joint))
             last = np.eye(4)
         properties = body.mass_properties
         self.links.append(
@@ -235,9 +236,9 @@ class _Builder:
         return name, last
 
     def _joint(
-        self, motion: AxisMotion, body: MobileBody, origin: Array, parent: str, child: str | None, body_name: str
+        self, motion: AxisMotion, mobilizer: Mobilizer, origin: Array, parent: str, child: str | None, body_name: str
     ) -> RobotJoint:
-        places = tuple(body.mobilizer.coordinates[place] for place in motion.coordinates)
+        places = tuple(mobilizer.coordinates[place] for place in motion.coordinates)
         name = self.coordinate_names[places[0]] if motion.coordinate is not None else None
         if name is not None:
             # A second joint driven by the same coordinate needs a name of its own.
@@ -253,15 +254,15 @@ class _Builder:
             axis=motion.axis,
             coordinates=places,
             function=motion.function,
-            source=body.mobilizer.joint,
+            source=mobilizer.joint,
         )
 
-    def _split(self, body: MobileBody, start: Array) -> tuple[list[AxisMotion], list[Array]]:
+    def _split(self, mobilizer: Mobilizer, start: Array) -> tuple[list[AxisMotion], list[Array]]:
         """The m motions on the way to the body, and the m + 1 fixed transforms before, between and after them."""
-        own = list(body.mobilizer.coordinates)
+        own = list(mobilizer.coordinates)
         motions: list[AxisMotion] = []
         frames = [start]
-        for part in body.mobilizer.elementary():
+        for part in mobilizer.elementary():
             for factor in self._simplified(part, own):
                 if isinstance(factor, Fixed):
                     frames[-1] = frames[-1] @ factor.matrix

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, rotation_about, transform
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, FrameGeometry, Geometry, Mesh, Sphere
@@ -84,7 +84,7 @@ class _Collector:
         if surface.representation != 3 or surface.texture:
             note("appearance", path, "a shape drawn as points or lines, or with a texture", "filled, in its colour")
         body, where = self.mechanism.frames[frame]
-        owner = "/ground" if body == GROUND else self.mechanism.bodies[body].path
+        owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
         visual = Visual(shape, where @ placed, (*appearance.color, appearance.opacity), path)
         self.found.by_body.setdefault(owner, []).append(visual)
 

@@ -1,0 +1,69 @@
+"""What the views need to know of a motion, and the few numbers they work out from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+
+
+class Motion(Protocol):
+    """A recorded motion of n moments: a Trajectory, or anything like it."""
+
+    @property
+    def times(self) -> Array:
+        """Moments (n,), s."""
+
+    @property
+    def coordinates(self) -> Sequence[str]:
+        """Names of the k coordinates, in the order of the columns of `values` and `speeds`."""
+
+    @property
+    def values(self) -> Array:
+        """Coordinate values (n, k), rad or m."""
+
+    @property
+    def speeds(self) -> Array:
+        """Generalized speeds (n, k)."""
+
+    @property
+    def forces(self) -> Mapping[str, Array]:
+        """Columns (n,) by OpenSim's labels, as ``RFootForce.RightShank.force.X``; in SI units."""
+
+
+class ContactForce(NamedTuple):
+    """Force (n, 3) in ground of the force element `element` on the frame `frame`, N."""
+
+    element: str
+    frame: str
+    vectors: Array
+
+
+def contact_forces(motion: Motion) -> list[ContactForce]:
+    """The force vectors among the columns of `motion.forces`, in their order."""
+    found = []
+    for label in motion.forces:
+        if label.endswith(".force.X"):
+            place = label.removesuffix(".force.X")
+            element, _, frame = place.partition(".")
+            vectors = np.column_stack([np.asarray(motion.forces[f"{place}.force.{axis}"]) for axis in "XYZ"])
+            found.append(ContactForce(element, frame, vectors))
+    return found
+
+
+def at_times(motion: Motion, columns: Array, times: Array) -> Array:
+    """Columns (n, k) of the motion at other times (m,), along straight lines between the moments on record."""
+    recorded = np.asarray(motion.times, dtype=float)
+    return np.column_stack([np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])])
+
+
+def in_mechanism_order(motion: Motion, mechanism: Mechanism, columns: Array) -> Array:
+    """Columns (n, k) of the motion in the order of the mechanism's coordinates (n, c); defaults where it has none."""
+    result = np.tile(mechanism.default_state()[0], (len(columns), 1))
+    for k, name in enumerate(motion.coordinates):
+        result[:, mechanism.coordinate_index(name)] = columns[:, k]
+    return result

@@ -1,0 +1,223 @@
+"""Pictures of a simulation: coordinates, contact forces, other forces, and energy over time."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import OsimliteError
+from osimlite.files import write_atomically
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.view.motion import ContactForce, Motion, contact_forces, in_mechanism_order
+
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Colours that colour-blind people tell apart (Okabe and Ito, 2008), without the yellow, too pale for lines."""
+
+STYLES = ("-", "--", ":")
+"""Once all colours are used they come again in another style."""
+
+LINES_IN_PANEL = 7
+
+MOST_ENERGIES = 400
+"""Moments at which energy is worked out; more would not show."""
+
+_NEVER_MIND = 1e-9
+"""A force below this part of the largest counts as none."""
+
+
+def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechanism | None = None) -> list[Path]:
+    """Draw the coordinates, the contact forces, the other forces and the energy of a motion over time.
+
+    Args:
+        trajectory: the motion.
+        folder: where the pictures go; made if it is not there.
+        mechanism: what moves; the trajectory's own if left out. Without any, coordinates cannot be told into angles
+            and lengths, and there is no picture of the energy.
+
+    Returns:
+        The PNG files: ``coordinates.png``, and as far as there is something to show ``contact_forces.png``,
+        ``other_forces.png`` and ``energy.png``.
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+        OsimliteError: the motion has no moments, or the folder cannot be written to.
+    """
+    if len(trajectory.times) == 0:
+        raise OsimliteError("the motion has no moments; nothing can be drawn")
+    known = mechanism if mechanism is not None else getattr(trajectory, "mechanism", None)
+    base = Path(folder)
+    try:
+        base.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(base)) from None
+    written = []
+    for name, figure in _figures(trajectory, known):
+        out = io.BytesIO()
+        figure.savefig(out, format="png", dpi=150)
+        write_atomically(base / name, out.getvalue())
+        written.append(base / name)
+    return written
+
+
+def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
+    """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), the latter zero at the start."""
+    times = np.asarray(motion.times, dtype=float)
+    places = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_ENERGIES)).astype(int))
+    q = in_mechanism_order(motion, mechanism, np.asarray(motion.values)[places])
+    u = in_mechanism_order(motion, mechanism, np.asarray(motion.speeds)[places])
+    kinetic = np.array([mechanism.kinetic_energy(*state) for state in zip(q, u, strict=True)])
+    height = np.array([mechanism.potential_energy(row) for row in q])
+    return times[places], {"kinetic": kinetic, "potential of gravity": height - height[0]}
+
+
+def _figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+    times = np.asarray(motion.times, dtype=float)
+    yield "coordinates.png", _coordinates(times, motion, mechanism)
+    contacts = list(_one_of_each_pair(contact_forces(motion)))
+    if contacts:
+        yield "contact_forces.png", _contacts(times, contacts)
+    others = {
+        label: np.asarray(column)
+        for label, column in motion.forces.items()
+        if ".force." not in label and ".torque." not in label and "PotentialEnergy" not in label
+    }
+    acting = {label: column for label, column in others.items() if np.any(column)}
+    if acting:
+        idle = [label for label in others if label not in acting]
+        yield "other_forces.png", _others(times, acting, idle)
+    if mechanism is not None:
+        yield "energy.png", _energy(*energies(motion, mechanism))
+
+
+def _coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> Any:
+    kinds: dict[str, dict[str, Array]] = {}
+    held = []
+    for k, name in enumerate(motion.coordinates):
+        column = np.asarray(motion.values)[:, k]
+        if mechanism is None:
+            kinds.setdefault("value (rad, m)", {})[name] = column
+            continue
+        info = mechanism.coordinates[mechanism.coordinate_index(name)]
+        if info.motion_type == "rotational":
+            label, column, unit = "angle (deg)", np.degrees(column), "deg"
+        elif info.motion_type == "translational":
+            label, unit = "displacement (m)", "m"
+        else:
+            label, unit = "coupled (rad, m)", ""
+        if info.locked:
+            held.append(f"{name} is locked at {column[0]:.4g} {unit}".rstrip())
+        else:
+            kinds.setdefault(label, {})[name] = column
+    panels = [(label, part) for label, lines in kinds.items() for part in _shared_out(lines)]
+    figure, axes = _sheet("Coordinates", [3.0] * max(1, len(panels)))
+    for panel, (label, lines) in zip(axes, panels, strict=False):
+        _lines(panel, times, lines)
+        panel.set_ylabel(label)
+    _finish(axes, times, "; ".join(held))
+    return figure
+
+
+def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
+    """Of an element that pushes two frames with opposite forces, the first; of any other, all."""
+    by_element: dict[str, list[ContactForce]] = {}
+    for force in forces:
+        by_element.setdefault(force.element, []).append(force)
+    for group in by_element.values():
+        opposite = len(group) == 2 and np.allclose(group[0].vectors, -group[1].vectors)
+        yield from group[:1] if opposite else group
+
+
+def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
+    sizes = {f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1) for force in forces}
+    threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
+    acting = {label: size for label, size in sizes.items() if size.max() > threshold}
+    figure, (above, below) = _sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
+    _lines(above, times, acting)
+    above.set_ylabel("force (N)")
+    above.set_ylim(bottom=0.0)
+    for row, size in enumerate(acting.values()):
+        spans = [(times[first], max(times[last] - times[first], 1e-3)) for first, last in _spans(size > threshold)]
+        below.broken_barh(spans, (row - 0.35, 0.7), facecolors=_style(row)["color"])
+    below.set_yticks(range(len(acting)), [label.split(" on ")[0] for label in acting])
+    below.set_ylim(len(acting) - 0.5, -0.5)
+    below.set_ylabel("in contact")
+    idle = [label.split(" on ")[0] for label in sizes if label not in acting]
+    _finish((above, below), times, f"never in contact: {', '.join(idle)}" if idle else "")
+    return figure
+
+
+def _others(times: Array, acting: Mapping[str, Array], idle: Sequence[str]) -> Any:
+    parts = _shared_out(acting)
+    figure, axes = _sheet("Forces on coordinates and others", [3.0] * len(parts))
+    for panel, part in zip(axes, parts, strict=True):
+        _lines(panel, times, part)
+        panel.set_ylabel("force (N) or torque (N·m)")
+    _finish(axes, times, f"never acting: {', '.join(idle)}" if idle else "")
+    return figure
+
+
+def _energy(times: Array, parts: Mapping[str, Array]) -> Any:
+    figure, (panel,) = _sheet("Energy", [3.6])
+    _lines(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
+    panel.set_ylabel("energy (J)")
+    note = "gravity: zero at the start; energy stored in contacts and limit springs is not in the sum"
+    _finish((panel,), times, note)
+    return figure
+
+
+def _sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
+    """A figure with panels of these heights (inches) above each other, and its panels."""
+    figures = require("matplotlib.figure", extra="plot", purpose="a picture of a simulation")
+    require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture of a simulation")
+    figure = figures.Figure(figsize=(9.0, 0.7 + sum(heights)), layout="constrained")
+    figure.suptitle(title, fontsize=13, x=0.02, ha="left", fontweight="bold")
+    grid = {"height_ratios": list(heights)}
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]
+    return figure, panels
+
+
+def _shared_out(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
+    """The lines of each panel: as many in one as in another, and no more than a reader can follow."""
+    items = list(lines.items())
+    size = ceil(len(items) / ceil(len(items) / LINES_IN_PANEL))
+    return [dict(items[first : first + size]) for first in range(0, len(items), size)]
+
+
+def _style(number: int) -> dict[str, Any]:
+    style = STYLES[number // len(COLORS) % len(STYLES)]
+    return {"color": COLORS[number % len(COLORS)], "ls": style, "lw": 1.6}
+
+
+def _lines(panel: Any, times: Array, lines: Mapping[str, Array]) -> None:
+    for number, (label, column) in enumerate(lines.items()):
+        panel.plot(times, column, label=label, **_style(number))
+    # Beside the panel, where it covers no data.
+    panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9)
+
+
+def _finish(panels: Sequence[Any], times: Array, note: str) -> None:
+    for panel in panels:
+        panel.grid(True, color="0.9", lw=0.8)
+        panel.set_axisbelow(True)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.margins(x=0.0)
+    if times[-1] > times[0]:
+        panels[-1].set_xlim(times[0], times[-1])
+    panels[-1].set_xlabel("time (s)")
+    if note:
+        panels[-1].annotate(
+            note, (0.0, 0.0), (0, -38), xycoords="axes fraction", textcoords="offset points", fontsize=8, color="0.35"
+        )
+
+
+def _spans(mask: Array) -> list[tuple[int, int]]:
+    """First and last place of every run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
+    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]

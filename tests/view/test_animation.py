@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+
+from osimlite.errors import MissingDependency, OsimliteError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.multibody import build_mechanism
+from osimlite.view import animate
+from osimlite.view.animation import FORCE, TOUCHING, _Film, _round_down
+from tests.view.motions import Recorded, stroll
+
+pytest.importorskip("matplotlib")
+Image = pytest.importorskip("PIL.Image")
+
+SMALL = (320, 240)
+
+
+def frames(path):
+    with Image.open(path) as film:
+        assert film.size == SMALL
+        for number in range(film.n_frames):
+            film.seek(number)
+            yield np.asarray(film.convert("RGB")).astype(int), film.info["duration"]
+
+
+def has(picture, color):
+    """How many pixels have a colour, up to the few shades of a shared palette."""
+    wanted = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
+    return int((np.abs(picture - wanted).max(axis=2) < 16).sum())
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    path = tmp_path_factory.mktemp("film") / "walk.gif"
+    told = []
+    result = animate(
+        dynamic_walker(), stroll(), path, size=SMALL, progress=lambda done, all_: told.append((done, all_))
+    )
+    assert result == path
+    return list(frames(path)), told
+
+
+def test_the_film_runs_at_the_speed_of_the_motion(film):
+    pictures, told = film
+    assert len(pictures) == 13
+    assert {duration for _, duration in pictures} == {40}
+    assert told == [(k, 13) for k in range(1, 14)]
+
+
+def test_forces_are_drawn_while_they_act(film):
+    pictures = [picture for picture, _ in film[0]]
+    # Loaded from 0.1 to 0.3 s; the scale of the forces has the same colour all the time.
+    scale = has(pictures[0], FORCE)
+    assert scale > 0
+    assert max(has(pictures[0], TOUCHING), has(pictures[12], TOUCHING)) < 20
+    assert has(pictures[5], FORCE) > scale + 50
+    assert has(pictures[5], TOUCHING) > 100
+
+
+def test_slow_motion_has_more_frames(tmp_path):
+    path = animate(dynamic_walker(), stroll(), tmp_path / "slow.gif", size=SMALL, speed=0.5, fps=20)
+    pictures = list(frames(path))
+    assert len(pictures) == 21 and pictures[0][1] == 50
+
+
+def test_the_camera_follows_the_mass_centre_of_what_moves():
+    mechanism = build_mechanism(dynamic_walker())
+    film = _Film(dynamic_walker(), stroll(), 25, 1.0, "xy")
+    names = [body.name for body in mechanism.bodies]
+    assert [name for name, moves in zip(names, film.moving, strict=False) if not moves] == ["Platform"]
+    for number in (0, 7):
+        q = mechanism.values({"Pelvis_tx": film.times[number]})
+        total = mechanism.center_of_mass(q) * 6.0 - film.poses[number].origins[names.index("Platform")]
+        assert film.focus[number] == pytest.approx(total[:2] / 5.0)
+
+
+def test_all_that_moves_is_in_the_picture():
+    film = _Film(dynamic_walker(), stroll(), 25, 1.0, "xy")
+    for pose, focus in zip(film.poses, film.focus, strict=True):
+        for outline in film.scene.outlines:
+            if film.moving[outline.body]:
+                away = np.abs(film.scene.silhouette(pose, outline) - focus)
+                assert (away <= film.reach + 1e-12).all()
+
+
+def test_a_model_without_shapes_is_a_stick_figure(tmp_path):
+    model = dynamic_walker()
+    for body in model.body_set.objects:
+        del body.attached_geometry[:]
+    path = animate(model, dataclasses.replace(stroll(), forces={}), tmp_path / "sticks.gif", size=SMALL)
+    with_sticks = next(frames(path))[0]
+    assert has(with_sticks, "#26323f") > 300
+
+
+@pytest.mark.parametrize("plane", ["yz", "xz"])
+def test_other_planes_can_be_drawn(plane, tmp_path):
+    assert len(list(frames(animate(dynamic_walker(), stroll(), tmp_path / "a.gif", size=SMALL, plane=plane)))) == 13
+
+
+def test_one_moment_makes_a_picture(tmp_path):
+    motion = stroll()
+    still = Recorded(motion.times[:1], motion.coordinates, motion.values[:1], motion.speeds[:1])
+    assert len(list(frames(animate(dynamic_walker(), still, tmp_path / "a.gif", size=SMALL)))) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"), [({"fps": 0}, "1 to 50"), ({"fps": 60}, "1 to 50"), ({"speed": 0.0}, "positive")]
+)
+def test_options_out_of_range_are_refused(options, said, tmp_path):
+    with pytest.raises(OsimliteError, match=said):
+        animate(dynamic_walker(), stroll(), tmp_path / "a.gif", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_left_behind_by_a_failure(tmp_path, monkeypatch):
+    motion = stroll()
+    empty = Recorded(motion.times[:0], motion.coordinates, motion.values[:0], motion.speeds[:0])
+    with pytest.raises(OsimliteError, match="no moments"):
+        animate(dynamic_walker(), empty, tmp_path / "a.gif")
+    monkeypatch.setitem(sys.modules, "PIL.Image", None)
+    with pytest.raises(MissingDependency, match=r"osimlite\[plot\]"):
+        animate(dynamic_walker(), motion, tmp_path / "a.gif")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("value", "round_"), [(0.37, 0.2), (5.0, 5.0), (999.0, 500.0), (1.0, 1.0)])
+def test_scales_are_round(value, round_):
+    assert _round_down(value) == pytest.approx(round_)

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+
+from osimlite.errors import MissingDependency, OsimliteError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.multibody import build_mechanism
+from osimlite.view import plot_simulation
+from osimlite.view.plots import _figures, energies
+from tests.view.motions import Recorded, stroll
+
+pytest.importorskip("matplotlib")
+
+
+def walker():
+    return build_mechanism(dynamic_walker())
+
+
+def drawn(name, motion=None, mechanism="walker"):
+    """The figure of a name, laid out as it will be saved."""
+    figures = dict(_figures(motion or stroll(), walker() if mechanism == "walker" else mechanism))
+    return laid_out(figures[name])
+
+
+def laid_out(figure):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure).draw()
+    return figure
+
+
+def lines(panel):
+    return {line.get_label(): line for line in panel.get_lines()}
+
+
+def test_pictures_are_written(tmp_path):
+    paths = plot_simulation(stroll(), tmp_path / "a" / "b", mechanism=walker())
+    assert [path.name for path in paths] == ["coordinates.png", "contact_forces.png", "other_forces.png", "energy.png"]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
+    assert sorted(path.name for path in (tmp_path / "a" / "b").iterdir()) == sorted(path.name for path in paths)
+
+
+def test_the_mechanism_of_the_trajectory_will_do(tmp_path):
+    motion = stroll()
+    motion.mechanism = walker()
+    assert len(plot_simulation(motion, tmp_path)) == 4
+
+
+def test_angles_are_in_degrees_and_lengths_in_metres():
+    figure = drawn("coordinates.png")
+    angles, lengths = figure.axes
+    assert angles.get_ylabel() == "angle (deg)" and lengths.get_ylabel() == "displacement (m)"
+    assert lengths.get_xlabel() == "time (s)"
+    assert lines(angles)["RHip_rz"].get_ydata()[0] == pytest.approx(30.0)
+    assert lines(lengths)["Pelvis_tx"].get_ydata()[-1] == pytest.approx(0.5)
+    assert "platform_rz" not in lines(angles)
+    assert [text.get_text() for text in lengths.texts] == ["platform_rz is locked at -10 deg"]
+
+
+def test_many_coordinates_are_shared_out_to_panels():
+    names = tuple(f"c{k}" for k in range(16))
+    times = np.linspace(0.0, 1.0, 5)
+    motion = Recorded(times, names, np.ones((5, 16)), np.zeros((5, 16)))
+    figure = drawn("coordinates.png", motion, None)
+    assert [len(panel.get_lines()) for panel in figure.axes] == [6, 6, 4]
+    assert "energy.png" not in dict(_figures(motion, None))
+
+
+def test_no_legend_covers_data_and_all_is_on_the_sheet():
+    motion = stroll()
+    for _, figure in _figures(motion, walker()):
+        sheet = laid_out(figure).bbox
+        for panel in figure.axes:
+            legend = panel.get_legend()
+            if legend is not None:
+                box = legend.get_window_extent()
+                assert not box.overlaps(panel.get_window_extent())
+                assert box.x1 <= sheet.x1 + 1
+            for text in (*panel.texts, panel.xaxis.label, panel.yaxis.label):
+                if text.get_text():
+                    box = text.get_window_extent()
+                    assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= sheet.x1
+
+
+def test_contact_forces_are_sizes_of_what_acts():
+    above, below = drawn("contact_forces.png").axes
+    assert set(lines(above)) == {"RFootForce on RightShank"}
+    assert lines(above)["RFootForce on RightShank"].get_ydata().max() == pytest.approx(100.0)
+    assert above.get_ylabel() == "force (N)"
+    assert "never in contact: LFootForce" in [text.get_text() for text in below.texts]
+    (bars,) = below.collections
+    assert np.ptp(bars.get_paths()[0].vertices[:, 0]) == pytest.approx(0.18, abs=0.011)
+
+
+def test_other_forces_leave_out_what_never_acts():
+    (panel,) = drawn("other_forces.png").axes
+    assert set(lines(panel)) == {"RKneeLimitTorque"}
+    assert [text.get_text() for text in panel.texts] == ["never acting: LKneeLimitTorque"]
+
+
+def test_energy_is_that_of_the_mechanism():
+    motion, mechanism = stroll(1001), walker()
+    times, parts = energies(motion, mechanism)
+    assert len(times) == 400 and times[-1] == motion.times[-1]
+    at = 200
+    q, u = motion.values[0].copy(), motion.speeds[0]
+    q[mechanism.coordinate_index("Pelvis_tx")] = times[at]
+    assert parts["kinetic"][at] == pytest.approx(mechanism.kinetic_energy(q, u), rel=1e-12)
+    # 5 kg slide down 10 degrees.
+    fall = -5.0 * 9.80665 * times[at] * np.sin(np.radians(10))
+    assert parts["potential of gravity"][at] == pytest.approx(fall, rel=1e-9)
+
+
+def test_a_motion_without_forces_has_no_pictures_of_forces(tmp_path):
+    motion = dataclasses.replace(stroll(), forces={})
+    names = [path.name for path in plot_simulation(motion, tmp_path, mechanism=walker())]
+    assert names == ["coordinates.png", "energy.png"]
+
+
+def test_failures_are_said_in_a_sentence(tmp_path, monkeypatch):
+    motion = stroll()
+    empty = Recorded(motion.times[:0], motion.coordinates, motion.values[:0], motion.speeds[:0])
+    with pytest.raises(OsimliteError, match="no moments"):
+        plot_simulation(empty, tmp_path)
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(OsimliteError, match="cannot make this folder"):
+        plot_simulation(motion, tmp_path / "taken")
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MissingDependency, match=r"osimlite\[plot\]"):
+        plot_simulation(motion, tmp_path)
