@@ -24,6 +24,7 @@ _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
 _BLANK_CONTROLS = str.maketrans("\f\v", "  ")
 _ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
 _DECLARATION = re.compile(r"<\?xml\s")
+_SPECIAL = re.compile(r"<!(?:--|\[CDATA\[)")
 _EN_DASH = "\u2013"
 
 
@@ -51,6 +52,12 @@ def read_repaired(
             f"an unfinished merge: '{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out",
             file=source.file, line=line, column=column,
         )  # fmt: skip
+    unended = _unended(source.text)
+    if unended is not None:
+        line, column, _ = source.position(unended)
+        raise NotWellFormedError(
+            "not well-formed XML: what begins here with '<!' has no end", file=source.file, line=line, column=column
+        )
     text, repairs = repaired(source.text)
     if not repairs:
         raise fault
@@ -89,7 +96,7 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
         if kind == "comment":
             piece = _comment(piece, start, repairs)
         elif kind == "instruction":
-            if _DECLARATION.match(piece) and text[:start].strip("\ufeff \t\r\n"):
+            if _DECLARATION.match(piece) and place > 0:
                 repairs.append(Repair("stray-text", start, piece, ""))
                 piece = _blanked(piece)
         elif kind in ("open", "empty"):
@@ -101,6 +108,15 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
         place = end
     pieces.append(_outside(text[place:], place, repairs) if depth <= 0 else text[place:])
     return "".join(pieces), repairs
+
+
+def _unended(text: str) -> int | None:
+    """Where a comment or its like begins that never ends."""
+    place = 0
+    for _, _, end, _ in markup(text):
+        place = end
+    found = _SPECIAL.search(text, place)
+    return None if found is None else found.start()
 
 
 def _bare(tag: str) -> str:

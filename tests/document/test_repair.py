@@ -1,0 +1,183 @@
+"""Text that is not quite XML: read where its meaning is certain, with a note; else refused, with line and column."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from osimlite.document.printer import to_text
+from osimlite.document.reader import Document, read_document, read_text
+from osimlite.document.source import Source
+from osimlite.errors import DocumentError
+
+HEAD = '<?xml version="1.0" encoding="UTF-8" ?>\n'
+TEXT = HEAD + (
+    '<OpenSimDocument Version="40600">\n<Model name="walker">\n<credits>Anna</credits>\n<BodySet>\n<objects>\n'
+    '<Body name="thigh">\n<mass>8</mass>\n</Body>\n</objects>\n</BodySet>\n</Model>\n</OpenSimDocument>\n'
+)
+
+
+def document(text: str | bytes) -> Document:
+    return read_document(Source(text if isinstance(text, bytes) else text.encode()))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kind", "line"),
+    [
+        (HEAD, "// saved by hand\n\n" + HEAD, "stray-text", 1),
+        (HEAD, "<!-- saved by hand -->\n" + HEAD, "stray-text", 2),
+        (HEAD, "\ufeff\ufeff" + HEAD, "stray-text", 1),
+        ("</OpenSimDocument>\n", "</OpenSimDocument>\n~\n", "stray-text", 14),
+        ("<mass>", "<!-- heavy -- too heavy? -->\n<mass>", "hyphens-in-comment", 8),
+        ("<mass>", "<!----- heavy ----->\n<mass>", "hyphens-in-comment", 8),
+        ("Anna", "Anna & Bert", "bare-ampersand", 4),
+        ("Anna", "Anna&nbsp;Berg", "bare-ampersand", 4),
+        ('<Body name="thigh">', '<Body name="femur"  name="thigh">', "duplicate-attribute", 7),
+    ],
+)
+def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
+    found = document(TEXT.replace(old, new, 1))
+    assert [(note.kind, note.line) for note in found.notes] == [(kind, line)]
+    assert found.fault is not None
+    thigh = found.model["/bodyset/thigh"]
+    assert thigh.mass == 8
+    # Positions are those of the text as it is.
+    source = found.source
+    assert source.lines[source.of_tag(thigh._index).line - 1].startswith("<Body")
+    mass = source.child(thigh._index, "mass")
+    assert mass is not None
+    assert source.lines[source.of_tag(mass).line - 1].endswith("<mass>8</mass>")
+    # What is written is XML.
+    assert read_document(Source(to_text(found.model).encode())).notes == []
+
+
+def test_well_formed_text_has_no_fault() -> None:
+    found = document(TEXT)
+    assert (found.notes, found.fault) == ([], None)
+
+
+def test_everything_at_once() -> None:
+    text = TEXT.replace("Anna", "A & B &copy; C &amp; D").replace("<mass>", "<!-- a -- b -- c --><mass>")
+    found = document("notes:\n" + text.replace('name="thigh"', "name='a' name = \"thigh\"") + "bye")
+    kinds = [note.kind for note in found.notes]
+    assert kinds == [
+        "stray-text",
+        "bare-ampersand",
+        "bare-ampersand",
+        "duplicate-attribute",
+        "hyphens-in-comment",
+        "stray-text",
+    ]
+    assert found.model.credits == "A & B \u00a9 C & D"
+    assert [found.source.spans[note.number].tag for note in found.notes[1:5]] == ["credits", "credits", "Body", "Body"]
+
+
+def test_the_last_of_two_attributes_counts_as_for_opensim() -> None:
+    found = document(TEXT.replace('<Body name="thigh">', '<Body name="a" name="b" name="thigh">'))
+    assert found.model["/bodyset/thigh"].mass == 8
+    assert [note.word for note in found.notes] == ["name", "name"]
+
+
+def test_a_comment_with_hyphens_looks_the_same() -> None:
+    found = document(TEXT.replace("<mass>", "<!---- hand-made ---->\n<mass>"))
+    assert "<!--\u2013\u2013 hand-made \u2013\u2013-->" in to_text(found.model)
+
+
+@pytest.mark.parametrize("reference", ["&lt;", "&#65;", "&#x42;", "&amp;", "&quot;"])
+def test_references_of_xml_are_left_alone(reference: str) -> None:
+    found = document(TEXT.replace("Anna", f"Anna {reference} & Bert"))
+    assert [note.word for note in found.notes] == ["&"]
+
+
+def test_references_of_html_make_no_markup() -> None:
+    assert (
+        document(TEXT.replace("Anna", "&LT;mass&GT; &NewLine; &AMP; &bad; &#;")).model.credits == "<mass> & &bad; &#;"
+    )
+
+
+def test_a_conflict_is_refused_where_it_begins() -> None:
+    text = TEXT.replace("<mass>8</mass>", "<<<<<<< HEAD\n<mass>8</mass>\n=======\n<mass>9</mass>\n>>>>>>> faster")
+    with pytest.raises(DocumentError) as caught:
+        document(text)
+    assert (caught.value.line, caught.value.column) == (8, 1)
+    assert "<<<<<<< HEAD" in caught.value.message
+    assert "merge" in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("</mass>", "", 9),
+        ("</Body>", "</Boddy>", 9),
+        ("<mass>8</mass>", "<mass>8 < 9</mass>", 8),
+        ("<mass>8</mass>", "<mass>\x01</mass>", 8),
+        ('name="thigh"', "name=thigh", 7),
+        ("</OpenSimDocument>", "", 14),
+        ("</OpenSimDocument>", "</OpenSimDocument><More/>", 13),
+        ("<mass>8</mass>", "<mass>8</mass><!-- no end", 8),
+        ("<mass>8</mass>", "<mass>8 & 9</mas>", 8),
+    ],
+)
+def test_what_may_mean_two_things_is_refused(old: str, new: str, line: int) -> None:
+    with pytest.raises(DocumentError) as caught:
+        document(TEXT.replace(old, new, 1))
+    assert caught.value.line == line
+    assert caught.value.column is not None
+
+
+def test_control_characters_that_are_white_space() -> None:
+    assert document(TEXT.replace("Anna", "Anna\fand\vBert & Co")).model.credits == "Anna and Bert & Co"
+
+
+# Encodings
+
+
+@pytest.mark.parametrize(
+    ("data", "encoding"),
+    [
+        (TEXT.replace("Anna", "Ren\u00e9").encode("utf-8-sig"), "utf-8-sig"),
+        (TEXT.replace("Anna", "Ren\u00e9").encode("utf-16"), "utf-16"),
+        (TEXT.replace("Anna", "Ren\u00e9").encode("utf-32"), "utf-32"),
+        (TEXT.replace("Anna", "Ren\u00e9").encode("cp1252"), "cp1252"),
+        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "ISO-8859-1").encode("latin-1"), "iso-8859-1"),
+        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "windows-1252").encode("cp1252"), "windows-1252"),
+        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "UTF-16").encode(), "utf-8"),
+        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "klingon").encode(), "utf-8"),
+        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "punycode").encode(), "utf-8"),
+    ],
+)
+def test_every_encoding_is_read(data: bytes, encoding: str) -> None:
+    source = Source(data)
+    assert source.encoding == encoding
+    assert read_document(source).model.credits == "Ren\u00e9"
+
+
+def test_one_foreign_byte_spoils_nothing_else() -> None:
+    data = TEXT.replace("Anna", "Ren\u00e9 \u2013 ").encode() + b"<!-- 1 \x96 2 -->\n"
+    source = Source(data)
+    assert source.encoding == "cp1252"
+    assert read_document(source).model.credits == "Ren\u00e9 \u2013"
+    assert "1 \u2013 2" in source.text
+
+
+def test_half_a_character_of_two_bytes() -> None:
+    data = TEXT.encode("utf-16")
+    for cut in (data[:-1], data[:101], b"\xff\xfe", b"\xfe\xff\x00", b"\xff\xfe\x00\x00\x00"):
+        Source(cut)
+
+
+# Nothing hangs on any text
+
+
+@pytest.mark.parametrize(
+    "piece",
+    ["<", "<a", "<!--", "<a b='", '<a b="', "<![CDATA[", "</", "<a ", "&", "a", "<?", "<!DOCTYPE", "--", "=\" '"],
+)
+def test_time_is_linear_in_the_length(piece: str) -> None:
+    text = "<OpenSimDocument Version='40600'><Model>" + piece * (400_000 // len(piece))
+    start = time.perf_counter()
+    with pytest.raises(DocumentError) as caught:
+        read_text(text)
+    assert caught.value.line == 1
+    assert time.perf_counter() - start < 5
