@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from osimlite.lint.engine import INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
@@ -55,7 +55,8 @@ def missing_mesh(subject: Subject, found: Found) -> None:
         message = f"the file '{name}' of {called(item)} is not there; looked in {tried}"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
-        found(message, item, tag=tag, suggestion=twin)
+        severity = ERROR if isinstance(item, ContactMesh) and twin is None else None
+        found(message, item, tag=tag, suggestion=twin, severity=severity)
 
 
 @rule("OSIM702", "included-file", severity=INFO)

@@ -49,7 +49,9 @@ def duplicate_name(subject: Subject, found: Found) -> None:
     tree = subject.tree
     for renamed in tree.renamed:
         item = renamed.component
-        if not item.name or isinstance(item, Unknown) or (item._index is None and subject.source is not None):
+        # Of what has no name in the file nobody expects one.
+        named = subject.source is None or "name" in item.model_fields_set
+        if not item.name or not named or isinstance(item, Unknown):
             continue
         users = _who_names(subject, renamed.first)
         message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"
@@ -125,7 +127,10 @@ def missing_name(subject: Subject, found: Found) -> None:
         path = tree.path_of(component) or ""
         message = f"this {called(component)} has no name; OpenSim calls it '{path.rpartition('/')[2]}'"
         if wanted:
-            count = times(len([b for b in broken_references(subject) if _last(b.text) == wanted[0]]), "reference")
+            count = times(
+                len([b for b in broken_references(subject) if _last(b.text) == wanted[0] and b.why == "missing"]),
+                "reference",
+            )
             message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
         found(
             message,
@@ -150,8 +155,10 @@ def _wanted_names(subject: Subject, component: Component) -> list[str]:
     names: dict[str, None] = {}
     for broken in broken_references(subject):
         use = broken.use
-        if broken.why != "missing" or not any(
-            base.__name__ == use.reference.target for base in type(component).__mro__
+        if (
+            use.reference.rule == "set-member"
+            or broken.why != "missing"
+            or not any(base.__name__ == use.reference.target for base in type(component).__mro__)
         ):
             continue
         name = _last(broken.text)

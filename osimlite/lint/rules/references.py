@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple, cast
 
-from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Object, Unknown, reference_specs
@@ -242,7 +242,7 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     stripped = text.strip(",;")
     if stripped != text and tree.lookup(reference, stripped, use.owner).target is not None:
         return Broken(use, text, "missing", None, stripped, "comma")
-    right = tree.spellings(use)
+    right = _right_words(subject, use)
     last = text.rstrip("/").rpartition("/")[2]
     same_name = [word for word in right if word.rpartition("/")[2] == last]
     if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
@@ -259,6 +259,15 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
         return Broken(use, text, "case", None, lowered[0])
     hint = "illegal" if resolution.failure == "illegal" else ""
     return Broken(use, text, "missing", None, _nearest_name(text, right), hint)
+
+
+def _right_words(subject: Subject, use: Use) -> list[str]:
+    """Every text that would be right; the same for all references of one kind in one component."""
+    known = cast("dict[tuple[str, str, int], list[str]]", subject.kept.setdefault("right words", {}))
+    key = (use.reference.rule, use.reference.target, id(use.owner))
+    if key not in known:
+        known[key] = subject.tree.spellings(use)
+    return known[key]
 
 
 def _same_place(text: str, candidates: list[str]) -> bool:
@@ -356,4 +365,14 @@ def _report(subject: Subject, found: Found, broken: Broken, message: str) -> Non
     value = getattr(use.holder, use.spec.name)
     before = value[: use.position] if isinstance(value, tuple) and use.position else ()
     nth = sum(1 for word in before if word == broken.text)
-    found(message, use.holder, tag=use.spec.tag, word=broken.text, nth=nth, suggestion=broken.suggestion)
+    # OpenSim drops what a group names wrongly and goes on.
+    severity = WARNING if use.reference.rule == "set-member" else None
+    found(
+        message,
+        use.holder,
+        tag=use.spec.tag,
+        word=broken.text,
+        nth=nth,
+        suggestion=broken.suggestion,
+        severity=severity,
+    )

@@ -41,7 +41,7 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         if _other_rule(note, owner):
             continue
         specs = field_specs(type(owner))
-        suggestion = nearest(note.word, specs)
+        suggestion = nearest(note.word, specs, cutoff=70)
         message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
         if suggestion is not None:
             kept = _default_of(specs[suggestion])

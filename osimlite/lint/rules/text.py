@@ -11,6 +11,8 @@ from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
 _CONFLICT = re.compile(r"^(<{7}|>{7})(?= |$)[^\n]*", re.MULTILINE)
+_OLDEST_FOR_OPENSIM = 10901
+"""The oldest version that OpenSim 4.6 loads."""
 _SOCKETS = 30505
 """The version in which joints, points and forces got sockets."""
 _SOCKET = re.compile(r"<(socket_(?:parent|child)_frame)>")
@@ -182,6 +184,13 @@ def document_version(subject: Subject, found: Found) -> None:
         if isinstance(fault, VersionError):
             wanted = None if fault.version is not None else str(CURRENT_VERSION)
             found(fault.message, number=0, attribute="Version", suggestion=wanted)
+    if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
+        found(
+            f"version {subject.version} is too old for OpenSim 4.6, which refuses it; `osimlite upgrade` writes the "
+            "model in the current format",
+            number=0,
+            attribute="Version",
+        )
     if subject.version is not None and subject.version < _SOCKETS and (word := _SOCKET.search(subject.source.text)):
         found(
             f"the document says version {subject.version} and holds <{word[1]}>, which came later: OpenSim reads it by "

@@ -303,7 +303,7 @@ def massless_leaf(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     A force on such a body would accelerate it without bounds: the mass matrix is singular, and OpenSim refuses the
-    model. Between two bodies with mass, or welded to one, a massless body is fine.
+    model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or welded to one, a massless body is fine.
 
     ## Example
     ```xml
@@ -321,7 +321,7 @@ def massless_leaf(subject: Subject, found: Found) -> None:
     for body, members in _massless_leaves(bones):
         welded = f" with the bodies welded to it ({listed(item.name for item in members)})" if members else ""
         found(
-            f"{called(body)}{welded} has no mass and is the end of its chain: OpenSim refuses the model",
+            f"{called(body)}{welded} is massless and the end of its chain: OpenSim refuses the model or computes NaN",
             body,
             tag="mass",
         )

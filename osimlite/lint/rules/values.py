@@ -440,7 +440,8 @@ def _value_notes(subject: Subject, *kinds: str) -> Iterator[tuple[Note, Object, 
 
 def _all_read(text: str, kind: Value) -> bool:
     """Whether every word is one of its kind, so that only their count is wrong."""
-    reads: Callable[[str], object] = {"double": real, "int": whole, "bool": flag, "string": str}[kind.scalar]
+    readers: dict[str, Callable[[str], object]] = {"double": real, "int": whole, "bool": flag, "string": str}
+    reads = readers[kind.scalar]
     try:
         for word in text.split():
             reads(word)
