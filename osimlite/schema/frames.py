@@ -57,7 +57,7 @@ class PhysicalOffsetFrame(PhysicalFrame):
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
 
 
-_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+_AXES = ("+x", "-x", "x", "+y", "-y", "y", "+z", "-z", "z")
 
 
 class StationDefinedFrame(PhysicalFrame):

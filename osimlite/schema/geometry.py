@@ -8,9 +8,9 @@ from osimlite.schema.references import FileName, FrameSocket, TransformInput
 
 
 class SurfaceProperties(Object):
-    """How a surface is drawn: 1 as points, 2 as wireframe, 3 filled."""
+    """How a surface is drawn: 0 not at all, 1 as points, 2 as wireframe, 3 filled, -1 as the viewer likes."""
 
-    representation: Annotated[int, Value("int", choices=(1, 2, 3))] = 3
+    representation: Annotated[int, Value("int", choices=(-1, 0, 1, 2, 3))] = 3
     texture: Annotated[str | None, Value("string", "optional")] = None
 
 
