@@ -101,7 +101,7 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     assert isinstance(kind, Value)
     word = legacy_flag if kind.legacy and kind.scalar == "bool" else _WORDS[kind.scalar]
     if kind.shape in ("single", "optional"):
-        return text if kind.scalar == "string" else _one(word)
+        return text if kind.scalar == "string" else _one(word, kind.shape == "optional")
     if kind.size is not None:
         return _exactly(kind.size)
     if kind.shape == "vector":
@@ -111,7 +111,7 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     return _words(word, kind.least, kind.most)
 
 
-def _one(read: Callable[[str], Any]) -> Callable[[str], Any]:
+def _one(read: Callable[[str], Any], optional: bool) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         # Almost every text is one clean number or switch; what follows this is for the rest.
         if read is real:
@@ -125,6 +125,8 @@ def _one(read: Callable[[str], Any]) -> Callable[[str], Any]:
             return _PLAIN_FLAGS[raw]
         words = raw.split()
         if not words:
+            if optional:
+                return None
             raise Unclean("empty", "")
         if len(words) == 1:
             return read(words[0])

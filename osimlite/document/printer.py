@@ -11,7 +11,7 @@ from osimlite.document.foreign import relaid
 from osimlite.document.lexical import formatter
 from osimlite.files import write_atomically
 from osimlite.schema.base import Component, FieldSpec, Include, Layout, Object, Remark, Unknown, field_specs
-from osimlite.schema.fields import Held, Reference
+from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
 
 Numbers = Literal["shortest", "opensim"]
@@ -128,6 +128,8 @@ class _Printer:
         kind = spec.kind
         indent = "\t" * depth
         if not isinstance(kind, Held):
+            if value is None and not (isinstance(kind, Value) and kind.scalar != "string"):
+                return  # An empty element would be an empty text.
             text = self._text(item, spec, value)
             # OpenSim closes empty lists of its first property system like this, and all else with an end tag.
             short = not text and spec.legacy and kind.shape == "list"  # type: ignore[attr-defined]

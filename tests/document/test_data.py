@@ -84,8 +84,9 @@ def test_values_that_json_cannot_say() -> None:
 def test_components_given_as_references_become_their_texts() -> None:
     walker = dynamic_walker()
     force = next(c for c in walker.components() if isinstance(c, CoordinateLimitForce))
-    force.coordinate = walker.tree().target(force, "coordinate", force.coordinate)
-    assert not isinstance(force.coordinate, str)
+    coordinate = walker.tree().target(force, "coordinate", force.coordinate)
+    force.coordinate = coordinate
+    assert force.coordinate is coordinate
     assert osimlite.to_text(from_data(to_data(walker))) == osimlite.to_text(walker)
 
 

@@ -183,3 +183,20 @@ def test_what_was_just_read_knows_its_place() -> None:
     (body,) = model.body_set.objects
     assert (body.path, body.model, body.parent) == ("/bodyset/b", model, model.body_set)
     assert body.copy_deep().model is None
+
+
+def test_an_optional_number_may_be_empty_and_an_optional_text_is_then_empty() -> None:
+    """Checked with OpenSim 4.6: the number has no value, the text has an empty one."""
+    text = (
+        '<OpenSimDocument Version="40600"><Model name="m"><ForceSet><objects>'
+        '<ExpressionBasedBushingForce name="b"><moment_visual_scale> </moment_visual_scale>'
+        "</ExpressionBasedBushingForce>"
+        '<CoordinateActuator name="a"><coordinate></coordinate></CoordinateActuator>'
+        "</objects></ForceSet></Model></OpenSimDocument>"
+    )
+    document = read_document(Source(text.encode()))
+    bushing, actuator = document.model.force_set.objects
+    assert (bushing.moment_visual_scale, bushing.force_visual_scale) == (None, 1.0)  # type: ignore[attr-defined]
+    assert actuator.coordinate == ""  # type: ignore[attr-defined]
+    assert document.notes == []
+    assert "<moment_visual_scale></moment_visual_scale>" in osimlite.to_text(document.model)
