@@ -74,5 +74,6 @@ def models(draw: st.DrawFn) -> Model:
     """A model with a few components of any class."""
     model = Model(name=draw(names), credits=draw(texts), gravity=draw(st.tuples(numbers, numbers, numbers)))
     for component in draw(st.lists(objects(Component), max_size=4)):
+        assert isinstance(component, Component)
         model.subcomponents.append(component)
     return model

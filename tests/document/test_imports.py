@@ -1,0 +1,44 @@
+"""Reading imports what the file needs and no more: start-up is most of the time of a short command."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+READ = "import sys, osimlite; osimlite.read(sys.argv[1]); print(*sorted(sys.modules))"
+
+
+@pytest.fixture(scope="module")
+def loaded(fixtures: Path) -> set[str]:
+    walker = fixtures / "walker" / "DynamicWalkerModel.osim"
+    done = subprocess.run(
+        [sys.executable, "-c", READ, str(walker)], capture_output=True, text=True, check=True, cwd=fixtures.parent
+    )
+    return set(done.stdout.split())
+
+
+def test_areas_whose_tags_do_not_occur_stay_out(loaded: set[str]) -> None:
+    areas = {name.rpartition(".")[2] for name in loaded if name.startswith("osimlite.schema.")}
+    # The walker has bodies, joints, contact, forces and no muscle, path, probe or controller of its own.
+    assert not areas & {
+        "actuators", "constraint_types", "contact_forces", "controller_types", "custom_joint", "metabolics", "muscles",
+        "muscle_curves", "path_actuators", "path_forces", "paths", "prescribed", "probe_types", "reporters", "springs",
+        "json_schema", "editing",
+    }  # fmt: skip
+    assert {"frames", "joints", "forces", "contact", "geometry"} <= areas
+
+
+def test_heavy_packages_stay_out(loaded: set[str]) -> None:
+    assert not loaded & {
+        "matplotlib", "numpy", "opensim", "PIL", "pybullet", "rapidfuzz", "rich", "typer", "yaml",
+        "urllib.request", "ssl", "http.client",
+    }  # fmt: skip
+
+
+def test_importing_the_package_alone_imports_nothing_of_weight() -> None:
+    code = "import sys, osimlite; print(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {"pydantic", "lxml", "numpy"}
