@@ -27,6 +27,10 @@ NoteKind = Literal[
     "bare-ampersand",
     "duplicate-attribute",
     "hyphens-in-comment",
+    "control-character",
+    "byte-order-mark",
+    "late-declaration",
+    "text-outside-root",
 ]
 
 

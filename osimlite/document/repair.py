@@ -21,7 +21,7 @@ _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
 _HYPHENS = re.compile(r"-{2,}|-\Z")
 _AMPERSAND = re.compile(r"&(?!#[0-9]+;|#x[0-9a-fA-F]+;)(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
 _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
-_BLANK_CONTROLS = str.maketrans("\f\v", "  ")
+_BLANK_CONTROLS = re.compile("[\f\v]")
 _ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
 _DECLARATION = re.compile(r"<\?xml\s")
 _SPECIAL = re.compile(r"<!(?:--|\[CDATA\[)")
@@ -87,7 +87,9 @@ def element_at(source: Source, offset: int) -> int:
 def repaired(text: str) -> tuple[str, list[Repair]]:
     """The text with everything mended whose meaning is certain, and what was mended."""
     repairs: list[Repair] = []
-    text = text.translate(_BLANK_CONTROLS)
+    for match in _BLANK_CONTROLS.finditer(text):
+        repairs.append(Repair("control-character", match.start(), f"\\x{ord(match[0]):02x}", " "))
+    text = _BLANK_CONTROLS.sub(" ", text)
     pieces: list[str] = []
     place = depth = 0
     for kind, start, end, _ in markup(text):
@@ -97,7 +99,7 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
             piece = _comment(piece, start, repairs)
         elif kind == "instruction":
             if _DECLARATION.match(piece) and place > 0:
-                repairs.append(Repair("stray-text", start, piece, ""))
+                repairs.append(Repair("late-declaration", start, piece, ""))
                 piece = _blanked(piece)
         elif kind in ("open", "empty"):
             depth += kind == "open"
@@ -133,9 +135,9 @@ def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
     stripped = text.strip("\ufeff \t\r\n")
     if stripped and "<" not in stripped:
         word = stripped.splitlines()[0][:40]
-        repairs.append(Repair("stray-text", offset + text.index(stripped), word, ""))
+        repairs.append(Repair("text-outside-root", offset + text.index(stripped), word, ""))
     elif not stripped and "\ufeff" in text:
-        repairs.append(Repair("stray-text", offset + text.index("\ufeff"), "\ufeff", ""))
+        repairs.append(Repair("byte-order-mark", offset + text.index("\ufeff"), "\ufeff", ""))
     else:
         return text
     return _blanked(text)

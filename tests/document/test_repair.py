@@ -25,13 +25,14 @@ def document(text: str | bytes) -> Document:
 @pytest.mark.parametrize(
     ("old", "new", "kind", "line"),
     [
-        (HEAD, "// saved by hand\n\n" + HEAD, "stray-text", 1),
-        (HEAD, "<!-- saved by hand -->\n" + HEAD, "stray-text", 2),
-        (HEAD, "\ufeff\ufeff" + HEAD, "stray-text", 1),
-        ("</OpenSimDocument>\n", "</OpenSimDocument>\n~\n", "stray-text", 14),
+        (HEAD, "// saved by hand\n\n" + HEAD, "text-outside-root", 1),
+        (HEAD, "<!-- saved by hand -->\n" + HEAD, "late-declaration", 2),
+        (HEAD, "\ufeff\ufeff" + HEAD, "byte-order-mark", 1),
+        ("</OpenSimDocument>\n", "</OpenSimDocument>\n~\n", "text-outside-root", 14),
         ("<mass>", "<!-- heavy -- too heavy? -->\n<mass>", "hyphens-in-comment", 8),
         ("<mass>", "<!----- heavy ----->\n<mass>", "hyphens-in-comment", 8),
         ("Anna", "Anna & Bert", "bare-ampersand", 4),
+        ("Anna", "Anna\fBert", "control-character", 4),
         ("Anna", "Anna&nbsp;Berg", "bare-ampersand", 4),
         ('<Body name="thigh">', '<Body name="femur"  name="thigh">', "duplicate-attribute", 7),
     ],
@@ -62,12 +63,12 @@ def test_everything_at_once() -> None:
     found = document("notes:\n" + text.replace('name="thigh"', "name='a' name = \"thigh\"") + "bye")
     kinds = [note.kind for note in found.notes]
     assert kinds == [
-        "stray-text",
+        "text-outside-root",
         "bare-ampersand",
         "bare-ampersand",
         "duplicate-attribute",
         "hyphens-in-comment",
-        "stray-text",
+        "text-outside-root",
     ]
     assert found.model.credits == "A & B \u00a9 C & D"
     assert [found.source.spans[note.number].tag for note in found.notes[1:5]] == ["credits", "credits", "Body", "Body"]
