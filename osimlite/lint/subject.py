@@ -146,6 +146,15 @@ class Subject:
             return self.source.of_text(number, word, nth)
         return self.source.of_tag(number)
 
+    def names_itself(self, item: Object) -> bool:
+        """Whether the text gives an object its name; always true of a model made in Python."""
+        if self.source is None:
+            return True
+        if item._index is None:
+            return False
+        span = self.source.spans[item._index]
+        return re.search(r"\sname\s*=", self.source.text[span.start : span.tag_end]) is not None
+
     def attribute_name(self, number: int, name: str) -> Position | None:
         """Where the name of an attribute stands."""
         if self.source is None:

@@ -50,8 +50,7 @@ def duplicate_name(subject: Subject, found: Found) -> None:
     for renamed in tree.renamed:
         item = renamed.component
         # Of what has no name in the file nobody expects one.
-        named = subject.source is None or "name" in item.model_fields_set
-        if not item.name or not named or isinstance(item, Unknown):
+        if not item.name or not subject.names_itself(item) or isinstance(item, Unknown):
             continue
         users = _who_names(subject, renamed.first)
         message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"

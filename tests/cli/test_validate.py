@@ -1,0 +1,87 @@
+"""osimlite validate and osimlite rule, as a user calls them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+
+
+def run(*arguments, text=""):
+    command = [sys.executable, "-m", "osimlite", *map(str, arguments)]
+    return subprocess.run(command, input=text, capture_output=True, text=True, encoding="utf-8", timeout=120)
+
+
+@pytest.fixture
+def faulty(tmp_path):
+    path = tmp_path / "faulty.osim"
+    path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "RFootContct PlatformContact"))
+    return path
+
+
+def test_a_sound_model_is_exit_0():
+    done = run("validate", WALKER, "--format", "concise")
+    assert done.returncode == 0 and done.stderr == ""
+    assert done.stdout.endswith("Found 2 info in 1 model.\n")
+
+
+def test_an_error_is_exit_1(faulty):
+    done = run("validate", faulty)
+    assert done.returncode == 1
+    assert "OSIM301" in done.stdout and "did you mean 'RFootContact'?" in done.stdout
+    assert "^^^^^^^^^^^" in done.stdout and "\033" not in done.stdout
+
+
+def test_fail_on_and_select_and_ignore(faulty):
+    assert run("validate", WALKER, "--fail-on", "info").returncode == 1
+    assert run("validate", WALKER, "--fail-on", "warning").returncode == 0
+    assert run("validate", faulty, "--ignore", "OSIM3").returncode == 0
+    assert run("validate", faulty, "--select", "OSIM1,physics").returncode == 0
+
+
+def test_json_from_standard_input(faulty):
+    done = run("validate", "-", "--format", "json", text=faulty.read_text())
+    findings = json.loads(done.stdout)
+    assert done.returncode == 1
+    assert {finding["code"] for finding in findings} == {"OSIM301", "OSIM508"}
+    assert {finding["file"] for finding in findings} == {"<stdin>"}
+
+
+def test_a_folder_is_every_model_below(faulty):
+    (faulty.parent / "sub").mkdir()
+    (faulty.parent / "sub" / "other.osim").write_text("<OpenSimDocument/>")
+    done = run("validate", faulty.parent, "--statistics")
+    assert done.returncode == 1
+    assert "1  OSIM301  unresolved-reference" in done.stdout
+    assert "1  OSIM004  document-version" in done.stdout
+    assert done.stdout.endswith("in 2 models.\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["validate", "no_such_file.osim"], "no_such_file.osim: cannot read the file: no such file"),
+        (["validate", WALKER, "--format", "yaml"], "--format is one of"),
+        (["validate", WALKER, "--fail-on", "bad"], "--fail-on is one of error, warning and info, not 'bad'"),
+        (["validate", WALKER, "--select", "OSIM999"], "no rule has the code or name 'OSIM999'"),
+        (["rule", "unresolved-refrence"], "did you mean 'unresolved-reference'?"),
+    ],
+)
+def test_what_cannot_be_carried_out_is_exit_2_and_one_sentence(arguments, words):
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert words in done.stderr and "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_table_and_the_page_of_a_rule():
+    table = run("rule").stdout
+    assert "OSIM301  unresolved-reference" in table
+    page = run("rule", "osim301").stdout
+    assert page.startswith("# unresolved-reference (OSIM301, error)\n")
+    assert "## Use instead" in page
