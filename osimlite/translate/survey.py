@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from osimlite.multibody.functions import IDENTITY
 from osimlite.schema.base import Component
 from osimlite.schema.constraints import Constraint
@@ -9,7 +11,7 @@ from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import Force
-from osimlite.schema.frames import PhysicalOffsetFrame
+from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.geometry import FrameGeometry
 from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, Joint, ScapulothoracicJoint
 from osimlite.schema.markers import Marker
@@ -77,7 +79,17 @@ class _Survey:
         self.note("gravity", "/", "gravity", "left out: set it in your program", f"({x:g}, {y:g}, {z:g}) m/s^2")
 
     def _links(self) -> None:
+        carriers = {body.path: body.mobilizer.joint for body in self.robot.mechanism.bodies}
         for path, (link, _) in self.robot.link_of.items():
+            if path not in self.tree.by_path:
+                self.note(
+                    "loop",
+                    carriers[path],
+                    "a closed loop of joints",
+                    "cut: the joint carries a part of the body's mass, and nothing holds the parts together",
+                    f"link {link.name}",
+                )
+                continue
             self.fidelity.translated[path] = f"link {link.name}"
             if len(link.bodies) > 1 and path != "/ground":
                 massless = " without its mass, for it does not move" if "/ground" in link.bodies else ""
@@ -85,6 +97,9 @@ class _Survey:
                 self.note("merged-body", path, "bodies welded together as links of their own", merged)
             elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
                 self._renamed(path, f"link {link.name}")
+            if link.mass == 0.0 and link.name in self._moving_ends:
+                done = "written as it is; PyBullet holds its last joint still"
+                self.note("massless-end", path, "a body without mass at the end of a chain", done)
             moments, _ = principal_axes(link.inertia)
             if breaks_triangle_rule(moments):
                 self.note(
@@ -94,6 +109,12 @@ class _Survey:
                     "written as it is; PyBullet takes zero instead",
                     "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
                 )
+
+    @cached_property
+    def _moving_ends(self) -> set[str]:
+        """Links that a moving joint carries and that carry nothing."""
+        carriers = {joint.parent for joint in self.robot.joints}
+        return {joint.child for joint in self.robot.moving} - carriers
 
     def _joints(self) -> None:
         massless = {link.name for link in self.robot.links if not link.bodies}
@@ -149,6 +170,9 @@ class _Survey:
             self.note("clamped", path, "that a user interface must not leave the range", "left out", text)
         if coordinate.locked:
             self.note("locked", path, "that a joint is locked", "a joint that moves: hold it in your program")
+        if coordinate.prescribed and coordinate.prescribed_function is not None:
+            done = "a joint that moves: drive it in your program"
+            self.note("prescribed", path, "that a coordinate follows a function of time", done)
         if coordinate.default_value != 0.0:
             self.note(
                 "default-pose",
@@ -180,9 +204,9 @@ class _Survey:
     def _frames(self) -> None:
         mechanism = self.robot.mechanism
         for frame in self.tree.components:
-            if not isinstance(frame, PhysicalOffsetFrame):
-                continue
             path = self.tree.path_of(frame) or ""
+            if not isinstance(frame, PhysicalFrame) or path not in mechanism.frames or path in self.fidelity.translated:
+                continue
             if isinstance(self.tree.parent_of(frame), Joint):
                 self.fidelity.translated[path] = "origins of the joint's parts"
                 continue
@@ -210,7 +234,7 @@ class _Survey:
                 dropped.add(id(component))
                 name = getattr(component, "class_name", "") or type(component).__name__
                 known = ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls))
-                kind, what = next(known, ("component", f"a {name}"))
+                kind, what = next(known, ("component", f"a component of class {name}"))
                 self.note(kind, path, what, "left out", name)
 
     def _renamed(self, path: str, name: str) -> None:

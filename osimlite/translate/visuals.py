@@ -126,7 +126,7 @@ class _Collector:
                 return MeshFile(file), _Y_TO_Z
             case Mesh():
                 return self._mesh(geometry, path)
-        note("visual", path, f"a {type(geometry).__name__}", "left out")
+        note("visual", path, f"a shape of class {type(geometry).__name__}", "left out")
         return None
 
     def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
