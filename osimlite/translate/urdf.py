@@ -11,6 +11,8 @@ What is written so that readers take the same mechanics from it:
   the model has none. OpenSim's coordinate ranges limit no motion, so they are no limits here unless the robot says so.
 - A joint driven by a multiple of the coordinate of another joint says so with ``<mimic>``; any other function cannot
   be said.
+- PyBullet tells the frames of links in single precision and their inertial frames (mass centre, principal axes) in
+  double: who needs more than 1e-7 has to start from the latter and take out the ``<inertial>`` origin.
 - No ``<collision>``: contact in OpenSim is a force between a few named surfaces, not a property of shapes.
 """
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,9 @@ LONGEST_ARROW = 0.7
 
 FAINTEST = 0.72
 """How bright a shape at the back is, compared with one at the front."""
+
+SCENERY = 3.0
+"""How many times larger than what moves something that stands still may be and still be shown whole."""
 
 Progress = Callable[[int, int], None]
 
@@ -151,24 +154,30 @@ class _Film:
         return self.scene.flat(np.array(path))
 
     def _reach(self) -> Array:
-        """How far (2,) from the focus what moves gets, to the side and up or down."""
-        reach = np.full(2, 0.05)
-        for number, (pose, focus) in enumerate(zip(self.poses, self.focus, strict=True)):
-            flat = [
-                corners
-                for shape, corners in zip(self.scene.outlines, self.silhouettes[number], strict=True)
-                if self.moving[shape.body]
-            ]
-            for disc in self.scene.discs.values():
-                if self.moving[disc.body]:
-                    middle = self.scene.flat(pose.points(disc.body, disc.center[None, :]))
-                    flat += [middle - disc.radius, middle + disc.radius]
-            flat += [
-                self.scene.flat(lines.reshape(-1, 3)) for body, lines in self.scene.sticks(pose) if self.moving[body]
-            ]
-            for corners in flat:
-                reach = np.maximum(reach, np.abs(corners - focus).max(axis=0))
-        return reach
+        """How far (2,) from the focus things get, to the side and up or down.
+
+        Everything that moves counts, and of what stands still only what is not much larger: a walker's floor is not.
+        """
+        moving = still = np.full(2, 0.05)
+        for number, focus in enumerate(self.focus):
+            for body, corners in self._corners(number):
+                away = np.abs(corners - focus).max(axis=0)
+                if self.moving[body]:
+                    moving = np.maximum(moving, away)
+                else:
+                    still = np.maximum(still, away)
+        return np.maximum(moving, still) if (still <= SCENERY * moving.max()).all() else moving
+
+    def _corners(self, number: int) -> Iterator[tuple[int, Array]]:
+        """Body and points (k, 2) of everything that may be drawn."""
+        pose = self.poses[number]
+        for shape, corners in zip(self.scene.outlines, self.silhouettes[number], strict=True):
+            yield shape.body, corners
+        for disc in self.scene.discs.values():
+            middle = self.scene.flat(pose.points(disc.body, disc.center[None, :]))
+            yield disc.body, np.vstack((middle - disc.radius, middle + disc.radius))
+        for body, lines in self.scene.sticks(pose):
+            yield body, self.scene.flat(lines.reshape(-1, 3))
 
 
 def _moving(poses: list[Bodies]) -> Array:

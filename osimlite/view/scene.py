@@ -130,21 +130,20 @@ class Scene:
         return float(point @ self.towards)
 
     def sticks(self, bodies: Bodies) -> list[tuple[int, Array]]:
-        """For every body, lines (k, 2, 3) in ground from its joint to the joints of what it carries.
+        """For every body, lines (k, 2, 3) in ground from its own joint to the joints of the bodies it carries.
 
         A body that carries nothing gets a line to its mass centre.
         """
-        inner, outer = [], []
-        for index, body in enumerate(self.mechanism.bodies):
-            frames = (body.mobilizer.parent_frame, body.mobilizer.child_frame)
-            start, end = frames[::-1] if body.mobilizer.reversed else frames
-            outer.append(bodies.points(body.parent, start[None, :3, 3])[0])
-            inner.append(bodies.points(index, end[None, :3, 3])[0])
+        everyone = self.mechanism.bodies
+        joints = []
+        for index, body in enumerate(everyone):
+            own = body.mobilizer.parent_frame if body.mobilizer.reversed else body.mobilizer.child_frame
+            joints.append(bodies.points(index, own[None, :3, 3])[0])
         lines: list[tuple[int, Array]] = []
-        for index, body in enumerate(self.mechanism.bodies):
-            ends = [outer[k] for k, other in enumerate(self.mechanism.bodies) if other.parent == index]
+        for index, body in enumerate(everyone):
+            ends = [joints[k] for k, other in enumerate(everyone) if other.parent == index]
             center = bodies.points(index, body.mass_properties.center[None, :])[0]
-            lines.append((index, np.array([(inner[index], end) for end in ends or [center]])))
+            lines.append((index, np.array([(joints[index], end) for end in ends or [center]])))
         return lines
 
     def _contact_surfaces(self, model: Model) -> None:

@@ -85,6 +85,21 @@ def test_all_that_moves_is_in_the_picture():
             if film.moving[outline.body]:
                 away = np.abs(film.scene.silhouette(pose, outline) - focus)
                 assert (away <= film.reach + 1e-12).all()
+    # The platform is 20 m long and stays where it is: that much scenery is not shown whole.
+    assert film.reach.max() < 2.0
+
+
+def test_what_stands_still_is_shown_if_it_is_not_too_large():
+    motion = stroll()
+    knee = np.array(motion.coordinates) == "RKnee_rz"
+    model = dynamic_walker()
+    del model.body_set.objects[0].attached_geometry[:]
+    motion = dataclasses.replace(motion, values=motion.values[0] + 0.5 * np.outer(motion.times, knee))
+    film = _Film(model, motion, 25, 1.0, "xy")
+    names = [body.name for body in film.mechanism.bodies]
+    assert [name for name, moves in zip(names, film.moving, strict=False) if moves] == ["RightShank"]
+    pelvis = film.scene.flat(film.poses[0].origins[[names.index("Pelvis")]])[0]
+    assert (np.abs(pelvis - film.focus[0]) < film.reach).all()
 
 
 def test_a_model_without_shapes_is_a_stick_figure(tmp_path):
