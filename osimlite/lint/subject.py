@@ -16,7 +16,7 @@ from osimlite.lint.config import Config
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, FieldSpec, Object, Unknown
 from osimlite.schema.model import Model
-from osimlite.schema.tree import Tree
+from osimlite.schema.tree import Resolution, Tree, Use
 
 T = TypeVar("T", bound=Object)
 
@@ -33,6 +33,8 @@ class Subject:
         self.sure_until: int | None = None
         self.version: int | None = None
         self.kept: dict[str, object] = {}
+        # The uses are kept alive by `uses`, so that their identities stay theirs.
+        self._resolutions: dict[int, Resolution] = {}
         if isinstance(found, Model):
             self.model = found
         else:
@@ -73,6 +75,18 @@ class Subject:
         for known, items in self.by_class.items():
             if issubclass(known, cls):
                 yield from cast("list[T]", items)
+
+    @cached_property
+    def uses(self) -> list[Use]:
+        """Every reference of the model, in tree order."""
+        return list(self.tree.uses())
+
+    def resolution(self, use: Use) -> Resolution:
+        """What a reference leads to."""
+        known = self._resolutions.get(id(use))
+        if known is None:
+            known = self._resolutions[id(use)] = self.tree.resolve(use)
+        return known
 
     @cached_property
     def has_unknown(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import broken_references
@@ -98,12 +99,11 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
     </HuntCrossleyForce>
     ```
     """
-    tree = subject.tree
     for force, _, uses in _contact_lists(subject):
         seen: set[int] = set()
         words: dict[tuple[int, str], int] = {}
         for use in uses:
-            target = tree.resolve(use).target
+            target = subject.resolution(use).target
             nth = words.get((id(use.holder), _text(use)), 0)
             words[id(use.holder), _text(use)] = nth + 1
             if target is None:
@@ -156,8 +156,7 @@ def unused_contact_geometry(subject: Subject, found: Found) -> None:
         return
     if any(len(uses) < 2 for _, _, uses in _contact_lists(subject)):
         return
-    tree = subject.tree
-    used = {id(tree.resolve(use).target) for use in tree.uses() if use.reference.target in _SURFACES}
+    used = {id(subject.resolution(use).target) for use in subject.uses if use.reference.target in _SURFACES}
     for surface in surfaces:
         if id(surface) not in used:
             found(f"no force uses {called(surface)}", surface, attribute="name")
@@ -170,12 +169,12 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
     """Each force that works through lists of contact geometry: the force, its parameter objects, what they name."""
     forces: dict[int, tuple[Component, list[Object], list[Use]]] = {}
     for force in subject.each(Force):
-        parameters = getattr(force, "contact_parameters", None)
-        if parameters is not None:
-            forces[id(force)] = (force, list(parameters.objects), [])
+        if "contact_parameters" in type(force).model_fields:
+            parameters: Any = force
+            forces[id(force)] = (force, list(parameters.contact_parameters.objects), [])
     if not forces:
         return
-    for use in subject.tree.uses():
+    for use in subject.uses:
         if id(use.owner) in forces and use.reference.rule == "contactgeometry-path-or-name":
             forces[id(use.owner)][2].append(use)
     for owner, holders, uses in forces.values():

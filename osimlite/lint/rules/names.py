@@ -173,8 +173,9 @@ def _last(text: str) -> str:
 
 def _who_names(subject: Subject, target: Object) -> list[str]:
     """Who holds a reference that leads to a component."""
-    tree = subject.tree
     holders = [
-        called(use.owner) for use in tree.uses() if use.reference.rule != "file" and tree.resolve(use).target is target
+        called(use.owner)
+        for use in subject.uses
+        if use.reference.rule not in ("file", "column", "input") and subject.resolution(use).target is target
     ]
     return list(dict.fromkeys(holders))

@@ -210,7 +210,7 @@ def broken_references(subject: Subject) -> list[Broken]:
 def _find(subject: Subject) -> Iterator[Broken]:
     tree = subject.tree
     for use in _uses(subject):
-        resolution = tree.resolve(use)
+        resolution = subject.resolution(use) if use.value != "" else tree.resolve(use)
         if resolution.failure is None or _overwritten(subject, use):
             continue
         value = use.value
@@ -224,7 +224,7 @@ def _find(subject: Subject) -> Iterator[Broken]:
 
 def _uses(subject: Subject) -> Iterator[Use]:
     """Every reference, but those that lead nowhere by their nature (files, columns, outputs)."""
-    for use in subject.tree.uses():
+    for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input", "positional", "point-index"):
             yield use
     # An optional reference that OpenSim insists on all the same is not among the uses when it is left out.
@@ -352,11 +352,10 @@ def _holder(subject: Subject, use: Use) -> str:
 
 def _contacts_on(subject: Subject, frame: Object) -> list[str]:
     """Names of the contact geometry that is fixed to a frame."""
-    tree = subject.tree
     return [
         use.owner.name
-        for use in tree.uses()
-        if isinstance(use.owner, ContactGeometry) and tree.resolve(use).target is frame
+        for use in subject.uses
+        if isinstance(use.owner, ContactGeometry) and subject.resolution(use).target is frame
     ]
 
 

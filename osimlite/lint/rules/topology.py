@@ -286,7 +286,7 @@ def shared_coordinate_name(subject: Subject, found: Found) -> None:
         if known is component or not component.name or tree.parent_of(known) is joint:
             continue
         users = [
-            called(use.owner) for use in tree.uses() if use.value == component.name and _by_name(use.reference.rule)
+            called(use.owner) for use in subject.uses if use.value == component.name and _by_name(use.reference.rule)
         ]
         message = f"{called(component)} has the name of a coordinate of {called(tree.parent_of(known) or known)}"
         if users:
