@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast
@@ -173,12 +173,9 @@ class Object(BaseModel):
         `values` may leave out properties, `present` names those the text gave; the rest take their defaults. This is
         the reader's way in, several times faster than ``cls(...)`` and tested to be equal to it.
         """
-        plain, factories = defaults(cls)
-        state = plain.copy()
+        # Default objects and lists are made when someone asks for them, see `__getattr__`: most are never asked for.
+        state = defaults(cls)[0].copy()
         state.update(values)
-        for name, factory in factories:
-            if name not in state:
-                state[name] = factory()
         self = _new(cls)
         _put_state(self, state)
         _put_present(self, present)
@@ -231,6 +228,10 @@ class Object(BaseModel):
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_"):
+            factory = defaults(type(self))[1].get(name)
+            if factory is not None:
+                made = self.__dict__[name] = factory()
+                return made
             spec = field_specs(type(self)).get(name)
             if spec is not None:
                 return getattr(self, spec.name)
@@ -253,7 +254,7 @@ class Object(BaseModel):
         if type(self) is not type(other):
             return NotImplemented
         assert isinstance(other, Object)
-        return _same(self.__dict__, other.__dict__) and _unknown(self) == _unknown(other)
+        return _same(_whole(self), _whole(other)) and _unknown(self) == _unknown(other)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -401,16 +402,16 @@ def value_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @cache
-def defaults(cls: type[Object]) -> tuple[dict[str, Any], tuple[tuple[str, Any], ...]]:
+def defaults(cls: type[Object]) -> tuple[dict[str, Any], dict[str, Callable[[], Any]]]:
     """Default values by field name, and the factories of the fields whose default is an object or a list."""
     plain: dict[str, Any] = {}
-    factories = []
+    factories: dict[str, Any] = {}
     for name, info in cls.model_fields.items():
         if info.default_factory is None:
             plain[name] = info.default
         else:
-            factories.append((name, info.default_factory))
-    return plain, tuple(factories)
+            factories[name] = info.default_factory
+    return plain, factories
 
 
 _COPYING = -1
@@ -440,6 +441,13 @@ def _same(left: Any, right: Any) -> bool:
     if isinstance(left, float) and isinstance(right, float):
         return left == right or (left != left and right != right)
     return bool(left == right)
+
+
+def _whole(item: Object) -> dict[str, Any]:
+    """The values of an object by field name, those included that no one has asked for yet."""
+    for name in defaults(type(item))[1]:
+        getattr(item, name)
+    return item.__dict__
 
 
 def _unknown(item: Object) -> list[str]:

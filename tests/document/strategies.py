@@ -53,7 +53,10 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
             several = st.lists(words, max_size=3).map(tuple)
             given[spec.name] = draw({"list": several, "optional": st.none() | words}.get(kind.shape, words))
         elif isinstance(kind, Value):
-            given[spec.name] = draw(values(kind))
+            value = draw(values(kind))
+            # A file cannot say that a text is absent where it is there by default: an empty element is an empty text.
+            if value is not None or kind.scalar != "string" or spec.default is None:
+                given[spec.name] = value
         elif depth and spec.accepts is not None:
             assert isinstance(kind, Held)
             held = objects(spec.accepts, depth - 1)
