@@ -183,7 +183,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
 
 def _plain_words(message: str) -> str:
     """The parser's message without its place, and readable."""
-    message = re.sub(r", line \d+, column \d+$", "", message).replace(STAND_IN, "::")
+    message = " ".join(re.sub(r", line \d+, column \d+$", "", message).replace(STAND_IN, "::").split())
     mismatch = re.fullmatch(r"Opening and ending tag mismatch: (\S+) line (\d+) and (\S+)", message)
     if mismatch:
         return f"<{mismatch[1]}> of line {mismatch[2]} is not closed before </{mismatch[3]}>"
@@ -198,8 +198,10 @@ def version_of(source: Source, root: etree._Element) -> int:
         VersionError: the version is missing, no whole number, or too old to be read.
     """
     text = root.get("Version")
-    if root.tag == "OpenSimDocument" and text is not None and text.strip().isdecimal() and int(text) >= OLDEST:
-        return int(text)
+    # A number too long for a version would take Python long to convert.
+    number = int(text) if text is not None and re.fullmatch(r"\s*[0-9]{1,9}\s*", text) else None
+    if root.tag == "OpenSimDocument" and number is not None and number >= OLDEST:
+        return number
     if root.tag == "Model" and text is None:
         return OLDEST
     # Places cost a pass over the text, so they are computed for errors only.
@@ -209,17 +211,17 @@ def version_of(source: Source, root: etree._Element) -> int:
             f"the root element is <{root.tag}>, not <OpenSimDocument>: this is no OpenSim document",
             file=source.file, line=line, column=column,
         )  # fmt: skip
-    if text is None or not text.strip().isdecimal():
-        found = "has no Version" if text is None else f'has Version="{text}", which is not a whole number'
+    if number is None:
+        found = "has no Version" if text is None else f'has Version="{text[:40]}", which is not a whole number'
         raise VersionError(
             f'<OpenSimDocument> {found}; write Version="{CURRENT_VERSION}"', file=source.file, line=line, column=column
         )
     fault = VersionError(
-        f"document version {int(text)} is none that OpenSim ever wrote (they begin at {OLDEST}); "
+        f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST}); "
         f'write Version="{CURRENT_VERSION}" if the model is in the current format',
         file=source.file, line=line, column=column,
     )  # fmt: skip
-    fault.version = int(text)
+    fault.version = number
     raise fault
 
 

@@ -1,0 +1,61 @@
+"""Whatever happens to a file: it is read, or refused in one sentence with a line."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from osimlite.document.printer import to_text
+from osimlite.document.reader import read_document
+from osimlite.document.source import Source
+from osimlite.errors import DocumentError
+from tests.conftest import ROOT, corpus_models
+from tests.document.damage import damaged
+
+LARGEST = 120_000
+"""Bytes of a file to damage; larger ones say nothing more and take longer."""
+
+
+def files() -> list[Path]:
+    """Small and old documents of ours, and real files where they are at hand."""
+    ours = [*(ROOT / "fixtures" / "versions").glob("*.osim"), *(ROOT / "fixtures" / "walker").glob("*.osim")]
+    real = [model.path for model in corpus_models()]
+    return sorted(path for path in [*ours, *real] if 0 < path.stat().st_size < LARGEST)
+
+
+def fate(data: bytes) -> str:
+    """What becomes of a file: ``read``, or ``refused``. Anything but that raises."""
+    try:
+        document = read_document(Source(data, "damaged.osim"))
+    except DocumentError as refused:
+        assert refused.line is not None and refused.line >= 1, refused.message
+        assert refused.message and "\n" not in refused.message, refused.message
+        return "refused"
+    model = document.model
+    # What has been read can be walked, asked and written, and what is written is read again without a change.
+    tree = model.tree()
+    for use in tree.uses():
+        tree.resolve(use)
+    for note in document.notes:
+        document.source.of_tag(note.number)
+    text = to_text(model)
+    again = read_document(Source(text.encode("utf-8", "surrogatepass")))
+    assert (again.fault, again.changes) == (None, [])
+    assert to_text(again.model) == text
+    return "read"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_damaged_file_is_read_or_refused(seed: int) -> None:
+    random = Random(seed)
+    paths = files()
+    fates: dict[str, int] = {"read": 0, "refused": 0}
+    for _ in range(30):
+        path = random.choice(paths)
+        start = time.perf_counter()
+        fates[fate(damaged(path.read_bytes(), random))] += 1
+        assert time.perf_counter() - start < 5, path
+    assert min(fates.values()) > 0
