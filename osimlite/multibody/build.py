@@ -2,44 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.multibody.joints import MOTIONS, Mobilizer, motion_types
-from osimlite.multibody.mechanism import (
+from osimlite.multibody.body_constraints import WeldConstraint
+from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.multibody.functions import Function
+from osimlite.multibody.joints import Mobilizer, motion_types
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.motions import Motion
+from osimlite.multibody.parts import (
     GROUND,
     CoordinateInfo,
     FramePlacement,
     MassProperties,
-    Mechanism,
     MobileBody,
+    StationPlacement,
 )
-from osimlite.multibody.motions import Motion
-from osimlite.multibody.spatial import Array, offset
+from osimlite.multibody.schema_constraints import ConstraintReader, unknown_constraint
+from osimlite.multibody.schema_frames import Placements
+from osimlite.multibody.schema_functions import numeric
+from osimlite.multibody.schema_joints import joint_motions, unknown_joint
+from osimlite.multibody.spatial import Array
+from osimlite.multibody.topology import spanning_tree
+from osimlite.schema import constraints as schema
 from osimlite.schema.base import Component, Unknown
-from osimlite.schema.constraints import Constraint
-from osimlite.schema.frames import Body, Ground, PhysicalFrame, PhysicalOffsetFrame
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.joints import Joint
+from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
 from osimlite.text import listed
 
 
-def build_mechanism(model: Model) -> Mechanism:
-    """The tree of bodies and mobilizers that a model describes.
+def build_mechanism(model: Model, *, opensim_derivatives: bool = False) -> Mechanism:
+    """The tree of bodies and mobilizers that a model describes, with its constraints.
 
     Bodies come level by level from ground, within a level in the order of the joints that carry them; coordinates
     come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is
-    reversed. Markers, forces and geometry play no part.
+    reversed. Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is
+    split into halves, one of which the joint carries, and the halves are welded by a constraint. Forces and
+    geometry play no part.
+
+    Args:
+        model: the model.
+        opensim_derivatives: compute two second derivatives as OpenSim 4.6 does, which are wrong. Simbody differentiates
+            the angular velocity of a CustomJoint as if its first coordinate alone drove the first rotation and the
+            first two alone the first two, so accelerations are off where one coordinate drives several rotations (the
+            knee of Rajagopal's model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
+            gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without this switch both are
+            right.
 
     Raises:
-        ModelError: a frame or joint names what does not exist, bodies are not connected to ground, a joint connects
-            a body with itself or has the wrong number of coordinates, a mass or an inertia is impossible.
-        UnsupportedError: a joint of another type, a closed loop, a constraint, a prescribed coordinate.
+        ModelError: something names what does not exist, bodies are not connected to ground, a joint connects
+            a body with itself or has the wrong number of coordinates, a mass, an inertia, a function is impossible.
+        UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop closed by a FreeJoint or
+            by a joint whose child is ground.
     """
-    return _Builder(model).mechanism()
+    return _Builder(model, opensim_derivatives).mechanism()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,87 +90,66 @@ class _Edge:
 
 
 class _Builder:
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, opensim_derivatives: bool) -> None:
         self.model = model
+        self.opensim_derivatives = opensim_derivatives
         self.tree = model.tree()
+        self.placements = Placements(self.tree)
         self.coordinates: list[CoordinateInfo] = []
-        # The body (or ground) that each frame is fixed to, by absolute path, and where it is there.
-        self.placements: dict[str, tuple[str, Array]] = {}
         self.bodies: dict[str, Body] = {}
+        self.constraints: list[Constraint] = []
 
     def mechanism(self) -> Mechanism:
         for component in self.tree.components:
             self._refuse(component)
         for component in self.tree.components:
             if isinstance(component, Body):
-                self.bodies[self._path(component)] = component
+                self.bodies[self.placements.path(component)] = component
             if isinstance(component, PhysicalFrame):
-                self._place(component, ())
+                self.placements.frame(component)
         edges = [self._edge(joint) for joint in self.tree.components if isinstance(joint, Joint)]
-        bodies = tuple(self._sorted(edges))
-        index = {body.path: place for place, body in enumerate(bodies)} | {self._path(self.model.ground): GROUND}
-        frames = {path: FramePlacement(index[base], matrix) for path, (base, matrix) in self.placements.items()}
+        bodies = self._bodies(edges)
+        ground = self.placements.path(self.model.ground)
+        index = {body.path: place for place, body in enumerate(bodies)} | {ground: GROUND}
+        self._constrain(index)
+        placed = self.placements
+        frames = {path: FramePlacement(index[base], matrix) for path, (base, matrix) in placed.found.items()}
+        stations = {}
+        for component in self.tree.components:
+            if isinstance(component, Station) and not self.tree.is_internal(component):
+                base, location = placed.station(component)
+                stations[placed.path(component)] = StationPlacement(index[base], location)
         gravity = np.array(self.model.gravity, dtype=float)
-        return Mechanism(self.model.name, bodies, tuple(self.coordinates), gravity, frames)
+        return Mechanism(
+            self.model.name,
+            tuple(bodies),
+            tuple(self.coordinates),
+            gravity,
+            frames,
+            tuple(self.constraints),
+            stations,
+        )
 
     def _refuse(self, component: Component) -> None:
-        """Stop at what would move the bodies differently and is not computed here."""
-        kind = component.class_name if isinstance(component, Unknown) else type(component).__name__
-        holder = self.tree.parent_of(component)
-        if isinstance(component, Unknown) and holder in (self.model.joint_set, self.model.body_set):
-            raise self._unknown(self._path(component), kind)
-        unknown_constraint = isinstance(component, Unknown) and holder is self.model.constraint_set
-        if unknown_constraint or (isinstance(component, Constraint) and component.isEnforced):
-            raise UnsupportedError(
-                f"the constraint '{self._path(component)}' ({kind}) cannot be computed; "
-                "set its isEnforced to false or remove it"
-            )
-
-    def _place(self, frame: PhysicalFrame, followed: tuple[str, ...]) -> tuple[str, Array]:
-        """The body (or ground) that a frame is fixed to, and the frame's transform there."""
-        path = self._path(frame)
-        if path in self.placements:
-            return self.placements[path]
-        if path in followed:
-            raise ModelError(f"the frame '{path}' is fixed to itself, through {listed(followed)}; fix it to a body")
-        if isinstance(frame, Body | Ground):
-            found = (path, np.eye(4))
-        elif isinstance(frame, PhysicalOffsetFrame):
-            base, matrix = self._place(self._frame(frame, "socket_parent"), (*followed, path))
-            found = (base, matrix @ offset(frame.translation, frame.orientation))
-        else:
-            raise UnsupportedError(f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place")
-        self.placements[path] = found
-        return found
-
-    def _frame(self, owner: Component, socket: str) -> PhysicalFrame:
-        target = self.tree.target(owner, socket, getattr(owner, socket))
-        if not isinstance(target, PhysicalFrame):
-            kind = getattr(target, "class_name", "") or type(target).__name__
-            raise UnsupportedError(
-                f"'{self._path(owner)}': {socket} names '{self._path(target)}', a {kind}, "
-                "which osimlite cannot place; name a body or a PhysicalOffsetFrame"
-            )
-        return target
+        """Stop at what would move the bodies differently and is not known."""
+        if not isinstance(component, Unknown):
+            return
+        holder, path = self.tree.parent_of(component), self.placements.path(component)
+        if holder in (self.model.joint_set, self.model.body_set):
+            raise unknown_joint(path, component.class_name)
+        if holder is self.model.constraint_set:
+            raise unknown_constraint(path, component.class_name)
 
     def _edge(self, joint: Joint) -> _Edge:
-        path, kind = self._path(joint), type(joint).__name__
-        parent, parent_frame = self._place(self._frame(joint, "socket_parent_frame"), ())
-        child, child_frame = self._place(self._frame(joint, "socket_child_frame"), ())
+        path = self.placements.path(joint)
+        parent, parent_frame = self.placements.frame(self.placements.named(joint, "socket_parent_frame"))
+        child, child_frame = self.placements.frame(self.placements.named(joint, "socket_child_frame"))
         if parent == child:
             raise ModelError(f"the joint '{path}' connects '{parent}' to itself; name frames of two bodies")
-        motions = self._motions(joint)
-        first, count = len(self.coordinates), len(joint.coordinates)
-        needed = 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
-        if count != needed:
-            raise ModelError(f"{kind} '{path}' has {count} coordinates and needs {needed}")
-        for coordinate, motion_type in zip(joint.coordinates, motion_types(motions, count), strict=True):
-            own_path = self._path(coordinate)
-            if coordinate.prescribed and coordinate.prescribed_function is not None:
-                raise UnsupportedError(
-                    f"the coordinate '{own_path}' is prescribed by a function, which osimlite cannot follow; "
-                    "set its prescribed to false, or lock it"
-                )
+        motions, coordinates = joint_motions(joint, path, opensim_derivatives=self.opensim_derivatives)
+        first, count = len(self.coordinates), len(coordinates)
+        for coordinate, motion_type in zip(coordinates, motion_types(motions, count), strict=True):
+            own_path = self.placements.path(coordinate)
             low, high = coordinate.range
             self.coordinates.append(
                 CoordinateInfo(
@@ -161,57 +162,78 @@ class _Builder:
                     range=(low, high),
                     clamped=coordinate.clamped,
                     locked=coordinate.locked,
+                    prescribed=self._prescribed(coordinate, own_path),
+                    yielding=coordinate.is_free_to_satisfy_constraints,
                 )
             )
         own = tuple(range(first, first + count))
         return _Edge(joint, path, parent, child, parent_frame, child_frame, motions, own)
 
-    def _motions(self, joint: Joint) -> tuple[Motion, ...]:
-        kind = type(joint).__name__
-        if kind not in MOTIONS:
-            raise self._unknown(self._path(joint), kind)
-        return MOTIONS[kind]
-
-    @staticmethod
-    def _unknown(path: str, kind: str) -> UnsupportedError:
-        return UnsupportedError(
-            f"'{path}' is a {kind}, whose motion osimlite cannot compute; the joints it can are "
-            f"{listed(MOTIONS, most=len(MOTIONS))}"
+    def _prescribed(self, coordinate: Coordinate, path: str) -> Function | None:
+        # OpenSim leaves a prescribed coordinate without a function free, and a locked one locked.
+        if not coordinate.prescribed or coordinate.prescribed_function is None or coordinate.locked:
+            return None
+        return numeric(
+            coordinate.prescribed_function,
+            1,
+            f"the prescribed_function of '{path}'",
+            opensim_derivatives=self.opensim_derivatives,
         )
 
-    def _sorted(self, edges: list[_Edge]) -> Iterator[MobileBody]:
-        """Yield the bodies level by level from ground, each with the mobilizer that carries it."""
-        level = [self._path(self.model.ground)]
-        index, used = {level[0]: GROUND}, set()
-        while level:
-            beyond = []
-            for edge in edges:
-                if edge.path in used or (edge.parent not in level and edge.child not in level):
-                    continue
-                used.add(edge.path)
-                carrier, outer = edge.parent, edge.child
-                if carrier not in level:
-                    carrier, outer = outer, carrier
-                if outer in index:
-                    raise UnsupportedError(
-                        f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
-                        "which osimlite cannot compute; remove one joint of the loop"
-                    )
-                yield MobileBody(
-                    name=_last(outer),
-                    path=outer,
-                    parent=index[carrier],
-                    mass_properties=self._mass_properties(outer),
-                    mobilizer=edge.mobilizer(reversed=carrier == edge.child),
-                )
-                index[outer] = len(index) - 1
-                beyond.append(outer)
-            level = beyond
+    def _bodies(self, edges: list[_Edge]) -> list[MobileBody]:
+        """The bodies, each with the mobilizer that carries it; welds for the joints that close loops."""
+        ground = self.placements.path(self.model.ground)
+        masses = {path: body.mass for path, body in self.bodies.items()}
+        branches, loops = spanning_tree(edges, ground, masses)
+        index = {ground: GROUND} | {branch.outer: place for place, branch in enumerate(branches)}
         loose = [path for path in self.bodies if path not in index]
         if loose:
             raise ModelError(
                 f"no joint connects {listed(loose)} to ground; add a joint for each, for instance a FreeJoint"
             )
+        bodies = []
+        for edge, outer, backward in branches:
+            carrier, mobilizer = edge.child if backward else edge.parent, edge.mobilizer(reversed=backward)
+            properties = self._mass_properties(outer)
+            bodies.append(MobileBody(_last(outer), outer, index[carrier], properties, mobilizer))
+        for edge in loops:
+            if not edge.coordinates:
+                first = FramePlacement(index[edge.parent], edge.parent_frame)
+                second = FramePlacement(index[edge.child], edge.child_frame)
+                self.constraints.append(WeldConstraint(first, second, edge.path))
+            elif edge.child == ground or type(edge.joint).__name__ == "FreeJoint":
+                raise UnsupportedError(
+                    f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
+                    "which osimlite cannot compute; remove one joint of the loop"
+                )
+            else:
+                self._split(edge, index, bodies)
+        return bodies
+
+    def _split(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
+        """Let the joint carry a part of its child, and weld that to the rest."""
+        place, whole = index[edge.child], self._mass_properties(edge.child)
+        parts = [place, *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part"))]
+        path = f"{edge.child}_part{len(parts)}"
+        bodies.append(MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False)))
+        parts.append(len(bodies) - 1)
+        for part in parts:
+            bodies[part] = replace(bodies[part], mass_properties=whole.share(len(parts)))
+        still = np.eye(4)
+        weld = WeldConstraint(FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path)
+        self.constraints.append(weld)
+
+    def _constrain(self, index: dict[str, int]) -> None:
+        places = {info.path: place for place, info in enumerate(self.coordinates)}
+        reader = ConstraintReader(self.placements, index, places, self.opensim_derivatives)
+        for component in self.tree.components:
+            if not isinstance(component, schema.Constraint) or not component.isEnforced:
+                continue
+            constraint = reader.constraint(component)
+            self.constraints.append(constraint)
+            if isinstance(constraint, Coupler):
+                place = constraint.dependent
+                self.coordinates[place] = replace(self.coordinates[place], yielding=True)
 
     def _mass_properties(self, path: str) -> MassProperties:
         body = self.bodies[path]
@@ -224,11 +246,6 @@ class _Builder:
             raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
         # OpenSim lets a body without mass have no inertia either.
         return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
-
-    def _path(self, component: Component) -> str:
-        path = self.tree.path_of(component)
-        assert path is not None
-        return path
 
 
 def _last(path: str) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.linear import solutions, stacked
 from osimlite.multibody.spatial import Array
 
 if TYPE_CHECKING:
@@ -114,18 +115,10 @@ def accelerations(state: Kinematics, applied: Array, constraints: Sequence[Const
     if not constraints:
         return _solve(state.mechanism, matrix, right, np.eye(len(right)))
     rows, values = stacked([constraint.acceleration_equations(state) for constraint in constraints])
-    basis, triangle = np.linalg.qr(rows.T, mode="complete")
-    rank = len(values)
-    particular = basis[:, :rank] @ np.linalg.solve(triangle[:rank].T, values)
-    free = basis[:, rank:]
+    particular, free = solutions(rows, values)
     reduced = _solve(state.mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free)
     udot: Array = particular + free @ reduced
     return udot
-
-
-def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """G (m, n) and b (m,) of several constraints in one."""
-    return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
 
 
 def _skews(vectors: Array) -> Array:

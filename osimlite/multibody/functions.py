@@ -9,10 +9,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from osimlite.errors import ModelError
 from osimlite.multibody.spatial import Array
 
 
@@ -101,6 +103,90 @@ class Sine(Univariate):
         angle = self.omega * x + self.phase
         wave = self.amplitude * math.sin(angle)
         return wave + self.offset, self.amplitude * self.omega * math.cos(angle), -(self.omega**2) * wave
+
+
+@dataclass(frozen=True)
+class WeightedSum(Function):
+    """The sum of all arguments times their `weights`, plus `start`."""
+
+    weights: tuple[float, ...]
+    start: float = 0.0
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """The sum, the weights, and zeros."""
+        weights, size = np.array(self.weights), len(arguments)
+        return float(weights @ arguments) + self.start, weights, np.zeros((size, size))
+
+
+@dataclass(frozen=True)
+class Step(Univariate):
+    """A change from `start_value` to `end_value` between two arguments, smooth to the second derivative."""
+
+    start: float
+    end: float
+    start_value: float
+    end_value: float
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        rate = 1.0 / (self.end - self.start)
+        t, rise = (x - self.start) * rate, self.end_value - self.start_value
+        if t <= 0.0 or t >= 1.0:
+            return (self.start_value if t <= 0.0 else self.end_value), 0.0, 0.0
+        first = 30.0 * t * t * (1.0 - t) ** 2
+        second = 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+        value = self.start_value + rise * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+        return value, rise * first * rate, rise * second * rate * rate
+
+
+@dataclass(frozen=True)
+class MultivariatePolynomial(Function):
+    """The sum of `coefficients` times monomials of all arguments.
+
+    Attributes:
+        coefficients: one for each monomial.
+        powers: of each argument in each monomial.
+        opensim_derivatives: give for the Hessian what OpenSim 4.6 takes for it, which is the gradient in every column.
+    """
+
+    coefficients: tuple[float, ...]
+    powers: tuple[tuple[int, ...], ...]
+    opensim_derivatives: bool = False
+
+    @classmethod
+    def complete(
+        cls, coefficients: Sequence[float], dimension: int, order: int, *, opensim_derivatives: bool = False
+    ) -> MultivariatePolynomial:
+        """With all monomials up to `order`, sorted by the power of the first argument, then of the next.
+
+        Raises:
+            ModelError: there are not as many coefficients as monomials.
+        """
+        powers = tuple(item for item in product(range(order + 1), repeat=dimension) if sum(item) <= order)
+        if len(powers) != len(coefficients):
+            raise ModelError(
+                f"a polynomial of {dimension} variables up to order {order} has {len(powers)} coefficients; "
+                f"got {len(coefficients)}"
+            )
+        return cls(tuple(coefficients), powers, opensim_derivatives)
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """Value, gradient (k,) and Hessian (k, k)."""
+        size = len(arguments)
+        powers = np.array(self.powers, dtype=int).reshape(-1, size)
+        value, gradient = self._derivative(arguments, powers, ()), np.zeros(size)
+        hessian = np.zeros((size, size))
+        for i in range(size):
+            gradient[i] = self._derivative(arguments, powers, (i,))
+            for j in range(size):
+                hessian[i, j] = gradient[i] if self.opensim_derivatives else self._derivative(arguments, powers, (i, j))
+        return value, gradient, hessian
+
+    def _derivative(self, arguments: Array, powers: NDArray[np.int_], by: tuple[int, ...]) -> float:
+        factors, left = np.array(self.coefficients), powers.copy()
+        for place in by:
+            factors = factors * left[:, place]
+            left[:, place] = np.maximum(left[:, place] - 1, 0)
+        return float(factors @ np.prod(arguments**left, axis=1))
 
 
 @dataclass(frozen=True)

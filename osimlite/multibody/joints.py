@@ -22,6 +22,7 @@ from osimlite.multibody.motions import (
     AxisMotion,
     Fixed,
     Motion,
+    SimbodyDrift,
     SphericalMotion,
     X,
     Y,
@@ -81,15 +82,20 @@ class TransformAxis(NamedTuple):
     function: Function
 
 
-def custom(rotations: Sequence[TransformAxis], translations: Sequence[TransformAxis]) -> tuple[Motion, ...]:
+def custom(
+    rotations: Sequence[TransformAxis], translations: Sequence[TransformAxis], *, opensim_derivatives: bool = False
+) -> tuple[Motion, ...]:
     """Motions of a CustomJoint: three translations along axes of F, then three body-fixed rotations.
+
+    With `opensim_derivatives` the velocity-dependent accelerations are Simbody's; see
+    :class:`osimlite.multibody.motions.SimbodyDrift`.
 
     Raises:
         ModelError: an axis has no direction.
     """
-    return tuple(_along("translate", axis) for axis in translations) + tuple(
-        _along("rotate", axis) for axis in rotations
-    )
+    slides = tuple(_along("translate", axis) for axis in translations)
+    turns = tuple(_along("rotate", axis) for axis in rotations)
+    return (*slides, SimbodyDrift(turns), *turns) if opensim_derivatives else (*slides, *turns)
 
 
 def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:

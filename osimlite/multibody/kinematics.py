@@ -30,6 +30,7 @@ class Kinematics:
         jacobians: from the n speeds to the velocity of each body (b + 1, 6, n).
         velocities: of each body in ground (b + 1, 6).
         biases: the accelerations (b + 1, 6) that the bodies have while all udot are zero.
+        time: what prescribed motions go by (s).
     """
 
     mechanism: Mechanism
@@ -40,6 +41,7 @@ class Kinematics:
     jacobians: Array
     velocities: Array
     biases: Array
+    time: float = 0.0
 
     def transform(self, body: int) -> Array:
         """The body in ground (4, 4)."""
@@ -55,6 +57,12 @@ class Kinematics:
         velocity: Array = self.velocities[body]
         return velocity[3:] + cross(velocity[:3], self.rotations[body] @ station)
 
+    def point_bias(self, body: int, station: Array) -> Array:
+        """Acceleration in ground (3,) of a `station` (3,) of the body while all udot are zero."""
+        arm, w = self.rotations[body] @ station, self.velocities[body][:3]
+        bias: Array = self.biases[body]
+        return bias[3:] + cross(bias[:3], arm) + cross(w, cross(w, arm))
+
     def point_jacobian(self, body: int, station: Array) -> Array:
         """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
         matrix: Array = self.jacobians[body].copy()
@@ -67,8 +75,8 @@ class Kinematics:
         return result
 
 
-def kinematics(mechanism: Mechanism, q: Array, u: Array) -> Kinematics:
-    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,)."""
+def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> Kinematics:
+    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,) and `time` (s)."""
     count, size = len(mechanism.bodies), len(q)
     rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
     # The columns of RelativeMotion, for each body in ground.
@@ -84,5 +92,5 @@ def kinematics(mechanism: Mechanism, q: Array, u: Array) -> Kinematics:
         blocks[index] = carried(blocks[parent], arm, moved[:, -2])
         blocks[index][:, [*own, size, size + 1]] += moved
     return Kinematics(
-        mechanism, q, u, rotations, origins, blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1]
+        mechanism, q, u, rotations, origins, blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1], time
     )

@@ -11,67 +11,41 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import ModelError
 from osimlite.multibody import dynamics
-from osimlite.multibody.constraints import Constraint, Lock
+from osimlite.multibody.assembly import assembled, projected
+from osimlite.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.multibody.dynamics import MassCentres, Wrench
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.kinematics import Kinematics, kinematics
+from osimlite.multibody.parts import (
+    GROUND,
+    CoordinateInfo,
+    FramePlacement,
+    MassProperties,
+    MobileBody,
+    StationPlacement,
+)
 from osimlite.multibody.spatial import Array
-from osimlite.schema.joints import MotionType
 from osimlite.text import did_you_mean
 
-GROUND = -1
+__all__ = [
+    "GROUND",
+    "CoordinateInfo",
+    "FramePlacement",
+    "MassProperties",
+    "Mechanism",
+    "MobileBody",
+    "StationPlacement",
+    "Values",
+]
 
 Values = ArrayLike | Mapping[str, float]
 """One number per coordinate: an array in coordinate order, or numbers by coordinate name."""
-
-
-@dataclass(frozen=True, eq=False)
-class MassProperties:
-    """Mass (kg), mass centre (3,) in the body frame (m), inertia (3, 3) about it along body axes (kg·m²)."""
-
-    mass: float
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
-
-
-@dataclass(frozen=True)
-class CoordinateInfo:
-    """What the model says of one coordinate (rad or m, and per second). `joint` is the path of its joint."""
-
-    name: str
-    path: str
-    joint: str
-    motion_type: MotionType
-    default_value: float = 0.0
-    default_speed: float = 0.0
-    range: tuple[float, float] = (-10.0, 10.0)
-    clamped: bool = False
-    locked: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class MobileBody:
-    """A body, the index of the body that carries it (-1: ground), and the mobilizer between them."""
-
-    name: str
-    path: str
-    parent: int
-    mass_properties: MassProperties
-    mobilizer: Mobilizer
-
-
-class FramePlacement(NamedTuple):
-    """A frame fixed to a body (index, -1 for ground); `transform` (4, 4) is the frame in the body."""
-
-    body: int
-    transform: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +54,16 @@ class Mechanism:
 
     Wherever a method takes q or u, an array (n,) in the order of `coordinates` or a mapping by coordinate name will
     do; names left out take their default. A body or frame is named by its absolute path, a body also by its name.
-    Every method raises ModelError for a name that does not exist and for values of the wrong number.
+    Every method raises ModelError for a name that does not exist and for values of the wrong number. A `time` (s)
+    matters only where coordinates are prescribed.
 
     Attributes:
         bodies: carriers before the carried.
         coordinates: in the order of all arrays.
         gravity: acceleration (3,) in ground (m/s²).
         frames: every frame fixed to a body or to ground, by absolute path.
-        constraints: what holds besides the joints; the locks of locked coordinates are put before them.
+        constraints: what holds besides the joints; what locked and prescribed coordinates need is put before them.
+        stations: every marker and other station, by absolute path.
     """
 
     name: str
@@ -96,6 +72,7 @@ class Mechanism:
     gravity: Array = field(default_factory=lambda: np.array((0.0, -9.80665, 0.0)))
     frames: Mapping[str, FramePlacement] = field(default_factory=dict)
     constraints: tuple[Constraint, ...] = ()
+    stations: Mapping[str, StationPlacement] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for index, body in enumerate(self.bodies):
@@ -106,8 +83,13 @@ class Mechanism:
         places = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
         if places != list(range(len(self.coordinates))):
             raise ModelError(f"the joints of '{self.name}' do not share out its coordinates one by one")
-        locks = tuple(Lock(index) for index, info in enumerate(self.coordinates) if info.locked)
-        object.__setattr__(self, "constraints", (*locks, *self.constraints))
+        holds: list[Constraint] = []
+        for index, info in enumerate(self.coordinates):
+            if info.locked:
+                holds.append(Lock(index, info.path))
+            elif info.prescribed is not None:
+                holds.append(Prescribed(index, info.prescribed, info.path))
+        object.__setattr__(self, "constraints", (*holds, *self.constraints))
 
     # ------------------------------------------------------------------------------------ names and states
     @cached_property
@@ -131,14 +113,31 @@ class Mechanism:
             near = did_you_mean(name, self._placements)
             raise ModelError(f"'{self.name}' has no body or frame '{name}'{near}") from None
 
-    def default_state(self) -> tuple[Array, Array]:
-        """Default values (n,) and speeds (n,), these changed as little as the constraints demand."""
-        q, u = self.values({}), self.speeds({})
-        if self.constraints:
-            state = kinematics(self, q, u)
-            rows, wanted = dynamics.stacked([item.velocity_equations(state) for item in self.constraints])
-            u = u + np.linalg.pinv(rows) @ (wanted - rows @ u)
-        return q, u
+    def default_state(self, time: float = 0.0) -> tuple[Array, Array]:
+        """Default values (n,) and speeds (n,), these changed as little as the constraints demand.
+
+        Raises:
+            SimulationError: no pose near the default one fulfils the constraints.
+        """
+        q = self.assemble({}, time)
+        return q, self.project_speeds(q, {}, time)
+
+    def assemble(self, q: Values, time: float = 0.0) -> Array:
+        """The values (n,) nearest to `q` that fulfil the constraints, by the rules of OpenSim's assembly.
+
+        Locked coordinates keep their values, clamped ones their ranges; those that are `yielding` do not count.
+
+        Raises:
+            SimulationError: no pose near the given one fulfils the constraints.
+        """
+        values = self.values(q)
+        if all(isinstance(item, Lock) for item in self.constraints):
+            return values
+        return assembled(self, values, time)
+
+    def project_speeds(self, q: Values, u: Values, time: float = 0.0) -> Array:
+        """The speeds (n,) nearest to `u` that fulfil the constraints."""
+        return projected(self.at(q, self.speeds(u), time))
 
     def values(self, q: Values) -> Array:
         """Coordinate values as an array (n,)."""
@@ -148,10 +147,10 @@ class Mechanism:
         """Generalized speeds as an array (n,)."""
         return self._array(u, "speed", [info.default_speed for info in self.coordinates])
 
-    def at(self, q: Values, u: Values | None = None) -> Kinematics:
+    def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> Kinematics:
         """Poses and velocities of all bodies (u None: at rest), from which everything else follows."""
         values = self.values(q)
-        return kinematics(self, values, np.zeros(len(values)) if u is None else self.speeds(u))
+        return kinematics(self, values, np.zeros(len(values)) if u is None else self.speeds(u), time)
 
     # ------------------------------------------------------------------------------------------ kinematics
     def body_transforms(self, q: Values) -> dict[str, Array]:
@@ -178,6 +177,11 @@ class Mechanism:
     def station_position(self, frame: str, station: ArrayLike, q: Values) -> Array:
         """Position (3,) in ground of a point given in a frame (m)."""
         return self.at(q).point(*self._station(frame, station))
+
+    def station_positions(self, q: Values) -> dict[str, Array]:
+        """Position (3,) in ground of every marker and other station, by absolute path (m)."""
+        state = self.at(q)
+        return {path: state.point(*placed) for path, placed in self.stations.items()}
 
     def station_velocity(self, frame: str, station: ArrayLike, q: Values, u: Values) -> Array:
         """Velocity (3,) in ground of a point fixed in a frame (m/s)."""
@@ -251,19 +255,21 @@ class Mechanism:
         u: Values,
         generalized_forces: Values | None = None,
         body_wrenches: Mapping[str, Wrench] | None = None,
+        time: float = 0.0,
     ) -> Array:
         """Derivatives of the generalized speeds (n,) under gravity, the given forces and the constraints.
 
         Args:
-            q: coordinate values.
-            u: generalized speeds, which must obey the constraints already (that of a locked coordinate is zero).
+            q: coordinate values, which must obey the constraints already.
+            u: generalized speeds, which must obey them too (that of a locked coordinate is zero).
             generalized_forces: conjugate to the generalized speeds (N, N·m); zero for names left out.
             body_wrenches: by body or frame, applied at its origin, along ground's axes.
+            time: what prescribed coordinates go by (s).
 
         Raises:
             SimulationError: a coordinate moves no mass, or a number is not finite.
         """
-        state = self.at(q, u)
+        state = self.at(q, u, time)
         applied = self._applied(state, {} if generalized_forces is None else generalized_forces, body_wrenches or {})
         return dynamics.accelerations(state, applied, self.constraints)
 

@@ -114,6 +114,41 @@ class AxisMotion(Motion):
 
 
 @dataclass(frozen=True, eq=False)
+class SimbodyDrift(Motion):
+    """No motion, but the error of Simbody's angular acceleration of a CustomJoint with these three `turns` after it.
+
+    The angular velocity is W r with the rates r of the three angles and the axes W, each turned by the angles before
+    it. In the rate of W Simbody takes for the rate of the first angle what the first coordinate does to all three
+    angles, and for that of the first two what the first two coordinates do. That is right only if each coordinate
+    drives the angle of the same number.
+    """
+
+    turns: tuple[AxisMotion, ...]
+    coordinates: tuple[int, ...] = ()
+
+    def relative(self, q: Array, u: Array) -> RelativeMotion:
+        """A frame at rest that all the same has the error as its angular acceleration."""
+        motion = RelativeMotion.fixed(np.eye(4), len(q))
+        axes, shares, rotation = [], np.zeros((3, len(q))), np.eye(3)
+        for row, turn in enumerate(self.turns):
+            own = list(turn.coordinates)
+            amount, gradient, _ = turn.function.evaluate(q[own])
+            shares[row, own] = gradient * u[own]
+            axes.append(rotation @ turn.axis)
+            rotation = rotation @ rotation_about(turn.axis, amount)
+        along, rates = np.array(axes).T, shares.sum(axis=1)
+        for row in (1, 2):
+            theirs = along @ shares[:, :row].sum(axis=1)
+            right = along[:, :row] @ rates[:row]
+            motion.block[:3, -1] += cross(theirs - right, axes[row]) * rates[row]
+        return motion
+
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """Nothing."""
+        return ()
+
+
+@dataclass(frozen=True, eq=False)
 class SphericalMotion(Motion):
     """Rotation by three body-fixed X-Y-Z angles, whose generalized speeds are the angular velocity.
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import gzip
 import json
-import xml.etree.ElementTree as ElementTree
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import osimlite
 from osimlite.multibody import functions as f
 from osimlite.multibody.joints import (
     MOTIONS,
@@ -23,7 +23,9 @@ from osimlite.multibody.joints import (
 )
 from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
 from osimlite.multibody.motions import Motion
+from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import offset
+from osimlite.schema import functions as schema
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "kinematics"
 
@@ -39,24 +41,16 @@ def load(name: str) -> Any:
 
 def function(spec: dict[str, Any]) -> f.Function:
     """The function that a case describes."""
-    match spec["type"]:
-        case "Constant":
-            return f.Constant(spec["value"])
-        case "LinearFunction":
-            return f.Linear(*spec["coefficients"])
-        case "PolynomialFunction":
-            return f.Polynomial(tuple(spec["coefficients"]))
-        case "SimmSpline":
-            return f.SimmSpline(spec["x"], spec["y"])
-        case "PiecewiseLinearFunction":
-            return f.PiecewiseLinear(tuple(spec["x"]), tuple(spec["y"]))
-        case "PiecewiseConstantFunction":
-            return f.PiecewiseConstant(tuple(spec["x"]), tuple(spec["y"]))
-        case "MultiplierFunction":
-            return f.Scaled(spec["scale"], function(spec["function"]))
-        case "Sine":
-            return f.Sine(spec["amplitude"], spec["omega"], spec["phase"], spec["offset"])
-    raise AssertionError(spec["type"])
+    return numeric(_component(spec), 1, "the function of a case")
+
+
+def _component(spec: dict[str, Any]) -> schema.Function:
+    fields = {name: tuple(value) if isinstance(value, list) else value for name, value in spec.items()}
+    kind = getattr(schema, str(fields.pop("type")))
+    if "function" in fields:
+        fields["function"] = _component(spec["function"])
+    component: schema.Function = kind(**fields)
+    return component
 
 
 def motions(joint_type: str, properties: dict[str, Any]) -> tuple[Motion, ...]:
@@ -110,66 +104,7 @@ def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechani
     return Mechanism("case", (body,), coordinates)
 
 
-def _numbers(element: ElementTree.Element, tag: str) -> list[float]:
-    return [float(word) for word in (element.findtext(tag) or "").split()]
-
-
-def _inertia(values: list[float]) -> Any:
-    xx, yy, zz, xy, xz, yz = values
-    return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
-
-
-def _function_spec(element: ElementTree.Element) -> dict[str, Any]:
-    spec: dict[str, Any] = {"type": element.tag}
-    for child in element:
-        values = _numbers(element, child.tag)
-        spec[child.tag] = values[0] if child.tag == "value" else values
-    return spec
-
-
-def _joint_properties(joint: ElementTree.Element, names: list[str]) -> dict[str, Any]:
-    if joint.tag == "EllipsoidJoint":
-        return {"radii_x_y_z": _numbers(joint, "radii_x_y_z")}
-    axes = [
-        {
-            "coordinates": (axis.findtext("coordinates") or "").split(),
-            "axis": _numbers(axis, "axis"),
-            "function": _function_spec(axis[-1]),
-        }
-        for axis in joint.iterfind("SpatialTransform/TransformAxis")
-    ]
-    return {"axes": axes, "coordinate_order": names}
-
-
 @cache
 def mixed_tree() -> Mechanism:
     """The tree of fixtures/kinematics/mixed_joint_tree.osim: 10 bodies, 24 coordinates, 10 joint types."""
-    model = ElementTree.parse(FIXTURES / "mixed_joint_tree.osim").getroot()[0]
-    elements = {body.get("name"): body for body in model.iterfind("BodySet/objects/Body")}
-    order: dict[str, int] = {}
-    bodies: list[MobileBody] = []
-    coordinates: list[CoordinateInfo] = []
-    for joint in model.iterfind("JointSet/objects/*"):
-        names = [str(item.get("name")) for item in joint.iterfind("coordinates/Coordinate")]
-        parts = motions(joint.tag, _joint_properties(joint, names))
-        types = motion_types(parts, len(names))
-        path = f"/jointset/{joint.get('name')}"
-        (parent, parent_frame), (child, child_frame) = (
-            (
-                (frame.findtext("socket_parent") or "").split("/")[-1],
-                offset(_numbers(frame, "translation"), _numbers(frame, "orientation")),
-            )
-            for frame in joint.iterfind("frames/PhysicalOffsetFrame")
-        )
-        own = tuple(range(len(coordinates), len(coordinates) + len(names)))
-        coordinates += [CoordinateInfo(name, f"{path}/{name}", path, types[i]) for i, name in enumerate(names)]
-        element = elements[child]
-        properties = MassProperties(
-            _numbers(element, "mass")[0],
-            np.array(_numbers(element, "mass_center")),
-            _inertia(_numbers(element, "inertia")),
-        )
-        mobilizer = Mobilizer(path, joint.tag, parts, own, parent_frame, child_frame)
-        bodies.append(MobileBody(child, f"/bodyset/{child}", order.get(parent, -1), properties, mobilizer))
-        order[child] = len(bodies) - 1
-    return Mechanism("mixed_joint_tree", tuple(bodies), tuple(coordinates), np.array(_numbers(model, "gravity")))
+    return osimlite.mechanism(osimlite.read(FIXTURES / "mixed_joint_tree.osim"))

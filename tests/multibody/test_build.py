@@ -13,7 +13,7 @@ from osimlite.multibody.spatial import inverse, offset
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, PhysicalOffsetFrame
-from osimlite.schema.functions import Constant
+from osimlite.schema.functions import ExpressionBasedFunction
 from osimlite.schema.joints import BallJoint, FreeJoint, Joint, PinJoint, PlanarJoint, WeldJoint
 from osimlite.schema.model import Model
 from tests.multibody.cases import load
@@ -213,7 +213,11 @@ def _second(model: Model, joint: Joint, parent, child) -> None:
 
 
 def _loop(model: Model, body: Body, joint: Joint) -> None:
-    model.add(WeldJoint(name="again").between(body, model.ground))
+    _second(model, FreeJoint(name="again"), model.ground, body)
+
+
+def _loop_to_ground(model: Model, body: Body, joint: Joint) -> None:
+    _second(model, PinJoint(name="again"), body, model.ground)
 
 
 def _to_itself(model: Model, body: Body, joint: Joint) -> None:
@@ -241,7 +245,7 @@ def _extra_coordinate(model: Model, body: Body, joint: Joint) -> None:
 
 
 def _prescribed(model: Model, body: Body, joint: Joint) -> None:
-    joint.coordinates[0].prescribed_function = Constant(value=0.2)
+    joint.coordinates[0].prescribed_function = ExpressionBasedFunction(expression="t", variables=("t",))
     joint.coordinates[0].prescribed = True
 
 
@@ -270,13 +274,18 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
 @pytest.mark.parametrize(
     ("spoil", "kind", "words"),
     [
-        (_loop, UnsupportedError, "'/jointset/again' closes a loop through '/bodyset/rod' and '/ground'.*remove"),
+        (_loop, UnsupportedError, "'/jointset/again' closes a loop through '/ground' and '/bodyset/rod'.*remove"),
+        (_loop_to_ground, UnsupportedError, "'/jointset/again' closes a loop through '/bodyset/rod' and '/ground'"),
         (_to_itself, ModelError, "'/jointset/hinge' connects '/bodyset/rod' to itself"),
         (_loose, ModelError, "no joint connects /bodyset/island and /bodyset/reef to ground; add a joint"),
         (_dangling, ModelError, "'/jointset/hinge'.*socket_child_frame.*'/bodyset/rodd'.*did you mean"),
         (_circle, ModelError, "'/bodyset/rod/first' is fixed to itself"),
         (_extra_coordinate, ModelError, "PinJoint '/jointset/hinge' has 2 coordinates and needs 1"),
-        (_prescribed, UnsupportedError, "'/jointset/hinge/hinge_0' is prescribed by a function"),
+        (
+            _prescribed,
+            UnsupportedError,
+            "of '/jointset/hinge/hinge_0' is a ExpressionBasedFunction",
+        ),
         (_unknown_joint, UnsupportedError, "'/jointset/odd' is a ScrewJoint.*PinJoint"),
         (_unknown_constraint, UnsupportedError, "'/constraintset/odd' \\(GearConstraint\\) cannot be computed"),
         (_no_mass, ModelError, "'/bodyset/rod' has mass nan"),

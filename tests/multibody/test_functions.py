@@ -92,3 +92,50 @@ def test_the_point_of_an_ellipsoid_has_the_derivatives_of_its_values(component, 
 def test_a_sine_is_a_sine():
     wave = f.Sine(2.0, 3.0, 0.5, 1.0)
     assert wave.evaluate(np.array((0.1,)))[0] == pytest.approx(2.0 * math.sin(0.8) + 1.0, abs=1e-15)
+
+
+def _slopes(function: f.Function, at: np.ndarray, step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient and Hessian by central differences."""
+    pairs = [[function.evaluate(at + sign * step * np.eye(len(at))[k]) for sign in (1.0, -1.0)] for k in range(len(at))]
+    gradient = np.array([(high[0] - low[0]) / (2.0 * step) for high, low in pairs])
+    hessian = np.array([(high[1] - low[1]) / (2.0 * step) for high, low in pairs])
+    return gradient, hessian
+
+
+@given(st.integers(1, 3), st.integers(0, 3), st.integers(0, 2**32 - 1))
+def test_a_polynomial_of_several_variables_has_the_derivatives_of_its_values(dimension, order, seed):
+    rng = np.random.default_rng(seed)
+    polynomial = f.MultivariatePolynomial.complete(
+        rng.uniform(-1.0, 1.0, math.comb(dimension + order, order)).tolist(), dimension, order
+    )
+    at = rng.uniform(-1.0, 1.0, dimension)
+    _, gradient, hessian = polynomial.evaluate(at)
+    slopes, bends = _slopes(polynomial, at)
+    assert gradient == pytest.approx(slopes, abs=1e-8)
+    assert hessian == pytest.approx(bends, abs=1e-8)
+
+
+def test_the_monomials_come_in_opensims_order():
+    # 1, y, y², x, xy, x²
+    polynomial = f.MultivariatePolynomial.complete((1.0, 10.0, 100.0, 1e3, 1e4, 1e5), 2, 2)
+    value, gradient, hessian = polynomial.evaluate(np.array((2.0, 3.0)))
+    assert value == 1.0 + 30.0 + 900.0 + 2e3 + 6e4 + 4e5
+    assert gradient.tolist() == [1e3 + 3e4 + 4e5, 10.0 + 600.0 + 2e4]
+    assert hessian.tolist() == [[2e5, 1e4], [1e4, 200.0]]
+    theirs = f.MultivariatePolynomial(polynomial.coefficients, polynomial.powers, opensim_derivatives=True)
+    assert theirs.evaluate(np.array((2.0, 3.0)))[2].tolist() == [[gradient[0]] * 2, [gradient[1]] * 2]
+
+
+@given(st.floats(-1.0, 2.0))
+def test_a_step_has_the_derivatives_of_its_values(x):
+    step = f.Step(0.2, 0.9, -1.0, 2.5)
+    _, gradient, hessian = step.evaluate(np.array((x,)))
+    slopes, bends = _slopes(step, np.array((x,)))
+    assert gradient == pytest.approx(slopes, abs=1e-6)
+    assert hessian == pytest.approx(bends, abs=2e-3)
+    assert step.evaluate(np.array((0.55,)))[0] == pytest.approx(0.75)
+
+
+def test_a_weighted_sum():
+    value, gradient, hessian = f.WeightedSum((2.0, -1.0), 0.5).evaluate(np.array((3.0, 4.0)))
+    assert (value, gradient.tolist(), hessian.tolist()) == (2.5, [2.0, -1.0], [[0.0, 0.0], [0.0, 0.0]])

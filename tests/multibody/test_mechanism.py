@@ -66,8 +66,8 @@ def test_what_is_not_there_is_named(call, words):
 
 def test_bodies_must_follow_their_carriers():
     tree = mixed_tree()
-    with pytest.raises(ModelError, match="'B' stands before the body that carries it"):
-        Mechanism("wrong", (tree.bodies[1], tree.bodies[0], *tree.bodies[2:]), tree.coordinates)
+    with pytest.raises(ModelError, match=f"'{tree.bodies[-1].name}' stands before the body that carries it"):
+        Mechanism("wrong", tree.bodies[::-1], tree.coordinates)
     with pytest.raises(ModelError, match="do not share out its coordinates"):
         Mechanism("wrong", tree.bodies, tree.coordinates[:-1])
 

@@ -1,0 +1,39 @@
+"""Linear equations that may repeat or contradict each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+
+_REDUNDANT = 1e-9
+"""An equation that differs from what others say by less than this part of itself says nothing new."""
+
+
+def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """G (m, n) and b (m,) of several sets of equations in one."""
+    return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
+
+
+def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
+    """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
+
+    Where equations contradict each other, the solution has the least squares of their errors, each equation counted
+    with a left side of unit length. The directions are orthonormal.
+    """
+    count, size = rows.shape
+    if not count:
+        return np.zeros(size), np.eye(size)
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths[lengths == 0.0] = 1.0
+    rows, values = rows / lengths[:, None], values / lengths
+    if count <= size:
+        basis, triangle = np.linalg.qr(rows.T, mode="complete")
+        triangle = triangle[:count]
+        if np.abs(triangle.diagonal()).min() > _REDUNDANT:
+            return basis[:, :count] @ np.linalg.solve(triangle.T, values), basis[:, count:]
+    left, strengths, right = np.linalg.svd(rows)
+    rank = int(np.sum(strengths > _REDUNDANT * strengths[0]))
+    return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T

@@ -1,0 +1,77 @@
+"""What a mechanism is made of: mass, coordinates, bodies, and what is fixed to bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.multibody.functions import Function
+from osimlite.multibody.joints import Mobilizer
+from osimlite.multibody.spatial import Array
+from osimlite.schema.joints import MotionType
+
+GROUND = -1
+"""The index that stands for ground wherever a body is meant."""
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Mass (kg), mass centre (3,) in the body frame (m), inertia (3, 3) about it along body axes (kg·m²)."""
+
+    mass: float
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def share(self, count: int) -> MassProperties:
+        """One of `count` equal parts that lie on each other."""
+        return MassProperties(self.mass / count, self.center, self.inertia / count)
+
+
+@dataclass(frozen=True)
+class CoordinateInfo:
+    """What the model says of one coordinate (rad or m, and per second).
+
+    Attributes:
+        joint: path of its joint.
+        prescribed: its value as a function of time (s), or None; a locked coordinate keeps its value all the same.
+        yielding: assembling a pose moves it as the constraints like, instead of as little as it can.
+    """
+
+    name: str
+    path: str
+    joint: str
+    motion_type: MotionType
+    default_value: float = 0.0
+    default_speed: float = 0.0
+    range: tuple[float, float] = (-10.0, 10.0)
+    clamped: bool = False
+    locked: bool = False
+    prescribed: Function | None = None
+    yielding: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class MobileBody:
+    """A body, the index of the body that carries it (-1: ground), and the mobilizer between them."""
+
+    name: str
+    path: str
+    parent: int
+    mass_properties: MassProperties
+    mobilizer: Mobilizer
+
+
+class FramePlacement(NamedTuple):
+    """A frame fixed to a body (index, -1 for ground); `transform` (4, 4) is the frame in the body."""
+
+    body: int
+    transform: Array
+
+
+class StationPlacement(NamedTuple):
+    """A point fixed to a body (index, -1 for ground); `location` (3,) is the point in the body's frame (m)."""
+
+    body: int
+    location: Array

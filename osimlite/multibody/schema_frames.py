@@ -1,0 +1,100 @@
+"""Where the frames and stations of a model are: which body they are fixed to, and their transform there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.multibody.spatial import Array, cross, offset, transform
+from osimlite.schema.base import Component
+from osimlite.schema.frames import Body, Ground, PhysicalFrame, PhysicalOffsetFrame, StationDefinedFrame
+from osimlite.schema.markers import Station
+from osimlite.schema.tree import Tree
+from osimlite.text import listed
+
+
+class Placements:
+    """Follows frames of frames down to bodies (or ground), each named by its absolute path."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.tree = tree
+        self.found: dict[str, tuple[str, Array]] = {}
+        """The body (or ground) that each frame is fixed to so far, and where it is there (4, 4)."""
+
+    def frame(self, frame: PhysicalFrame, followed: tuple[str, ...] = ()) -> tuple[str, Array]:
+        """The body (or ground) that a frame is fixed to, and the frame's transform (4, 4) there.
+
+        Raises:
+            ModelError: frames are fixed to each other in a circle, or stations do not define a frame.
+            UnsupportedError: a frame of another class.
+        """
+        path = self.path(frame)
+        if path in self.found:
+            return self.found[path]
+        if path in followed:
+            raise ModelError(f"the frame '{path}' is fixed to itself, through {listed(followed)}; fix it to a body")
+        if isinstance(frame, Body | Ground):
+            found = (path, np.eye(4))
+        elif isinstance(frame, PhysicalOffsetFrame):
+            base, matrix = self.frame(self.named(frame, "socket_parent"), (*followed, path))
+            found = (base, matrix @ offset(frame.translation, frame.orientation))
+        elif isinstance(frame, StationDefinedFrame):
+            found = self._through_stations(frame, path, (*followed, path))
+        else:
+            raise UnsupportedError(f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place")
+        self.found[path] = found
+        return found
+
+    def named(self, owner: Component, socket: str) -> PhysicalFrame:
+        """The frame that a socket of `owner` leads to."""
+        target = self.tree.target(owner, socket, getattr(owner, socket))
+        if not isinstance(target, PhysicalFrame):
+            kind = getattr(target, "class_name", "") or type(target).__name__
+            raise UnsupportedError(
+                f"'{self.path(owner)}': {socket} names '{self.path(target)}', a {kind}, "
+                "which osimlite cannot place; name a body or a PhysicalOffsetFrame"
+            )
+        return target
+
+    def station(self, station: Station, followed: tuple[str, ...] = ()) -> tuple[str, Array]:
+        """The body (or ground) that a station is fixed to, and its place (3,) there."""
+        base, matrix = self.frame(self.named(station, "socket_parent_frame"), followed)
+        return base, matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
+
+    def path(self, component: Component) -> str:
+        """The absolute path of a component of the model."""
+        path = self.tree.path_of(component)
+        assert path is not None
+        return path
+
+    def _through_stations(self, frame: StationDefinedFrame, path: str, followed: tuple[str, ...]) -> tuple[str, Array]:
+        bases, points = [], []
+        for socket in ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"):
+            target = self.tree.target(frame, socket, getattr(frame, socket))
+            assert isinstance(target, Station)
+            base, point = self.station(target, followed)
+            bases.append(base)
+            points.append(point)
+        if len(set(bases)) > 1:
+            raise ModelError(
+                f"the stations of the frame '{path}' are fixed to {listed(sorted(set(bases)))}; fix all to one body"
+            )
+        a, b, c, origin = points
+        along, across = b - a, cross(b - a, c - a)
+        if not np.linalg.norm(across) > 0.0:
+            raise ModelError(f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it")
+        # The third vector completes the two, in the order of the two axes.
+        first, second = _axis(frame.ab_axis), _axis(frame.ab_x_ac_axis)
+        if first @ second != 0.0:
+            second = np.roll(np.abs(first), 1)
+        vectors = [vector / np.linalg.norm(vector) for vector in (along, across, cross(along, across))]
+        axes = [first, second, cross(first, second)]
+        rotation = np.array(vectors).T @ np.array(axes)
+        return bases[0], transform(rotation, origin)
+
+
+def _axis(word: str) -> Array:
+    """The unit vector that a word like ``-y`` names."""
+    vector = np.zeros(3)
+    vector["xyz".index(word[-1].lower())] = -1.0 if word.startswith("-") else 1.0
+    return vector

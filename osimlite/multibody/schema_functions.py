@@ -1,0 +1,118 @@
+"""From the function components of a model to functions that can be evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.multibody import functions as f
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.schema import functions as schema
+from osimlite.schema.base import Object, Unknown
+from osimlite.text import listed
+
+
+def numeric(function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False) -> f.Function:
+    """The function that a component of a model describes.
+
+    Args:
+        function: one of OpenSim's functions.
+        arguments: how many arguments it will get.
+        where: the path and property it stands in, for messages.
+        opensim_derivatives: give a multivariate polynomial the second derivatives that OpenSim takes for them.
+
+    Raises:
+        ModelError: there is no function, or it is not a function of this many arguments, or has impossible values.
+        UnsupportedError: a function of another class.
+    """
+    if function is None:
+        raise ModelError(f"{where} has no function; give it one, for instance a LinearFunction")
+    kind = type(function)
+    try:
+        if isinstance(function, schema.MultiplierFunction):
+            inner = numeric(function.function, arguments, where, opensim_derivatives=opensim_derivatives)
+            return f.Scaled(function.scale, inner)
+        if isinstance(function, schema.MultivariatePolynomialFunction):
+            _takes(function, function.dimension, arguments)
+            return f.MultivariatePolynomial.complete(
+                function.coefficients, function.dimension, function.order, opensim_derivatives=opensim_derivatives
+            )
+        if isinstance(function, schema.LinearFunction):
+            return _linear(function, arguments)
+        if isinstance(function, schema.Constant):
+            return f.Constant(function.value)
+        if kind not in _UNIVARIATE:
+            name = function.class_name if isinstance(function, Unknown) else kind.__name__
+            can = ["Constant", "LinearFunction", "MultiplierFunction", "MultivariatePolynomialFunction"]
+            can += [item.__name__ for item in _UNIVARIATE]
+            raise UnsupportedError(
+                f"{where} is a {name}, which osimlite cannot differentiate twice; "
+                f"the functions it can are {listed(can, most=len(can))}"
+            )
+        _takes(function, 1, arguments)
+        return _UNIVARIATE[kind](function)
+    except _Impossible as problem:
+        raise ModelError(f"{where} ({kind.__name__}): {problem}") from None
+
+
+class _Impossible(Exception):
+    """What is wrong with a function, and what to do, without its place."""
+
+
+def _takes(function: Object, wanted: int, given: int) -> None:
+    if given != wanted:
+        raise _Impossible(f"it is a function of {wanted} variables and gets {given}; list as many coordinates")
+
+
+def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
+    *weights, start = function.coefficients or (0.0,)
+    _takes(function, len(weights), arguments)
+    return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(tuple(weights), start)
+
+
+def _points(function: Any, least: int, *, apart: bool) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The abscissae and ordinates of a function that goes through points, checked."""
+    x, y = tuple(function.x), tuple(function.y)
+    if len(x) != len(y) or len(x) < least:
+        raise _Impossible(f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}")
+    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        raise _Impossible("a point is not finite; give numbers")
+    steps = np.diff(x)
+    if (steps < 0.0).any() or (apart and (steps == 0.0).any()):
+        raise _Impossible("its x do not increase; sort the points" + (" and remove repeated ones" if apart else ""))
+    return x, y
+
+
+def _gcv(function: schema.GCVSpline) -> f.Function:
+    half_order = function.half_order
+    if not 1 <= half_order <= 4:
+        raise _Impossible(f"its half_order is {half_order}; give 1 to 4")
+    x, y = _points(function, 2 * half_order, apart=True)
+    return smoothing_spline(x, y, half_order, function.error_variance)
+
+
+def _step(function: schema.StepFunction) -> f.Function:
+    start, end = function.transition_start_time, function.transition_end_time
+    if not start < end:
+        raise _Impossible(f"its transition ends at {end:g} and starts at {start:g}; let it end later than it starts")
+    return f.Step(start, end, function.start_value, function.end_value)
+
+
+def _floats(values: Sequence[float]) -> tuple[float, ...]:
+    if not values:
+        raise _Impossible("it has no coefficients; give at least one")
+    return tuple(float(value) for value in values)
+
+
+_UNIVARIATE: dict[type[Object], Callable[[Any], f.Function]] = {
+    schema.PolynomialFunction: lambda item: f.Polynomial(_floats(item.coefficients)),
+    schema.Sine: lambda item: f.Sine(item.amplitude, item.omega, item.phase, item.offset),
+    schema.StepFunction: _step,
+    schema.PiecewiseConstantFunction: lambda item: f.PiecewiseConstant(*_points(item, 2, apart=False)),
+    schema.PiecewiseLinearFunction: lambda item: f.PiecewiseLinear(*_points(item, 2, apart=True)),
+    schema.SimmSpline: lambda item: f.SimmSpline(*_points(item, 2, apart=False)),
+    schema.GCVSpline: _gcv,
+}

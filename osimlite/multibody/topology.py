@@ -1,0 +1,90 @@
+"""From joints to a tree: which joint carries which body, and which joints close loops.
+
+The rules are those of Simbody's multibody graph maker, so that the bodies come in OpenSim's order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+
+class Link(Protocol):
+    """A joint between two bodies (or ground), named by their absolute paths."""
+
+    @property
+    def parent(self) -> str:
+        """The body of the joint's parent frame."""
+
+    @property
+    def child(self) -> str:
+        """The body of the joint's child frame."""
+
+    @property
+    def coordinates(self) -> tuple[int, ...]:
+        """Its coordinates, empty for a weld."""
+
+
+L = TypeVar("L", bound=Link)
+
+
+class Branch(NamedTuple, Generic[L]):
+    """A joint in the tree: which body it adds, and whether it does so from its child to its parent."""
+
+    link: L
+    outer: str
+    reversed: bool
+
+
+def spanning_tree(links: Sequence[L], ground: str, masses: Mapping[str, float]) -> tuple[list[Branch[L]], list[L]]:
+    """The joints that carry bodies, carriers before the carried, and those that only close loops.
+
+    The tree grows level by level from ground, within a level in the order of the joints. Where a joint would move a
+    body without mass, the branch goes on at once, to the heaviest neighbour, until a body with mass ends it.
+    """
+    levels = {ground: 0}
+    branches: list[Branch[L]] = []
+    used: set[int] = set()
+
+    def add(place: int) -> str:
+        link = links[place]
+        backward = link.parent not in levels
+        inner, outer = (link.child, link.parent) if backward else (link.parent, link.child)
+        used.add(place)
+        levels[outer] = levels[inner] + 1
+        branches.append(Branch(link, outer, backward))
+        return outer
+
+    def onward(inner: str) -> int | None:
+        """The joint to the heaviest body beyond, forward joints first, joints to bodies without mass last."""
+        found: list[tuple[float, bool, int]] = []
+        for place, link in enumerate(links):
+            if place not in used and inner in (link.parent, link.child):
+                backward = link.child == inner
+                outer = link.parent if backward else link.child
+                if outer not in levels:
+                    found.append((masses.get(outer, 0.0), not backward, -place))
+        heavy = [item for item in found if item[0] > 0.0]
+        best = max(heavy, key=lambda item: (item[1], item[0], item[2])) if heavy else max(found, default=None)
+        return None if best is None else -best[2]
+
+    level = 0
+    while level in levels.values():
+        for place, link in enumerate(links):
+            if place in used or (link.parent in levels) == (link.child in levels):
+                continue
+            if levels.get(link.parent, levels.get(link.child)) != level:
+                continue
+            outer = add(place)
+            while links[place].coordinates and not masses.get(outer, 0.0) > 0.0:
+                following = onward(outer)
+                if following is None:
+                    break
+                place = following
+                outer = add(place)
+                if masses.get(outer, 0.0) > 0.0:
+                    break
+        level += 1
+    return branches, [
+        link for place, link in enumerate(links) if place not in used and link.parent in levels and link.child in levels
+    ]
