@@ -106,7 +106,7 @@ class _Survey:
                     "inertia",
                     path,
                     "an inertia that no body can have (one principal moment exceeds the sum of the others)",
-                    "written as it is; PyBullet takes zero instead",
+                    "written as it is; PyBullet takes zero instead, MuJoCo refuses the file",
                     "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
                 )
 
@@ -131,7 +131,7 @@ class _Survey:
                     "massless-link",
                     path,
                     "a joint with several axes, or one whose axis passes by the origin of the body it moves",
-                    "a chain of one-axis joints with massless links between",
+                    "a chain of one-axis joints with massless links between (1e-9 kg in MuJoCo)",
                     f"links {' '.join(between)}",
                 )
             moving = {index for part in chain for index in part.coordinates}

@@ -11,6 +11,8 @@ What is written so that readers take the same mechanics from it:
   the model has none. OpenSim's coordinate ranges limit no motion, so they are no limits here unless the robot says so.
 - A joint driven by a multiple of the coordinate of another joint says so with ``<mimic>``; any other function cannot
   be said.
+- MuJoCo refuses a body without mass that moves. A ``<mujoco>`` element, which other readers skip, tells it to give
+  such bodies `LEAST_MASS`, and to look for mesh files where the text says they are.
 - PyBullet tells the frames of links in single precision and their inertial frames (mass centre, principal axes) in
   double: who needs more than 1e-7 has to start from the latter and take out the ``<inertial>`` origin.
 - No ``<collision>``: contact in OpenSim is a force between a few named surfaces, not a property of shapes.
@@ -32,6 +34,9 @@ from osimlite.translate.shapes import Ball, Box, MeshFile, Tube, Visual
 UNLIMITED = 1e9
 """Limit of position, velocity or effort (m, m/s, rad/s, N, N·m) where the model has none."""
 
+LEAST_MASS = 1e-9
+"""Mass (kg) and principal moments (kg·m²) of a massless link in MuJoCo; all else reads zero."""
+
 LONGEST_LINE = 1000
 """Characters; Bullet breaks a line of more than 8191 in the middle of whatever is there."""
 
@@ -50,6 +55,9 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
     materials = {color: _material_name(color) for color in sorted({visual.color for visual in with_visuals})}
     out.line('<?xml version="1.0" encoding="utf-8"?>')
     with out.element("robot", {"name": robot.name}):
+        with out.element("mujoco"):
+            least = number(LEAST_MASS)
+            out.empty("compiler", {"boundmass": least, "boundinertia": least, "strippath": "false"})
         for color, name in materials.items():
             with out.element("material", {"name": name}):
                 out.empty("color", {"rgba": numbers(color)})

@@ -101,11 +101,26 @@ def yourdfpy_poses(text: str, values: dict[str, float]) -> dict[str, Array]:
     return {name: reader.get_transform(name, "world") for name in reader.link_map}
 
 
+def mujoco_poses(text: str, values: dict[str, float]) -> tuple[dict[str, Array], float]:
+    """Pose of every link that moves in the root (4, 4), and the sum of their masses, by MuJoCo."""
+    mujoco = pytest.importorskip("mujoco")
+    # MuJoCo makes one body of links that do not move relative to each other, unless told otherwise.
+    model = mujoco.MjModel.from_xml_string(text.replace("<compiler ", '<compiler fusestatic="false" '))
+    data = mujoco.MjData(model)
+    for name, value in values.items():
+        data.qpos[model.joint(name).qposadr[0]] = value
+    mujoco.mj_kinematics(model, data)
+    bodies = [data.body(number) for number in range(1, model.nbody)]
+    poses = {body.name: transform(body.xmat.reshape(3, 3), body.xpos) for body in bodies}
+    return {"world": np.eye(4), **poses}, float(model.body_mass.sum())
+
+
 def worst_body(robot: Robot, poses: dict[str, Array], q: Array) -> float:
     """Largest difference between the bodies' poses of the mechanism and those that follow from links' poses."""
     wanted = robot.mechanism.body_transforms(q)
-    return max(
+    differences = [
         float(np.abs(poses[link.name] @ frame - wanted[body.name]).max())
         for body in robot.mechanism.bodies
         for link, frame in [robot.link_of[body.path]]
-    )
+    ]
+    return max(differences, default=0.0)

@@ -35,7 +35,7 @@ from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
 from osimlite.translate.survey import CONTAINERS
-from tests.translate.readers import in_bullet
+from tests.translate.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 
 
 def kinds(urdf: Urdf) -> dict[str, list[str]]:
@@ -287,12 +287,17 @@ def test_real_models_are_accounted_for_and_load(corpus_model, capfd):
     robot = urdf.robot
     q = np.random.default_rng(3).uniform(-1.0, 1.0, len(robot.mechanism.coordinates))
     q = np.where([info.locked for info in robot.mechanism.coordinates], robot.mechanism.default_state()[0], q)
-    placed, wanted = robot.link_transforms(q), robot.mechanism.body_transforms(q)
+    placed, values = robot.link_transforms(q), robot.joint_values(q)
+    assert worst_body(robot, placed, q) < 1e-12
+    assert worst_body(robot, yourdfpy_poses(urdf.text, values), q) < 1e-9
+    if "inertia" not in kinds(urdf):
+        poses, mass = mujoco_poses(to_urdf(model, visuals=False).text, values)
+        assert worst_body(robot, poses, q) < 1e-9
+        assert mass == pytest.approx(robot.mechanism.total_mass, rel=1e-6, abs=1e-6)
     with in_bullet(urdf.text, urdf.files) as bullet:
-        bullet.set(robot.joint_values(q))
+        bullet.set(values)
         for body in robot.mechanism.bodies:
-            link, frame = robot.link_of[body.path]
-            assert np.abs(placed[link.name] @ frame - wanted[body.name]).max() < 1e-12
+            link, _ = robot.link_of[body.path]
             seen = bullet.inertial_frame(link.name)[:3, 3]
             assert np.abs(seen - (placed[link.name] @ [*link.center, 1.0])[:3]).max() < 1e-9
     # Bullet complains of nothing but the inertias that the account names.

@@ -23,7 +23,7 @@ from osimlite.translate.shapes import MeshFile, Visual
 from osimlite.translate.urdf import UNLIMITED, number, urdf_text
 from tests.multibody.cases import mixed_tree
 from tests.multibody.strategies import Case, cases
-from tests.translate.readers import in_bullet, inertial_frame, worst_body, yourdfpy_poses
+from tests.translate.readers import in_bullet, inertial_frame, mujoco_poses, worst_body, yourdfpy_poses
 from tests.translate.test_robot import one_body
 
 
@@ -58,6 +58,14 @@ def test_yourdfpy_puts_the_bodies_where_the_mechanism_does(robot):
         q = state(robot, seed)
         poses = yourdfpy_poses(urdf_text(robot), robot.joint_values(q))
         assert worst_body(robot, poses, q) < 1e-12
+
+
+@pytest.mark.parametrize("robot", robots(), ids=lambda robot: f"{robot.name}-{len(robot.links)}")
+def test_mujoco_puts_the_bodies_where_the_mechanism_does(robot):
+    q = state(robot)
+    poses, mass = mujoco_poses(urdf_text(robot), robot.joint_values(q))
+    assert worst_body(robot, poses, q) < 1e-12
+    assert mass == pytest.approx(robot.mechanism.total_mass, rel=1e-7)
 
 
 @settings(max_examples=15)
