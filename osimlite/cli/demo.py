@@ -148,7 +148,7 @@ def _pictures(tour: _Tour, model: Model, trajectory: Trajectory) -> None:
         say(f"{len(files)} pictures", ", ".join(file.name for file in files))
     with tour.step("Animate the walker") as say, tour.progress("drawing", 1.0) as progress:
         target = tour.folder / "animation.gif"
-        animate(model, trajectory, target, progress=progress)
+        animate(model, trajectory, target, progress=lambda done, total: progress(done / total))
         say(f"{target.stat().st_size / 1e6:.1f} MB", target.name)
 
 

@@ -1,8 +1,8 @@
 """The exercise "Building a Dynamic Walker": a passive walker with knees on a slope.
 
 Six rigid bodies: the platform, and on it a pelvis that carries two legs of thigh and shank, hinged in the sagittal
-plane. Nothing drives it but gravity; it stands on its feet, knees and hips through Hunt-Crossley contact, and coordinate
-limit forces stop hips and knees.
+plane. Nothing drives it but gravity; it stands on its feet, knees and hips through Hunt-Crossley contact, and
+coordinate limit forces stop hips and knees.
 """
 
 from __future__ import annotations

@@ -58,7 +58,8 @@ def test_numbers_agree_with_lxml(fixtures: Path) -> None:
     root = etree.fromstring(source.text.replace("::", "__").encode())
     elements = list(root.iter(etree.Element))
     assert [span.tag.replace("::", "__") for span in source.spans] == [element.tag for element in elements]
-    assert [source.of_tag(n).line for n in range(len(elements))] == [element.sourceline for element in elements]
+    lines: list[object] = [source.of_tag(n).line for n in range(len(elements))]
+    assert lines == [element.sourceline for element in elements]
     for span in source.spans:
         assert source.text[span.start] == "<"
         assert source.text[span.tag_end - 1] == ">"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
+from osimlite.document.printer import Numbers
 from osimlite.models.dynamic_walker import dynamic_walker
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -27,7 +28,7 @@ def printed_whole(source: Path, target: Path) -> bytes:
 
 
 @pytest.mark.parametrize("numbers", ["shortest", "opensim"])
-def test_opensim_reads_the_same_model_from_our_file(fixtures: Path, tmp_path: Path, numbers: str) -> None:
+def test_opensim_reads_the_same_model_from_our_file(fixtures: Path, tmp_path: Path, numbers: Numbers) -> None:
     osimlite.write(dynamic_walker(), tmp_path / "ours.osim", numbers=numbers)
     ours = printed_whole(tmp_path / "ours.osim", tmp_path / "ours-printed.osim")
     reference = fixtures / "walker" / "DynamicWalkerModel.osim"
