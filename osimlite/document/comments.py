@@ -13,7 +13,7 @@ from pathlib import Path
 
 DIGEST_SIZE = 6
 
-_COMMENT = re.compile(rb"<!--([^-]*(?:-[^-]+)*)-->")
+_COMMENT = re.compile(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
 
 
 @lru_cache(maxsize=4096)

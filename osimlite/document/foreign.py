@@ -12,6 +12,7 @@ from lxml import etree
 from osimlite.document.escape import escape, quoted
 from osimlite.errors import ModelError
 
+_COLONS = re.compile(rb"::")
 _TAG_SO_FAR = re.compile(rb"</?[A-Za-z_][A-Za-z0-9_.-]*")
 STAND_IN = "\u00b7"
 """Takes the place of ``::`` in a tag: two bytes in UTF-8 as well, and legal in a name where ``::`` is not."""
@@ -20,12 +21,12 @@ _STAND_IN_BYTES = STAND_IN.encode()
 
 def without_colons(data: bytes) -> bytes:
     """UTF-8 text with the stand-in for ``::`` in tags; every position stays what it was."""
-    pieces, done, place = [], 0, data.find(b"::")
-    while place >= 0:
+    pieces, done = [], 0
+    for match in _COLONS.finditer(data):
+        place = match.start()
         if _TAG_SO_FAR.fullmatch(data, data.rfind(b"<", max(0, place - 200), place), place):
             pieces += [data[done:place], _STAND_IN_BYTES]
             done = place + 2
-        place = data.find(b"::", place + 2)
     return b"".join([*pieces, data[done:]]) if pieces else data
 
 

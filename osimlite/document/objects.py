@@ -117,7 +117,8 @@ class ObjectReader:
             found = self._block(block)
             self.count = start
         top = self.object(element, cls, skip=block)
-        self.home.model = top if isinstance(top, Model) else None
+        if isinstance(top, Model):
+            self.home.model = top
         if found:
             layout_of(top).defaults = found
         return top

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -99,12 +100,24 @@ _SLOTS = ("_model", "_index", "_layout")
 
 
 class Home:
-    """Stands for the model that the objects of one text belong to, until the model itself is made."""
+    """Stands for the model that the objects of one text belong to; it keeps the model as little as they do.
 
-    __slots__ = ("model",)
+    Were it a cycle of references, every model read would wait for the garbage collector.
+    """
+
+    __slots__ = ("_model",)
 
     def __init__(self) -> None:
-        self.model: Model | None = None
+        self._model: weakref.ref[Model] | None = None
+
+    @property
+    def model(self) -> Model | None:
+        """The model, once it is made and as long as it is there."""
+        return None if self._model is None else self._model()
+
+    @model.setter
+    def model(self, model: Model) -> None:
+        self._model = weakref.ref(model)
 
 
 def none() -> Any:

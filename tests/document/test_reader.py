@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from pathlib import Path
 
 import pytest
@@ -200,3 +202,16 @@ def test_an_optional_number_may_be_empty_and_an_optional_text_is_then_empty() ->
     assert actuator.coordinate == ""  # type: ignore[attr-defined]
     assert document.notes == []
     assert "<moment_visual_scale></moment_visual_scale>" in osimlite.to_text(document.model)
+
+
+def test_a_model_that_nobody_needs_is_gone_without_the_garbage_collector(fixtures: Path) -> None:
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    body = model.body_set.objects[0]
+    watched = weakref.ref(model)
+    gc.disable()
+    try:
+        del model
+        assert watched() is None
+    finally:
+        gc.enable()
+    assert body.model is None
