@@ -35,6 +35,19 @@ class Skeleton:
         """Whether every joint's frames lead to a body."""
         return all(link.parent_base is not None and link.child_base is not None for link in self.links)
 
+    def depths(self) -> dict[int, int]:
+        """How many joints lie between ground and each body (by identity); bodies that none reach are left out."""
+        depth = {id(self.ground): 0}
+        pending: list[Component] = [self.ground]
+        while pending:
+            base = pending.pop(0)
+            for link in self.of(base):
+                for end in (link.parent_base, link.child_base):
+                    if end is not None and id(end) not in depth:
+                        depth[id(end)] = depth[id(base)] + 1
+                        pending.append(end)
+        return depth
+
     def of(self, base: Component) -> list[Link]:
         """The joints at a body."""
         return [link for link in self.links if base is link.parent_base or base is link.child_base]

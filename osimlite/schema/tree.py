@@ -312,9 +312,10 @@ def _name_in_tree(spec: FieldSpec, item: Component) -> str:
 
 def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     if target == "Frame":
-        # While connecting, a frame puts itself into the socket of every geometry it owns, whatever the file says.
+        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever the file says;
+        # not of one that it merely holds among its components.
         parent = tree.parent_of(owner)
-        if parent is not None and is_a(parent, "Frame"):
+        if parent is not None and is_a(parent, "Frame") and not any(item is owner for item in parent.subcomponents):
             return Resolution(parent)
     if not text:
         return Resolution(None, "empty")

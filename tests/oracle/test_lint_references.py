@@ -17,7 +17,7 @@ WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicW
 REFERENCE = re.compile(
     r"<(socket_parent_frame|socket_child_frame|socket_parent|socket_frame|coordinate|geometry)>([^<]+)</"
 )
-CODES = ("OSIM301", "OSIM302", "OSIM303", "OSIM304", "OSIM305", "OSIM402")
+CODES = ("OSIM301", "OSIM302", "OSIM303", "OSIM304", "OSIM305", "OSIM402", "OSIM409")
 
 
 def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:

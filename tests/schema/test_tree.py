@@ -171,3 +171,13 @@ def test_find_names_the_nearest_path(walker: Model) -> None:
 @pytest.mark.parametrize(("path", "expected"), [("/a/../b", "/b"), ("/a/./b//c/", "/a/b/c"), ("/..", None), ("/", "/")])
 def test_paths_are_normalised(path: str, expected: str | None) -> None:
     assert normalised(path) == expected
+
+
+def test_a_frame_takes_over_only_the_geometry_it_draws():
+    from osimlite import Brick, Ground, Model
+
+    drawn, held = Brick(name="drawn", socket_frame="/nowhere"), Brick(name="held", socket_frame="/nowhere")
+    model = Model(name="m", ground=Ground(name="ground", attached_geometry=[drawn], subcomponents=[held]))
+    tree = model.tree()
+    failures = {use.owner.name: tree.resolve(use).failure for use in tree.uses() if use.value == "/nowhere"}
+    assert failures == {"drawn": None, "held": "missing"}

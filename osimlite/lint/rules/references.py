@@ -11,6 +11,7 @@ from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Object, Unknown, reference_specs
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.fields import Reference
+from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.tree import Resolution, Use, is_a, normalised
 from osimlite.text import listed, nearest
@@ -315,7 +316,9 @@ def _overwritten(subject: Subject, use: Use) -> bool:
 
 def _drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
     parent = subject.tree.parent_of(geometry)
-    return parent is not None and is_a(parent, "Frame")
+    if not isinstance(parent, Frame):
+        return False
+    return parent.frame_geometry is geometry or any(item is geometry for item in parent.attached_geometry)
 
 
 def _undecided(subject: Subject, use: Use, text: str) -> bool:
@@ -366,11 +369,13 @@ def _report(subject: Subject, found: Found, broken: Broken, message: str) -> Non
     nth = sum(1 for word in before if word == broken.text)
     # OpenSim drops what a group names wrongly and goes on.
     severity = WARNING if use.reference.rule == "set-member" else None
+    by_name = use.spec.name == "name"
     found(
         message,
         use.holder,
-        tag=use.spec.tag,
-        word=broken.text,
+        tag=None if by_name else use.spec.tag,
+        attribute="name" if by_name else None,
+        word=None if by_name else broken.text,
         nth=nth,
         suggestion=broken.suggestion,
         severity=severity,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.skeleton import Skeleton, has_unknown_joints, skeleton
+from osimlite.lint.skeleton import Skeleton, base_of, has_unknown_joints, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
 from osimlite.schema.base import Component, Object
@@ -366,6 +366,66 @@ def ground_as_child(subject: Subject, found: Found) -> None:
                 f"the child of {called(link.joint)} is ground; OpenSim turns the joint round",
                 link.joint,
                 tag="socket_child_frame",
+            )
+
+
+@rule("OSIM409", "stray-joint-frame", severity=WARNING)
+def stray_joint_frame(subject: Subject, found: Found) -> None:
+    """A joint holds a frame that has nothing to do with it.
+
+    ## What it does
+    Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects. It is an error if
+    that body is further from ground than the joint's child.
+
+    ## Why is this bad
+    OpenSim builds joints from ground outwards, and the frames of a joint with it: a frame on a body that is not there
+    yet ends in a message about an invalid index. Usually a socket names the wrong frame.
+
+    ## Example
+    ```xml
+    <PinJoint name="hip">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/bodyset/thigh</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+        <frames>
+            <PhysicalOffsetFrame name="shank_offset">
+                <socket_parent>/bodyset/shank</socket_parent>
+            </PhysicalOffsetFrame>
+        </frames>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="hip">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>thigh_offset</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+        <frames>
+            <PhysicalOffsetFrame name="thigh_offset">
+                <socket_parent>/bodyset/thigh</socket_parent>
+            </PhysicalOffsetFrame>
+        </frames>
+    </PinJoint>
+    ```
+    """
+    bones = skeleton(subject)
+    if not bones.complete:
+        return
+    depth = bones.depths()
+    for link in bones.links:
+        for frame in link.joint.frames:
+            base = base_of(subject, frame)
+            if base is None or base is link.parent_base or base is link.child_base:
+                continue
+            deepest = max(depth.get(id(end), 0) for end in (link.parent_base, link.child_base))
+            late = depth.get(id(base), 0) > deepest
+            found(
+                f"{called(frame)} of {called(link.joint)} is fixed to {called(base)}, which the joint does not connect"
+                + ("; OpenSim refuses the model" if late else ""),
+                frame,
+                tag="socket_parent",
+                severity=ERROR if late else None,
             )
 
 
