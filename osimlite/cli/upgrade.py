@@ -63,7 +63,8 @@ def _report(console: Console, document: Document) -> None:
     from rich.table import Table
 
     steps: dict[str, list[Change]] = {}
-    for change in document.changes:
+    done = document.changes
+    for change in done:
         steps.setdefault(change.what, []).append(change)
     if steps:
         table = Table("What changed", box=None, pad_edge=False, header_style="bold")
@@ -75,10 +76,12 @@ def _report(console: Console, document: Document) -> None:
         console.print(table)
     for note in document.notes:
         if note.line is not None:
-            meant = "as nothing" if not note.value else "as it stands" if note.value == note.word else f"as '{note.value}'"
+            meant = (
+                "as nothing" if not note.value else "as it stands" if note.value == note.word else f"as '{note.value}'"
+            )
             console.print(f"line {note.line}: '{note.word}' is no XML and was read {meant}", markup=False)
     lost: dict[str, list[Change]] = {}
-    for change in document.changes:
+    for change in done:
         if change.lost is not None:
             lost.setdefault(change.lost, []).append(change)
     for what, changes in lost.items():

@@ -30,21 +30,27 @@ OLDEST = 10500
 OLDEST_KNOWN = 10901
 """The oldest version whose every word is known; of an older document nothing may be left over."""
 
+_NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
+
 
 @dataclass(slots=True)
 class Document:
     """A model together with the text it came from and what the reader noticed in it.
 
-    `changes` is what was done to a document of an older version; `fault` is what the XML parser says against a text
-    that could be read all the same.
+    `fault` is what the XML parser says against a text that could be read all the same.
     """
 
     model: Model
     source: Source
     version: int
     notes: list[Note] = field(default_factory=list)
-    changes: list[Change] = field(default_factory=list)
+    upgraded: Upgraded | None = None
     fault: NotWellFormedError | None = None
+
+    @property
+    def changes(self) -> list[Change]:
+        """What was done to a document of an older version, in its order."""
+        return [] if self.upgraded is None else self.upgraded.changes
 
 
 def read(path: str | Path) -> Model:
@@ -88,15 +94,26 @@ def document_of(source: Source, root: etree._Element, version: int) -> Document:
     """
     with _collector_paused():
         upgraded = _upgraded(source, root, version) if version < CURRENT_VERSION else None
-        reader = ObjectReader(_included_by(source) if b"file=" in source.data else None)
-        model = _model_in(source, root if upgraded is None else upgraded.root, reader)
-        if version != CURRENT_VERSION:
-            layout_of(model).version = version
-        if upgraded is not None:
-            notes = _renumber(source, model, reader.notes, upgraded)
-            _refuse_leftovers(source, version, notes)
-            return Document(model, source, version, notes, upgraded.changes)
-    return Document(model, source, version, reader.notes)
+        document = _document(source, root, version, upgraded)
+        if upgraded is None and any(note.kind in _NOT_KNOWN for note in document.notes):
+            from osimlite.document.upgrade import with_present_names
+
+            upgraded = with_present_names(root)
+            if upgraded is not None:
+                document = _document(source, root, version, upgraded)
+    return document
+
+
+def _document(source: Source, root: etree._Element, version: int, upgraded: Upgraded | None) -> Document:
+    reader = ObjectReader(_included_by(source) if b"file=" in source.data else None)
+    model = _model_in(source, root if upgraded is None else upgraded.root, reader)
+    if version != CURRENT_VERSION:
+        layout_of(model).version = version
+    notes = reader.notes
+    if upgraded is not None:
+        notes = _renumber(source, model, notes, upgraded)
+        _refuse_leftovers(source, version, notes)
+    return Document(model, source, version, notes, upgraded)
 
 
 def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
@@ -114,8 +131,10 @@ def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
 
 def _renumber(source: Source, model: Model, notes: list[Note], upgraded: Upgraded) -> list[Note]:
     """Give everything read from an upgraded tree the place it has in the old text."""
-    numbers = upgraded.numbers
     source.moved = upgraded.moved
+    numbers = upgraded.numbers
+    if numbers is None:
+        return notes
     for top in (model, *layout_of(model).defaults):
         for item in top.walk():
             if item._index is not None:
@@ -125,7 +144,7 @@ def _renumber(source: Source, model: Model, notes: list[Note], upgraded: Upgrade
 
 def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
     """Refuse a document from before every word is known, if there is a word in it that no rule knows."""
-    left = [note for note in notes if note.kind in ("unknown-tag", "unknown-class", "wrong-class")]
+    left = [note for note in notes if note.kind in _NOT_KNOWN]
     if version >= OLDEST_KNOWN or not left:
         return
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in left})[:8])

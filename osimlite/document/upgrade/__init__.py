@@ -7,8 +7,6 @@ rounding of numbers to six digits and without the references it breaks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lxml import etree
 
 from osimlite.document.upgrade import (
@@ -38,27 +36,42 @@ from osimlite.document.upgrade import (
     v40000_axis_functions,  # noqa: F401
     v40000_meaningless,  # noqa: F401
     v40500_path_names,  # noqa: F401
-    v40600_class_names,  # noqa: F401
     v40600_controllers,  # noqa: F401
 )
 from osimlite.document.upgrade.draft import STEPS, Change, Draft, Element, Refused
+from osimlite.document.upgrade.v40600_class_names import class_names
+from osimlite.schema.model import CURRENT_VERSION
 
-__all__ = ["STEPS", "Change", "Refused", "Upgraded", "upgrade"]
+__all__ = ["STEPS", "Change", "Refused", "Upgraded", "upgrade", "with_present_names"]
 
 
-@dataclass(slots=True)
 class Upgraded:
-    """What an upgrade made of a document.
+    """What an upgrade made of a document: the `root` of its tree, and what there is to know about it."""
 
-    `numbers` gives, for every element of the new tree in document order, the number of the element of the old document
-    it came from. `moved` finds the old element for a property by the number of its owner and its present tag, where
-    the old document has none of that tag.
-    """
+    def __init__(self, draft: Draft) -> None:
+        self.root = draft.root
+        self._draft = draft
 
-    root: Element
-    changes: list[Change]
-    numbers: list[int]
-    moved: dict[tuple[int, str], int]
+    @property
+    def changes(self) -> list[Change]:
+        """What the steps did, in the order of the document."""
+        return self._draft.changes
+
+    @property
+    def numbers(self) -> list[int] | None:
+        """For every element of the tree the number of the one it came from; None if all are where they were."""
+        draft = self._draft
+        return [draft.numbers[element] for element in draft.root.iter(etree.Element)] if draft.moves else None
+
+    @property
+    def moved(self) -> dict[tuple[int, str], int]:
+        """The element of the old document for a property, by the number of its owner and its present tag."""
+        found: dict[tuple[int, str], int] = {}
+        for element in self._draft.touched:
+            parent = element.getparent()
+            if parent is not None:
+                found.setdefault((self._draft.numbers[parent], element.tag), self._draft.numbers[element])
+        return found
 
 
 def upgrade(root: Element, version: int) -> Upgraded:
@@ -74,11 +87,15 @@ def upgrade(root: Element, version: int) -> Upgraded:
         if version < step.below:
             draft.step = step
             step.apply(draft)
-    numbers = [draft.numbers[element] for element in draft.root.iter(etree.Element)]
-    moved: dict[tuple[int, str], int] = {}
-    for element in draft.touched:
-        parent = element.getparent()
-        if parent is not None:
-            moved.setdefault((draft.numbers[parent], element.tag), draft.numbers[element])
-    draft.changes.sort(key=lambda change: change.number)
-    return Upgraded(draft.root, draft.changes, numbers, moved)
+    return Upgraded(draft)
+
+
+def with_present_names(root: Element) -> Upgraded | None:
+    """Give the classes of a current document their present names, where it uses old ones; None if it does not.
+
+    OpenSim takes the old names in documents of every version.
+    """
+    draft = Draft(root, CURRENT_VERSION)
+    draft.step = next(step for step in STEPS if step.apply is class_names)
+    class_names(draft)
+    return Upgraded(draft) if draft.touched else None

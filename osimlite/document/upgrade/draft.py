@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 from lxml import etree
@@ -99,20 +99,43 @@ def families(tag: str) -> frozenset[str]:
 
 
 class Draft:
-    """The element tree of an old document, changed step by step.
-
-    `numbers` gives for every element its number in the document as it was; an element that a step makes has the number
-    of the element it was made from. `version` is that of the document as it was.
-    """
+    """The element tree of an old document, changed step by step. `version` is that of the document as it was."""
 
     def __init__(self, root: Element, version: int) -> None:
         self.root = root
         self.version = version
-        self.numbers: dict[Element, int] = {element: number for number, element in enumerate(root.iter(etree.Element))}
-        self.changes: list[Change] = []
         self.touched: dict[Element, None] = {}
         self.step: Step | None = None
-        self._tags = {element.tag for element in self.numbers}
+        self._changes: list[tuple[Step, Element, Element, str | None]] = []
+        if self.moves:
+            # Now or never: the steps to come move elements about.
+            assert self.numbers
+
+    @property
+    def moves(self) -> bool:
+        """Whether steps move elements; those of version 4 leave every element in its place."""
+        return self.version < 40000
+
+    @cached_property
+    def numbers(self) -> dict[Element, int]:
+        """The number of every element in the document as it was.
+
+        An element that a step makes has the number of the element it was made from.
+        """
+        return {element: number for number, element in enumerate(self.root.iter(etree.Element))}
+
+    @cached_property
+    def _tags(self) -> set[str]:
+        return {element.tag for element in self.numbers}
+
+    @property
+    def changes(self) -> list[Change]:
+        """What the steps have done, in the order of the document."""
+        found = [
+            Change(step.name, step.below, step.what, describe(owner), self.numbers[place], lost)
+            for step, owner, place, lost in self._changes
+        ]
+        return sorted(found, key=lambda change: change.number)
 
     def wrap(self, tag: str) -> None:
         """Put a new root around the tree."""
@@ -145,8 +168,7 @@ class Draft:
 
     def tagged(self, *tags: str) -> list[Element]:
         """Every element with one of these tags, in document order."""
-        present = [tag for tag in tags if tag in self._tags]
-        return list(self.root.iter(*present)) if present else []
+        return list(self.root.iter(*tags))
 
     def add(
         self, parent: Element, tag: str, text: str | None = None, *, source: Element, name: str | None = None
@@ -192,11 +214,18 @@ class Draft:
         found = parent.find(tag)
         return self.add(parent, tag, source=source) if found is None else found
 
-    def changed(self, element: Element, *, number: int | None = None, lost: str | None = None) -> None:
-        """Record that the current step changed something at an element, and what was lost."""
+    def is_a(self, element: Element, family: str) -> bool:
+        """Whether an element is of a class or one derived from it; of an unknown class, by the set it stands in."""
+        if families(element.tag):
+            return family in families(element.tag)
+        objects = element.getparent()
+        owner = None if objects is None or objects.tag != "objects" else objects.getparent()
+        return owner is not None and _FAMILY_OF_MEMBERS.get(owner.tag) == family
+
+    def changed(self, element: Element, *, at: Element | None = None, lost: str | None = None) -> None:
+        """Record that the current step changed an element, at which place inside, and what was lost."""
         assert self.step is not None
-        number = self.numbers[element] if number is None else number
-        self.changes.append(Change(self.step.name, self.step.below, self.step.what, describe(element), number, lost))
+        self._changes.append((self.step, element, element if at is None else at, lost))
 
 
 def describe(element: Element) -> str:

@@ -25,5 +25,5 @@ def engine(draft: Draft) -> None:
                 )
             for part in elements(inner):
                 draft.move(part, model)
-        draft.changed(model, number=draft.numbers[holder])
+        draft.changed(model, at=holder)
         draft.remove(holder)

@@ -24,7 +24,7 @@ def scale_factors(draft: Draft) -> None:
             if axis.get("name", "").startswith("translation") and direction is not None:
                 scale = sum(abs(part) * factor for part, factor in zip(direction, scales, strict=True))
                 _multiply(draft, axis.find("function"), scale, factors)
-        draft.changed(joint, number=draft.numbers[factors])
+        draft.changed(joint, at=factors)
         draft.remove(factors)
     for point in draft.tagged("MovingPathPoint"):
         factors = point.find("scale_factors")
@@ -33,7 +33,7 @@ def scale_factors(draft: Draft) -> None:
             continue
         for tag, scale in zip(_POINT, scales, strict=True):
             _multiply(draft, point.find(tag), scale, factors)
-        draft.changed(point, number=draft.numbers[factors])
+        draft.changed(point, at=factors)
         draft.remove(factors)
 
 

@@ -34,7 +34,7 @@ def transform_axes(draft: Draft) -> None:
                     padding = draft.add(spatial, "TransformAxis", source=old, name=name)
                     draft.add(padding, "axis", direction, source=old)
         draft.remove(old)
-        draft.changed(joint, number=draft.numbers[old])
+        draft.changed(joint, at=old)
 
 
 def _carry(draft: Draft, axis: Element, spatial: Element, name: str) -> None:

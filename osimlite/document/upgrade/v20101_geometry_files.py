@@ -22,7 +22,5 @@ def geometry_files(draft: Draft) -> None:
             draft.add(mesh, "scale_factors", scale, source=source)
             draft.add(mesh, "mesh_file", file, source=source)
         placed = any(reals(text_of(visible, "transform"), 6) or ())
-        draft.changed(
-            body, number=draft.numbers[visible], lost="where the shown geometry stood in the body" if placed else None
-        )
+        draft.changed(body, at=visible, lost="where the shown geometry stood in the body" if placed else None)
         draft.remove(visible)

@@ -12,13 +12,15 @@ _JOINT = {"location": "location_in_child", "orientation": "orientation_in_child"
 def body_inertia(draft: Draft) -> None:
     """Six numbers of inertia become one <inertia>."""
     for body in draft.tagged("Body"):
+        if body.get("name") == "ground":
+            continue
         parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
         given = [part for part in parts.values() if part is not None]
         words = [default if (part := parts[axes]) is None else plain(part) for axes, default in _INERTIA.items()]
         draft.add(body, "inertia", " ".join(words), source=given[0] if given else body)
         for part in given:
             draft.remove(part)
-        draft.changed(body)
+        draft.changed(body, at=given[0] if given else body)
 
 
 @step(below=30500)

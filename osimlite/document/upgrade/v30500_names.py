@@ -47,7 +47,7 @@ def _follow(draft: Draft, renamed: dict[str, str]) -> None:
                 new = renamed.get(text) or (_in_list(text, renamed) if element.tag in _LISTS else text)
                 if new != text:
                     element.text = new
-                    draft.changed(_owner(element), number=draft.numbers[element])
+                    draft.changed(_owner(element), at=element)
         name = element.get("name")
         if name is not None and " ".join(name.split()) in renamed and families(element.tag):
             # Not a component: an object whose own name says which component it is about.

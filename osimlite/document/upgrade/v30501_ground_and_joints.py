@@ -44,7 +44,7 @@ def joints(draft: Draft) -> None:
         if found:
             _settle(draft, found[0], body, objects)
         for extra in found[1:]:
-            draft.changed(body, number=draft.numbers[extra], lost=f"a second joint of the body, <{extra.tag}>")
+            draft.changed(body, at=extra, lost=f"a second joint of the body, <{extra.tag}>")
         draft.remove(wrapper)
 
 

@@ -19,7 +19,7 @@ def display_geometry(draft: Draft) -> None:
             pieces = [piece for piece in members(shown) if piece.tag == "DisplayGeometry"]
             for count, piece in enumerate(pieces, 1):
                 _mesh(draft, body, visible, attached, piece, count)
-            draft.changed(body, number=draft.numbers[visible])
+            draft.changed(body, at=visible)
         draft.remove(visible)
 
 
@@ -57,7 +57,7 @@ def _mesh(draft: Draft, body: Element, visible: Element, attached: Element, piec
             if preference == "0":
                 draft.add(appearance, "visible", "false", source=child)
             elif preference != "4":
-                draft.changed(body, number=draft.numbers[child], lost=f"display_preference {preference}")
+                draft.changed(body, at=child, lost=f"display_preference {preference}")
 
 
 def _product(scale: Element | None, outer: Element | None) -> str:

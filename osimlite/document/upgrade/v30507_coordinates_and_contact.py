@@ -19,7 +19,7 @@ def joint_coordinates(draft: Draft) -> None:
                 draft.move(coordinate, listed)
         groups = old.find("groups")
         lost = "groups of coordinates" if groups is not None and len(groups) else None
-        draft.changed(joint, number=draft.numbers[old], lost=lost)
+        draft.changed(joint, at=old, lost=lost)
         draft.remove(old)
 
 

@@ -16,5 +16,5 @@ def frame_set(draft: Draft) -> None:
     listed = draft.list_in(model, "components", source=old)
     for frame in frames:
         draft.move(frame, listed)
-    draft.changed(model, number=draft.numbers[old])
+    draft.changed(model, at=old)
     draft.remove(old)

@@ -23,7 +23,7 @@ def connectors(draft: Draft) -> None:
             connectee = connector.find("connectee_name")
             text = "" if connectee is None else plain(connectee)
             draft.add(component, f"socket_{connector.get('name', '')}", text, source=connector)
-        draft.changed(component, number=draft.numbers[old])
+        draft.changed(component, at=old)
         draft.remove(old)
 
 
@@ -34,7 +34,7 @@ def connectors_renamed(draft: Draft) -> None:
         for child in elements(component):
             if "connector" in child.tag:
                 draft.rename(child, child.tag.replace("connector", "socket", 1))
-                draft.changed(component, number=draft.numbers[child])
+                draft.changed(component, at=child)
 
 
 @step(below=30517, order=30499)
@@ -45,7 +45,7 @@ def connectee_names(draft: Draft) -> None:
             match = _SUFFIX.fullmatch(child.tag)
             if match is not None:
                 draft.rename(child, match[1])
-                draft.changed(component, number=draft.numbers[child])
+                draft.changed(component, at=child)
 
 
 @step(below=30517)
@@ -67,7 +67,7 @@ def set_levels(draft: Draft) -> None:
             last = text.rpartition("/")[2]
             if last in paths and not text.startswith("/") and not _leads_somewhere(component, text, paths):
                 child.text = paths[last]
-                draft.changed(component, number=draft.numbers[child])
+                draft.changed(component, at=child)
 
 
 def _leads_somewhere(component: Element, text: str, paths: dict[str, str]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from osimlite.document.upgrade.draft import Draft, Element, elements, families, plain, reals, step
 
 MEANINGLESS: dict[str, dict[str, str]] = {
+    "Body": {"Joint": ""},
     "Coordinate": {
         "initial_value": "",
         "keys": "",
@@ -38,7 +39,7 @@ def meaningless(draft: Draft) -> None:
     for visible in draft.tagged("VisibleObject"):
         parent = visible.getparent()
         if parent is not None and families(parent.tag):
-            draft.changed(parent, number=draft.numbers[visible])
+            draft.changed(parent, at=visible)
             draft.remove(visible)
     for family, usual in MEANINGLESS.items():
         for owner in draft.every(family):
@@ -46,7 +47,7 @@ def meaningless(draft: Draft) -> None:
                 if child.tag in usual:
                     lost = _loss(child, usual[child.tag])
                     if lost is None or draft.version >= 10901:
-                        draft.changed(owner, number=draft.numbers[child], lost=lost)
+                        draft.changed(owner, at=child, lost=lost)
                         draft.remove(child)
 
 

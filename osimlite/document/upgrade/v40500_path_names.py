@@ -8,8 +8,8 @@ from osimlite.document.upgrade.draft import Draft, step
 @step(below=40500)
 def path_names(draft: Draft) -> None:
     """The <GeometryPath> of a force is called path."""
-    for force in draft.every("Force"):
-        path = force.find("GeometryPath")
-        if path is not None:
+    for path in draft.tagged("GeometryPath"):
+        force = path.getparent()
+        if force is not None and force.find("GeometryPath") is path and draft.is_a(force, "Force"):
             path.set("name", "path")
             draft.changed(path)

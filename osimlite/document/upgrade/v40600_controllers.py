@@ -11,6 +11,8 @@ def controller_actuators(draft: Draft) -> None:
 
     A name that no actuator has stays, as a path to nothing, where OpenSim drops it without a word.
     """
+    if next(draft.root.iter("actuator_list"), None) is None:
+        return
     listed = [c for c in draft.every("Controller") if c.find("actuator_list") is not None]
     if not listed:
         return

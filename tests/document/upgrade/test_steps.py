@@ -245,6 +245,39 @@ def test_a_document_too_old_is_refused_with_what_would_be_lost(version: int, ins
         assert words in caught.value.message
 
 
+def test_the_defaults_of_a_document_are_upgraded_too() -> None:
+    old = document(
+        """<defaults> <Thelen2003Muscle name="default"> <isDisabled>true</isDisabled>
+        <pennation_angle>0.3</pennation_angle> <GeometryPath> <VisibleObject /> </GeometryPath>
+        <Vmax>10</Vmax> </Thelen2003Muscle>
+        <Body name="default"> <mass>3</mass> <Joint /> </Body> </defaults>
+        <ForceSet> <objects> <Thelen2003Muscle name="m" /> </objects> </ForceSet>""",
+        20301,
+    )
+    muscle = old.model["/forceset/m"]
+    assert (muscle.appliesForce, muscle.pennation_angle_at_optimal) == (False, 0.3)
+    assert old.notes == []
+
+
+@pytest.mark.parametrize("version", [30000, 40000, CURRENT_VERSION])
+def test_old_names_of_classes_are_read_in_every_version(version: int) -> None:
+    old = document(
+        """<ForceSet> <objects> <GeneralizedForce name="motor"> <coordinate>q</coordinate> </GeneralizedForce>
+        <Torque name="turn" />\n<Nonsense /> </objects> </ForceSet>""",
+        version,
+    )
+    assert [type(force).__name__ for force in old.model.force_set.objects] == [
+        "CoordinateActuator",
+        "TorqueActuator",
+        "Unknown",
+    ]
+    [note] = old.notes
+    assert (note.word, old.source.of_tag(note.number).line) == ("Nonsense", 4)
+    assert {change.what for change in old.changes if change.step == "class_names"} == {
+        "Classes get their present names"
+    }
+
+
 def test_an_included_file_is_upgraded_by_its_own_version(tmp_path: Path) -> None:
     (tmp_path / "markers.osim").write_text(
         '<OpenSimDocument Version="30000"><MarkerSet> <objects> <Marker name="m"> <body>ground</body> </Marker> '
