@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -364,8 +364,12 @@ class Unknown(ModelComponent, abstract=True):
     content: str = ""
 
 
+# Pydantic evaluates the annotations of all bases for every class; evaluated here once, they cost it nothing.
+for _base in (Object, Component):
+    _hints = get_type_hints(_base, include_extras=True)
+    _base.__annotations__.update({name: _hints[name] for name in _base.__annotations__})
+
 _set = object.__setattr__
-_ABSENT = object()
 
 
 @cache
