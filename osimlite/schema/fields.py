@@ -146,6 +146,9 @@ class Held(Kind):
             return ObjectList(_instance(item, accepts) for item in value)
         if value is None and self.form == "optional":
             return None
+        if self.form == "unnamed" and isinstance(value, accepts) and type(value) is not accepts:
+            # Its tag is what tells the property.
+            raise ValueError(f"expected a {accepts.__name__} and no class derived from it, got {type(value).__name__}")
         return _instance(value, accepts)
 
 

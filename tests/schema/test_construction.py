@@ -124,3 +124,9 @@ def test_where_a_component_stands_and_the_path_of_a_muscle_are_two_things() -> N
     muscle.path = line
     assert muscle.path == "biceps"
     assert muscle.geometry_path is line
+
+
+def test_a_property_without_a_name_takes_exactly_its_class() -> None:
+    point = CLASSES["ConditionalPathPoint"](name="p")
+    with pytest.raises(ModelError, match="expected a PathPoint and no class derived from it"):
+        CLASSES["Scholz2015GeometryPathPoint"](path_point=point)
