@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from math import inf, isfinite, sqrt
 
 from osimlite.errors import SimulationError
@@ -82,8 +83,12 @@ class Stepper(ABC):
         """
 
     @abstractmethod
+    def interpolant(self) -> Callable[[float], list[float]]:
+        """The function that gives the state at any time within the last step, s; it stays good for that step."""
+
     def interpolate(self, t: float) -> list[float]:
         """State at a time within the last step, s."""
+        return self.interpolant()(t)
 
     def steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
         """Yield (time, state) after each step; the last one ends at `until` (s), as with OpenSim's Manager."""
@@ -251,18 +256,9 @@ class RungeKuttaMerson(Stepper):
                 self._give_up(t1, error, weights, cause)
             self._next_step = max(self._next_step, smallest)
 
-    def interpolate(self, t: float) -> list[float]:
-        """State at a time within the last step, s, by the cubic Hermite polynomial through its ends."""
-        t0, y0, f0 = self._previous
-        h = self.time - t0
-        s = (t - t0) / h
-        b1 = s * s * (3.0 - 2.0 * s)
-        b0 = 1.0 - b1
-        c = h * s * (s - 1.0)
-        c1 = c * s
-        c0 = c1 - c
-        ends = zip(y0, self.state, f0, self.derivative, strict=True)
-        return [b0 * y + b1 * z + c0 * f + c1 * g for y, z, f, g in ends]
+    def interpolant(self) -> Callable[[float], list[float]]:
+        """The cubic Hermite polynomial through the ends of the last step."""
+        return partial(_cubic, *self._previous, self.time, self.state, self.derivative)
 
     def _error(self, y1: list[float], companion: list[float], weights: list[float]) -> float:
         """Largest of three root mean squares: errors of q as they are, of u and of z weighted."""
@@ -359,11 +355,9 @@ class SemiImplicitEuler(Stepper):
         rates = u if self._rates is None else self._rates(q, u)
         self._advance(t, [x + h * v for x, v in zip(q, rates, strict=True)] + u)
 
-    def interpolate(self, t: float) -> list[float]:
-        """State at a time within the last step, s, on the straight line between its ends."""
-        t0, y0, _ = self._previous
-        s = (t - t0) / (self.time - t0)
-        return [y + s * (z - y) for y, z in zip(y0, self.state, strict=True)]
+    def interpolant(self) -> Callable[[float], list[float]]:
+        """The straight line between the ends of the last step."""
+        return partial(straight_line, *self._previous[:2], self.time, self.state)
 
 
 def merson_step(
@@ -386,6 +380,25 @@ def merson_step(
     fa = f(t1, companion)
     c = h / 6.0
     return [y + c * (a + 4.0 * b + d) for y, a, b, d in zip(y0, f0, fb, fa, strict=True)], companion
+
+
+def _cubic(
+    t0: float, y0: list[float], f0: Sequence[float], t1: float, y1: list[float], f1: Sequence[float], t: float
+) -> list[float]:
+    h = t1 - t0
+    s = (t - t0) / h
+    b1 = s * s * (3.0 - 2.0 * s)
+    b0 = 1.0 - b1
+    c = h * s * (s - 1.0)
+    c1 = c * s
+    c0 = c1 - c
+    return [b0 * y + b1 * z + c0 * f + c1 * g for y, z, f, g in zip(y0, y1, f0, f1, strict=True)]
+
+
+def straight_line(t0: float, y0: list[float], t1: float, y1: list[float], t: float) -> list[float]:
+    """State at time t on the straight line from y0 at t0 to y1 at t1."""
+    s = (t - t0) / (t1 - t0)
+    return [y + s * (z - y) for y, z in zip(y0, y1, strict=True)]
 
 
 def next_step_size(h: float, error: float, accuracy: float, cut: bool = False) -> float:

@@ -1,0 +1,96 @@
+"""The Dynamic Walker, two seconds: osimlite's PyBullet engine and OpenSim's Manager, side by side in one run.
+
+Warm: the model is read and made ready once; what is timed is the motion alone, from the default pose. Both integrate
+with Runge-Kutta-Merson, OpenSim records its states at every step, osimlite every 10 ms. Whole process: a new Python
+that imports, reads the file, simulates, and ends. The error is the largest difference of any coordinate (rad or m)
+from the converged motion, at t = 2 s.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import opensim
+from _pair import pair, pair_commands, report
+from rich.console import Console
+from rich.table import Table
+
+import osimlite
+from osimlite.simulation import Simulation
+
+MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+TO = 2.0
+ACCURACIES = (1e-3, 1e-5, 1e-6)
+CONVERGED = 1e-10
+ROUNDS, WARM_UP = 15, 2
+
+OURS = "import osimlite; osimlite.simulate(osimlite.read({model!r}), to={to}, accuracy={accuracy})"
+THEIRS = """
+import opensim
+opensim.Logger.setLevelString("off")
+model = opensim.Model({model!r})
+state = model.initSystem()
+manager = opensim.Manager(model)
+manager.setIntegratorAccuracy({accuracy})
+manager.initialize(state)
+manager.integrate({to})
+"""
+
+
+def main() -> None:
+    opensim.Logger.setLevelString("off")
+    model = opensim.Model(str(MODEL))
+    model.initSystem()
+    console = Console()
+    with Simulation(osimlite.read(MODEL)) as simulation:
+        exact = run_ours(simulation, CONVERGED)()
+        errors = Table(title="Error at 2 s")
+        for heading in ("accuracy", "osimlite", "OpenSim"):
+            errors.add_column(heading, justify="right")
+        warm = []
+        for accuracy in ACCURACIES:
+            ours, theirs = run_ours(simulation, accuracy), run_opensim(model, accuracy, 1 + WARM_UP + ROUNDS)
+            ends = [max(abs(a - b) for a, b in zip(run(), exact, strict=True)) for run in (ours, theirs)]
+            errors.add_row(f"{accuracy:g}", *(f"{end:.2g}" for end in ends))
+            warm.append(pair(f"warm, {accuracy:g}", ours=ours, theirs=theirs, rounds=ROUNDS, warmup=WARM_UP))
+    console.print(errors)
+    whole = []
+    for accuracy in ACCURACIES[:2]:
+        words = {"model": str(MODEL), "to": TO, "accuracy": accuracy}
+        commands = [[sys.executable, "-c", text.format(**words)] for text in (OURS, THEIRS)]
+        whole.append(pair_commands(f"whole process, {accuracy:g}", ours=commands[0], theirs=commands[1], rounds=9))
+    report(f"Dynamic Walker, {TO:g} s, by accuracy", [*warm, *whole], console=console)
+
+
+def run_ours(simulation: Simulation, accuracy: float) -> Callable[[], list[float]]:
+    def run() -> list[float]:
+        trajectory = simulation.run(TO, accuracy=accuracy)
+        return [float(value) for value in trajectory.values[-1]]
+
+    return run
+
+
+def run_opensim(model: Any, accuracy: float, runs: int) -> Callable[[], list[float]]:
+    coordinates = model.getCoordinateSet()
+    # A manager starts once. All are made ready here, so that only the motion is timed.
+    ready = []
+    for _ in range(runs):
+        state = opensim.State(model.initializeState())
+        state.setTime(0.0)
+        manager = opensim.Manager(model)
+        manager.setIntegratorAccuracy(accuracy)
+        manager.initialize(state)
+        ready.append(manager)
+
+    def run() -> list[float]:
+        end = ready.pop().integrate(TO)
+        return [coordinates.get(place).getValue(end) for place in range(coordinates.getSize())]
+
+    return run
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,492 @@
+"""The PyBullet engine: Bullet computes the accelerations, osimlite the forces and, if asked, the steps.
+
+Two routes lead to the accelerations. "mass-matrix" takes M and the bias from Bullet's inverse dynamics and solves for
+them; it is the quicker one for small mechanisms. "articulated-body" lets Bullet take a step of one second from the
+state and reads the change of the speeds, which is exactly the acceleration, since Bullet's step is semi-implicit
+Euler; it grows more slowly with the number of joints, and takes inertias that the other refuses.
+
+Bullet is made for games; what has to be changed so that it computes mechanics is in `_Body`, one method or constant
+for each.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
+from osimlite.multibody.constraints import Lock
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines.protocol import FreeState, Settings
+from osimlite.simulation.field import ForceField
+from osimlite.simulation.integrators import Observer, RungeKuttaMerson, Stepper, straight_line
+from osimlite.simulation.solver import SingularMassError, tree_solver
+from osimlite.simulation.speeds import Speeds
+from osimlite.translate.passes.merge_fixed import merge_fixed
+from osimlite.translate.passes.names import legal_names
+from osimlite.translate.passes.principal_axes import principal_axes
+from osimlite.translate.robot import Link, Robot, RobotJoint, build_robot
+from osimlite.translate.urdf import urdf_text
+
+require("pybullet", extra="sim", purpose="the PyBullet engine")
+
+import pybullet as bullet  # noqa: E402
+
+MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
+ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
+
+FEW_JOINTS = 15
+"""Up to here the mass matrix is quicker, on the machine it was measured on."""
+
+NO_LIMIT = 1e9
+
+
+def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
+    """Make the engine."""
+    return BulletEngine(mechanism, forces, route=settings.route, show=settings.show)
+
+
+class BulletEngine:
+    """The accelerations of a mechanism by PyBullet; see the protocol for what it offers.
+
+    Args:
+        mechanism: what moves.
+        forces: what pushes it, besides gravity.
+        route: "mass-matrix", "articulated-body", or "auto" for the better one.
+        show: open Bullet's window.
+
+    Raises:
+        UnsupportedError: the mechanism has a constraint other than locked coordinates, or a joint that cannot be
+            said with one-axis joints; or its inertias rule out the route asked for.
+        SimulationError: a body at the end of a chain has no mass; or there is no screen to show the motion on.
+    """
+
+    name = "bullet"
+    version = f"pybullet API {bullet.getAPIVersion()}"
+
+    def __init__(self, mechanism: Mechanism, forces: Forces, *, route: str = "auto", show: bool = False) -> None:
+        if route not in ROUTES:
+            raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
+        for constraint in mechanism.constraints:
+            if not isinstance(constraint, Lock):
+                raise UnsupportedError(
+                    f"the constraint '{constraint.name}' cannot be simulated with PyBullet yet; "
+                    "switch it off or remove it"
+                )
+        robot = legal_names(merge_fixed(build_robot(mechanism, body_frames=False)))
+        _require_masses(robot)
+        self._body = _Body(robot, mechanism.gravity.tolist(), show=show)
+        try:
+            self._prepare(mechanism, forces, robot, route)
+        except BaseException:
+            self.close()
+            raise
+
+    def _prepare(self, mechanism: Mechanism, forces: Forces, robot: Robot, route: str) -> None:
+        body = self._body
+        self.mechanism = mechanism
+        self.field = ForceField(robot, body.joints, forces.elements)
+        self.order = self.field.order
+        self.state = FreeState(mechanism, self.order)
+        self.contacts = self.field.contacts
+        self.columns = self.field.columns
+        self.loads: list[Any] = [None] * len(self.contacts) + [0]
+        self._speeds = Speeds(mechanism, self.order)
+        self._count = len(self.order)
+        self._forces = self.field.generalized
+        if route == "auto":
+            few = self._count <= FEW_JOINTS
+            route = MASS_MATRIX if few and body.mass_matrix_works else ARTICULATED_BODY
+        if route == MASS_MATRIX and not body.mass_matrix_works:
+            raise UnsupportedError(
+                f"Bullet refuses a mass matrix with the inertia of '{body.impossible[0]}', which no real body has "
+                "(one principal moment exceeds the sum of the others); take the route articulated-body"
+            )
+        self.route = route
+        parents = [self.field.chain.parent(joint) for joint in range(self._count)]
+        self._solve = tree_solver(parents)
+        if not self._count:
+            self.derivative = self._nothing_moves  # type: ignore[method-assign]
+        elif self.field.separate:
+            self.derivative = self._derivative_with_speeds  # type: ignore[method-assign]
+        elif route == ARTICULATED_BODY:
+            self.derivative = self._derivative_by_step  # type: ignore[method-assign]
+
+    # ---------------------------------------------------------------------------------------- accelerations
+    def derivative(self, t: float, y: list[float]) -> list[float]:
+        """(qdot, udot) at a state; here where the speeds are the rates, by the mass matrix."""
+        count, body = self._count, self._body
+        q, u = y[:count], y[count:]
+        try:
+            return u + self._solve(
+                bullet.calculateMassMatrix(body.id, q, 0, body.client),
+                bullet.calculateInverseDynamics(body.id, q, u, body.zeros, 0, body.client),
+                self._forces(q, u, self.loads),
+            )
+        except SingularMassError as error:
+            raise self._singular(error, y) from None
+
+    def _derivative_by_step(self, t: float, y: list[float]) -> list[float]:
+        q, u = y[: self._count], y[self._count :]
+        return u + self._body.accelerations_by_step(q, u, self._forces(q, u, self.loads))
+
+    def _derivative_with_speeds(self, t: float, y: list[float]) -> list[float]:
+        count, body = self._count, self._body
+        q, u = y[:count], y[count:]
+        rates = self._speeds.rates(q, u)
+        forces = self._joint_forces(q, rates, u)
+        if self.route == MASS_MATRIX:
+            try:
+                qddot = self._solve(body.mass_matrix(q), body.bias(q, rates), forces)
+            except SingularMassError as error:
+                raise self._singular(error, y) from None
+        else:
+            qddot = body.accelerations_by_step(q, rates, forces)
+        return rates + self._speeds.accelerations(q, u, qddot)
+
+    @staticmethod
+    def _nothing_moves(t: float, y: list[float]) -> list[float]:
+        return []
+
+    def _joint_forces(self, q: list[float], rates: list[float], u: list[float]) -> Sequence[float]:
+        """Forces on the one-axis joints; `rates` are theirs, `u` the generalized speeds."""
+        if not self.field.separate:
+            return self._forces(q, rates, self.loads)
+        both, count = self._forces(q, rates, u, self.loads), self._count
+        converted = self._speeds.joint_forces(q, both[count:])
+        return [a + b for a, b in zip(both[:count], converted, strict=True)]
+
+    def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
+        """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
+        udot = self.derivative(t, self.state.pack(q, u))[self._count :]
+        return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
+
+    def _singular(self, error: SingularMassError, y: list[float]) -> SimulationError:
+        wrong = [value for value in y if not np.isfinite(value)]
+        if wrong:
+            return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
+        name = self.mechanism.coordinates[self.order[error.joint]].name
+        return SimulationError(
+            f"coordinate '{name}' moves no mass, or a negative inertia; "
+            "give the bodies beyond its joint mass and inertia, or lock it"
+        )
+
+    # ---------------------------------------------------------------------------------------------- reports
+    def touching(self, t: float, y: list[float]) -> int:
+        """The bits of the contacts that touch; sets `loads`."""
+        q, u = y[: self._count], y[self._count :]
+        self._joint_forces(q, self._speeds.rates(q, u), u)
+        return int(self.loads[-1])
+
+    def force_records(self, t: float, y: list[float]) -> list[float]:
+        """One number for each of the columns."""
+        q, u = y[: self._count], y[self._count :]
+        return self.field.records(q, self._speeds.rates(q, u), u)
+
+    def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
+        """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
+        q, u = y[: self._count], y[self._count :]
+        return self.field.energies(q, self._speeds.rates(q, u), u)
+
+    # ---------------------------------------------------------------------------------------------- motion
+    def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
+        """What integrates from a state on: Runge-Kutta-Merson, or Bullet's own fixed steps."""
+        if settings.fixed_step is not None:
+            return BulletStepper(self, t, y, settings.fixed_step, observe, paced=settings.show)
+        infos = [self.mechanism.coordinates[place] for place in self.order]
+        # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
+        spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
+        return RungeKuttaMerson(
+            self.derivative,
+            t,
+            y,
+            self._count,
+            accuracy=settings.accuracy,
+            count_q=len(self.mechanism.coordinates) + spare,
+            count_u=len(self.mechanism.coordinates),
+            observe=observe,
+            names=[info.name for info in infos] + [f"the speed of {info.name}" for info in infos],
+        )
+
+    def close(self) -> None:
+        """Leave Bullet; any number of times."""
+        self._body.close()
+
+    def __enter__(self) -> BulletEngine:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class BulletStepper(Stepper):
+    """Bullet's own fixed steps: speeds by the accelerations at the start of the step, then values by the new speeds.
+
+    That is what a PyBullet user expects of ``stepSimulation``: first order, one force evaluation a step.
+
+    Args:
+        engine: whose mechanism.
+        t: initial time, s.
+        y: initial state.
+        h: step, s; a last one may be shorter.
+        observe: called with (time, state) after each step; the loads are those at that state.
+        paced: wait so that the motion takes its real time.
+    """
+
+    def __init__(
+        self, engine: BulletEngine, t: float, y: list[float], h: float, observe: Observer, *, paced: bool = False
+    ) -> None:
+        if not 0.0 < h < np.inf:
+            raise SimulationError(f"The fixed step must be positive and finite; {h} s is not.")
+        self._engine, self._body = engine, engine._body
+        self._h = h
+        self._observe = observe
+        self._paced = paced
+        self._start = (t, time.perf_counter())
+        self._origin, self._since = t, 0
+        self.time, self.state = t, list(y)
+        self.evaluations = self.taken = 0
+        self._previous = t, self.state, []
+        count = engine._count
+        self._body.set_state(y[:count], engine._speeds.rates(y[:count], y[count:]))
+        self._torques = self._evaluate_forces(y)
+
+    def step(self, limit: float = np.inf) -> None:
+        """Take one step of the fixed size, or up to the limit if that comes first."""
+        self._require_room(limit)
+        self._since += 1
+        t, h = self._origin + self._h * self._since, self._h
+        if t > limit - 1e-9 * h:
+            if t > limit + 1e-9 * h:
+                h = limit - self.time
+            t = limit
+            self._origin, self._since = limit, 0
+        self._body.step(h, self._torques)
+        q, rates = self._body.get_state()
+        y = q + self._engine._speeds.from_rates(q, rates)
+        if not np.isfinite(sum(y)):
+            raise SimulationError(
+                f"the motion is not finite any more after t = {self.time:.9g} s; take a shorter fixed step "
+                f"than {self._h:g} s, or error control (--accuracy)"
+            )
+        self._previous = self.time, self.state, []
+        self.time, self.state = t, y
+        self.taken += 1
+        self._torques = self._evaluate_forces(y)
+        if self._observe is not None:
+            self._observe(t, y)
+        if self._paced:
+            ahead = (t - self._start[0]) - (time.perf_counter() - self._start[1])
+            if ahead > 0.0:
+                time.sleep(ahead)
+
+    def interpolant(self) -> Any:
+        """The straight line between the ends of the last step."""
+        t0, y0, _ = self._previous
+        t1, y1 = self.time, self.state
+        return lambda t: straight_line(t0, y0, t1, y1, t)
+
+    def _evaluate_forces(self, y: list[float]) -> Sequence[float]:
+        self.evaluations += 1
+        engine = self._engine
+        q, u = y[: engine._count], y[engine._count :]
+        return engine._joint_forces(q, engine._speeds.rates(q, u), u)
+
+
+class _Body:
+    """One robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
+
+    Attributes:
+        client: Bullet's number of the world.
+        id: Bullet's number of the robot.
+        joints: the robot's joints in the order of Bullet's degrees of freedom.
+        impossible: names of links whose inertia no real body has.
+        zeros: as many as there are joints.
+    """
+
+    # Without this flag Bullet makes up inertias from collision shapes, of which there are none. Sleeping stays off.
+    FLAGS = bullet.URDF_USE_INERTIA_FROM_FILE
+
+    DAMPING = 0.0
+    """Bullet's default is 0.04, in every link."""
+
+    FASTEST = NO_LIMIT
+    """Bullet clips joint speeds at 100 by default."""
+
+    def __init__(self, robot: Robot, gravity: Sequence[float], *, show: bool) -> None:
+        self.client = _connect(show)
+        self._step = 0.0
+        try:
+            self._load(robot, gravity)
+        except BaseException:
+            self.close()
+            raise
+
+    def _load(self, robot: Robot, gravity: Sequence[float]) -> None:
+        client = self.client
+        bullet.setGravity(*gravity, physicsClientId=client)
+        # Bullet keeps files by name, and temporary names may come again.
+        bullet.setPhysicsEngineParameter(enableFileCaching=0, numSubSteps=0, physicsClientId=client)
+        self.impossible = [link.name for link in robot.links if _excess(link) > 0.0]
+        with _temporary_file(self._text(robot)) as path:
+            self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)
+        infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
+        self.joints = self._by_name(robot, infos)
+        self._indices = [int(info[0]) for info in infos if info[3] >= 0]
+        self.zeros = [0.0] * len(self._indices)
+        self._release(infos)
+        if self.impossible:
+            self._set_inertias(robot, infos)
+
+    @staticmethod
+    def _text(robot: Robot) -> str:
+        """The robot as URDF, with inertias that Bullet does not set to zero."""
+        links = [
+            replace(link, inertia=link.inertia + _excess(link) * np.eye(3)) if _excess(link) > 0.0 else link
+            for link in robot.links
+        ]
+        return urdf_text(replace(robot, links=tuple(links)), visuals=True)
+
+    @staticmethod
+    def _by_name(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
+        """The joints in Bullet's order, which is not that of the model nor of the robot."""
+        joints = {joint.name: joint for joint in robot.moving}
+        return [joints[info[1].decode()] for info in infos if info[3] >= 0]
+
+    def _release(self, infos: Sequence[Sequence[Any]]) -> None:
+        """Take away everything that slows a joint down."""
+        client = self.client
+        for index in (-1, *(int(info[0]) for info in infos)):
+            bullet.changeDynamics(
+                self.id,
+                index,
+                linearDamping=self.DAMPING,
+                angularDamping=self.DAMPING,
+                jointDamping=self.DAMPING,
+                maxJointVelocity=self.FASTEST,
+                physicsClientId=client,
+            )
+        self._switch_motors_off()
+
+    def _switch_motors_off(self) -> None:
+        """Bullet starts every joint with a motor that holds it."""
+        if self._indices:
+            bullet.setJointMotorControlArray(
+                self.id, self._indices, bullet.VELOCITY_CONTROL, forces=self.zeros, physicsClientId=self.client
+            )
+
+    def _set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
+        """Give Bullet the inertias that it refuses to read; only its articulated-body algorithm takes them."""
+        links = {link.name: link for link in robot.links}
+        for info in infos:
+            link = links[info[12].decode()]
+            if link.name in self.impossible:
+                moments, _ = principal_axes(link.inertia)
+                bullet.changeDynamics(
+                    self.id,
+                    int(info[0]),
+                    localInertiaDiagonal=[float(moment) for moment in moments],
+                    physicsClientId=self.client,
+                )
+
+    @property
+    def mass_matrix_works(self) -> bool:
+        """Whether Bullet's inverse dynamics accepts the inertias."""
+        return not self.impossible
+
+    def mass_matrix(self, q: list[float]) -> Sequence[Sequence[float]]:
+        """M (n, n) of the joints."""
+        matrix: Sequence[Sequence[float]] = bullet.calculateMassMatrix(self.id, q, 0, self.client)
+        return matrix
+
+    def bias(self, q: list[float], rates: list[float]) -> Sequence[float]:
+        """Forces (n,) on the joints without which they would accelerate."""
+        bias: Sequence[float] = bullet.calculateInverseDynamics(self.id, q, rates, self.zeros, 0, self.client)
+        return bias
+
+    def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
+        """Put the joints into a state, and all links where they then are."""
+        bullet.resetJointStatesMultiDof(self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client)
+
+    def get_state(self) -> tuple[list[float], list[float]]:
+        """Values and rates of the joints."""
+        states = bullet.getJointStates(self.id, self._indices, self.client)
+        return [state[0] for state in states], [state[1] for state in states]
+
+    def step(self, h: float, forces: Sequence[float]) -> None:
+        """Let Bullet take one step of length h (s) under forces on the joints, which hold for this step only."""
+        client = self.client
+        if h != self._step:
+            bullet.setTimeStep(h, client)
+            self._step = h
+        bullet.setJointMotorControlArray(
+            self.id, self._indices, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=client
+        )
+        bullet.stepSimulation(client)
+
+    def accelerations_by_step(self, q: list[float], rates: list[float], forces: Sequence[float]) -> list[float]:
+        """Second derivatives of the joint values: what one second changes the rates by."""
+        self.set_state(q, rates)
+        self.step(1.0, forces)
+        states = bullet.getJointStates(self.id, self._indices, self.client)
+        return [state[1] - rate for state, rate in zip(states, rates, strict=True)]
+
+    def close(self) -> None:
+        """Leave the world."""
+        if self.client >= 0:
+            bullet.disconnect(self.client)
+            self.client = -1
+
+
+def _connect(show: bool) -> int:
+    if show and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise SimulationError(
+            "there is no screen to show the motion on (DISPLAY is not set); leave out --gui, "
+            "and take --animate for a film"
+        )
+    client = int(bullet.connect(bullet.GUI if show else bullet.DIRECT))
+    if client < 0:
+        raise SimulationError("Bullet opens no more worlds; close the engines that are not needed any more")
+    return client
+
+
+def _excess(link: Link) -> float:
+    """What to add to each principal moment of inertia so that Bullet does not set them to zero; 0 if they are fine."""
+    moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
+    low, middle, high = sorted(moments)
+    return high if high > low + middle or low < 0.0 else 0.0
+
+
+def _require_masses(robot: Robot) -> None:
+    """SimulationError if the last link of a chain has no mass: nothing decides how its joint moves."""
+    carriers = {joint.parent for joint in robot.joints}
+    links = {link.name: link for link in robot.links}
+    for joint in robot.joints:
+        if joint.child not in carriers and links[joint.child].mass == 0.0:
+            body = next(iter(links[joint.child].bodies), joint.child)
+            raise SimulationError(
+                f"the body '{body}' has no mass and carries none, so that nothing decides how the joint "
+                f"'{joint.source}' moves; give it mass and inertia, or lock the coordinates of the joint"
+            )
+
+
+@contextmanager
+def _temporary_file(text: str) -> Iterator[str]:
+    handle, name = tempfile.mkstemp(suffix=".urdf", prefix="osimlite-")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        yield name
+    finally:
+        Path(name).unlink(missing_ok=True)

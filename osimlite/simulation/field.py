@@ -1,0 +1,250 @@
+"""All forces of a model at once, as functions written for it.
+
+A `ForceField` knows the joints of a robot in the order of an engine's degrees of freedom, and gives the generalized
+forces on them; it also reports forces and energies. It needs no engine: what it reports can be asked for when the
+engine is closed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Any
+
+from osimlite.errors import UnsupportedError
+from osimlite.forces.coordinate_limit import limit_energy, limit_force
+from osimlite.forces.hunt_crossley import contact_energy, contact_force, half_space_sphere, sphere_sphere
+from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.simulation.chain import Chain, Column
+from osimlite.simulation.elements import ForceElement, HuntCrossley, Triple
+from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
+from osimlite.translate.robot import Robot, RobotJoint
+
+LAWS: dict[str, Callable[..., Any]] = {
+    law.__name__: law
+    for law in (contact_energy, contact_force, half_space_sphere, limit_energy, limit_force, sphere_sphere)
+}
+"""What the code of force elements may call, by name."""
+
+
+class Writer:
+    """What a force element needs to write itself.
+
+    Attributes:
+        script: the code so far.
+        chain: where bodies and points are.
+        reporting: whether the code is to keep what a report wants, and not to be quick.
+    """
+
+    def __init__(self, field: ForceField, script: Script, *, reporting: bool) -> None:
+        self.field = field
+        self.script = script
+        self.chain = field.chain
+        self.reporting = reporting
+        self.names: dict[str, Any] = {**LAWS, "sin": math.sin, "cos": math.cos}
+        self._slot = self._contact = 0
+
+    def write(self, elements: Sequence[ForceElement]) -> None:
+        """Write all elements, each with its own places for what it keeps."""
+        for element in elements:
+            element.write(self)
+            self._slot += slots(element)
+            self._contact += len(element.pairs) if isinstance(element, HuntCrossley) else 0
+
+    def coordinate(self, place: int) -> tuple[Scalar, Scalar]:
+        """Value and generalized speed of a coordinate; numbers if it is locked."""
+        joint = self.field.joint_of.get(place)
+        if joint is None:
+            return self.field.mechanism.coordinates[place].default_value, 0.0
+        return f"q{joint}", f"u{joint}" if self.field.separate else f"r{joint}"
+
+    def call(self, law: str, *arguments: Scalar, results: int = 1) -> Any:
+        """Call a law: the name of its result, or a list of names if there are more."""
+        text = f"{law}({', '.join(x if isinstance(x, str) else repr(x) for x in arguments)})"
+        if results == 1:
+            return self.script.assign(text)
+        names = [self.script.fresh() for _ in range(results)]
+        self.script.line(f"{', '.join(names)} = {text}")
+        return names
+
+    def constant(self, value: Any) -> str:
+        """A name for any object."""
+        name = f"constant{len(self.names)}"
+        self.names[name] = value
+        return name
+
+    def push(self, columns: Sequence[Column], force: Vector) -> None:
+        """Apply a force at the point of some columns, and its opposite at the same point of their base."""
+        for column in columns if not self.reporting else ():
+            self._add(f"t{column.joint}", self.script.dot(column.moving, force))
+
+    def push_coordinate(self, place: int, force: Scalar) -> None:
+        """Apply a generalized force, conjugate to the generalized speed, on a coordinate that is not locked."""
+        if not self.reporting:
+            self._add(f"{'s' if self.field.separate else 't'}{self.field.joint_of[place]}", force)
+
+    def keep(self, place: int, *values: Scalar) -> None:
+        """Keep some values for the report in one of the element's places."""
+        if self.reporting:
+            self.script.line(f"kept[{self._slot + place}] = ({', '.join(map(str, values))},)")
+
+    def touch(self, place: int, force: Vector) -> None:
+        """Note that a contact touches, and its force."""
+        if not self.reporting:
+            number = self._contact + place
+            self.script.line(f"touching |= {1 << number}")
+            self.script.line(f"loads[{number}] = ({', '.join(map(str, force))})")
+
+    def _add(self, name: str, value: Scalar) -> None:
+        if value != 0.0:
+            self.script.line(f"{name} += {value}")
+
+
+class ForceField:
+    """The forces of a model on the joints of a robot.
+
+    Args:
+        robot: without fixed joints; every joint's value is a coordinate of its own.
+        joints: its joints in the order of the degrees of freedom.
+        elements: the forces.
+
+    Attributes:
+        order: the coordinate of each degree of freedom.
+        joint_of: the degree of freedom of each coordinate that is not locked.
+        separate: whether the generalized speeds are not the rates of the joints.
+        contacts: names of the contacts, by their number.
+
+    Raises:
+        UnsupportedError: a joint's value is not a coordinate of its own.
+    """
+
+    def __init__(self, robot: Robot, joints: Sequence[RobotJoint], elements: Sequence[ForceElement]) -> None:
+        self.mechanism: Mechanism = robot.mechanism
+        self.chain = Chain(robot, joints)
+        self.elements = tuple(elements)
+        self.order = tuple(_coordinate(joint) for joint in joints)
+        self.joint_of = {place: joint for joint, place in enumerate(self.order)}
+        if len(self.joint_of) < len(self.order):
+            raise UnsupportedError(
+                f"'{self.mechanism.name}' has a coordinate that moves several axes, which the simulation cannot "
+                "do; replace its joint by one with a coordinate for each axis"
+            )
+        self.separate = not all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
+        self.contacts = tuple(
+            element.pair_name(place)
+            for element in self.elements
+            if isinstance(element, HuntCrossley)
+            for place in range(len(element.pairs))
+        )
+
+    @cached_property
+    def generalized(self) -> Callable[..., tuple[float, ...]]:
+        """The function of q, rates, loads (q, rates, u, loads if `separate`) that gives the forces on the n joints.
+
+        If `separate`, n more follow, which are conjugate to the generalized speeds. `loads` is a list: its last entry
+        becomes a number whose bits tell which contacts touch, an entry before it becomes the force (N, in ground) on
+        the second surface of a contact that does; the others are left as they are.
+        """
+        script = self._script("generalized", "loads")
+        names = [f"t{joint}" for joint in range(len(self.order))]
+        if self.separate:
+            names += [f"s{joint}" for joint in range(len(self.order))]
+        if names:
+            script.line(f"{' = '.join(names)} = 0.0")
+        script.line("touching = 0")
+        writer = Writer(self, script, reporting=False)
+        writer.write(self.elements)
+        script.line("loads[-1] = touching")
+        script.line(f"return ({''.join(name + ', ' for name in names)})")
+        return script.function(writer.names)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Labels of the rows that :meth:`records` gives; every label occurs once."""
+        labels: list[str] = []
+        for element in self.elements:
+            for label in element.columns:
+                count = labels.count(label)
+                labels.append(label if not count else f"{label}_{count}")
+        return tuple(labels)
+
+    def records(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> list[float]:
+        """One row of the forces in effect, at the state of the joints."""
+        row: list[float] = []
+        for element, values, origins in self._reported(q, rates, u):
+            row += element.record(values, origins)
+        return row
+
+    def stored_energy(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> float:
+        """Potential energy of all force elements, J."""
+        return sum(value[-1] for _, values, _ in self._reported(q, rates, u) for value in values if value is not None)
+
+    def energies(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> tuple[float, float, float]:
+        """Kinetic energy, potential energy of gravity, and energy stored in the force elements, J."""
+        kinetic, gravity = self._mechanical(q, rates, u) if self.separate else self._mechanical(q, rates)
+        return kinetic, gravity, self.stored_energy(q, rates, u)
+
+    # --------------------------------------------------------------------------------------------- helpers
+    def _script(self, name: str, *more: str) -> Script:
+        script = Script(name, ["q", "r", *(["u"] if self.separate else []), *more])
+        for letter in "qru" if self.separate else "qr":
+            if self.order:
+                script.line(f"{''.join(f'{letter}{joint}, ' for joint in range(len(self.order)))}= {letter}")
+        return script
+
+    def _reported(
+        self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]
+    ) -> Iterator[tuple[ForceElement, list[Any], list[Triple]]]:
+        kept, origins = self._report(q, rates, u) if self.separate else self._report(q, rates)
+        slot = 0
+        for element in self.elements:
+            yield element, kept[slot : slot + slots(element)], origins
+            slot += slots(element)
+
+    @cached_property
+    def _report(self) -> Callable[..., Any]:
+        script = self._script("report")
+        script.line(f"kept = [None] * {sum(map(slots, self.elements))}")
+        writer = Writer(self, script, reporting=True)
+        places = [self.chain.body(script, body).origin for body in (*range(len(self.mechanism.bodies)), GROUND)]
+        writer.write(self.elements)
+        script.line(f"return kept, [{', '.join('(' + ', '.join(map(str, place)) + ')' for place in places)}]")
+        return script.function(writer.names)
+
+    @cached_property
+    def _mechanical(self) -> Callable[..., tuple[float, float]]:
+        """Kinetic energy and potential energy of gravity."""
+        script, gravity = self._script("mechanical"), vector(self.mechanism.gravity)
+        script.line("kinetic = potential = 0.0")
+        for index, body in enumerate(self.mechanism.bodies):
+            mass = body.mass_properties.mass
+            if mass == 0.0:
+                continue
+            center = self.chain.point(script, index, vector(body.mass_properties.center))
+            height = script.dot(gravity, center)
+            script.line(f"potential -= {script.sum((mass, height))}")
+            columns = self.chain.columns(script, GROUND, index, center)
+            v = self.chain.velocity(script, columns)
+            turning = self.chain.velocity(script, columns, turning=True)
+            rotation = self.chain.body(script, index).rotation
+            w = script.combine(*zip(turning, rotation, strict=True)) if turning != ZERO else ZERO
+            momentum = script.apply(matrix(body.mass_properties.inertia), w)
+            moving, spinning = script.dot(v, v), script.dot(w, momentum)
+            script.line(f"kinetic += {script.sum((0.5 * mass, moving), (0.5, spinning))}")
+        script.line("return kinetic, potential")
+        return script.function({"sin": math.sin, "cos": math.cos})
+
+
+def slots(element: ForceElement) -> int:
+    """How many places an element has to keep something for its record."""
+    return len(element.pairs) if isinstance(element, HuntCrossley) else 1
+
+
+def _coordinate(joint: RobotJoint) -> int:
+    if joint.coordinate is None:
+        raise UnsupportedError(
+            f"the joint '{joint.source}' has an axis that moves by a function of its coordinates, which the "
+            "simulation cannot do; replace it by a joint whose coordinates move its axes directly"
+        )
+    return joint.coordinate

@@ -1,0 +1,254 @@
+"""Simulating a model: initial state, engine, steps, report."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Mapping
+from math import floor, isfinite
+from typing import Any
+
+from osimlite.errors import SimulationError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.schema.model import Model
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.engines import engine_factory
+from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson, Stepper
+from osimlite.simulation.recorder import Recorder
+from osimlite.simulation.trajectory import Report, Trajectory
+
+Progress = Callable[[float], object]
+"""Called with the simulated time (s) reached."""
+
+
+def simulate(
+    model: Model,
+    to: float = 2.0,
+    engine: str = "bullet",
+    *,
+    accuracy: float = DEFAULT_ACCURACY,
+    fixed_step: float | None = None,
+    report_interval: float = 0.01,
+    initial: Mapping[str, float] | None = None,
+    initial_speeds: Mapping[str, float] | None = None,
+    route: str = "auto",
+    skip_unsupported: bool = False,
+    simbody_early_return: bool = False,
+    show: bool = False,
+    progress: Progress | None = None,
+) -> Trajectory:
+    """Simulate a model forward in time, from its default pose and speeds.
+
+    Args:
+        model: what moves.
+        to: how long, s.
+        engine: what computes the accelerations.
+        accuracy: of the integrator, with the meaning it has in OpenSim.
+        fixed_step: take PyBullet's own steps of this length (s) instead of controlling the error.
+        report_interval: time between the recorded moments, s; the last one is `to` in any case.
+        initial: values (rad, m) of coordinates by name or path that do not start at their default.
+        initial_speeds: generalized speeds that do not start at their default, likewise.
+        route: how Bullet computes accelerations: "mass-matrix", "articulated-body", or "auto" for the better one.
+        skip_unsupported: leave out forces that cannot be computed; the summary lists them.
+        simbody_early_return: reproduce a defect of Simbody in contact forces of several surfaces: the first contact
+            that separates too fast to push takes the force of those after it.
+        show: show the motion in Bullet's window, in real time; needs `fixed_step`.
+        progress: called with the simulated time at every recorded moment.
+
+    Raises:
+        ModelError: the model is not a mechanism, a name does not exist, or a coordinate is locked.
+        UnsupportedError: the model has a joint, constraint or force that cannot be computed.
+        SimulationError: the motion cannot be computed any further; a setting has no meaning.
+        MissingDependency: PyBullet is not installed.
+    """
+    with Simulation(
+        model,
+        engine,
+        route=route,
+        skip_unsupported=skip_unsupported,
+        simbody_early_return=simbody_early_return,
+        show=show,
+    ) as simulation:
+        return simulation.run(
+            to,
+            accuracy=accuracy,
+            fixed_step=fixed_step,
+            report_interval=report_interval,
+            initial=initial,
+            initial_speeds=initial_speeds,
+            progress=progress,
+        )
+
+
+class Simulation:
+    """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
+
+    Args and errors: as those of :func:`simulate`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        engine: str = "bullet",
+        *,
+        route: str = "auto",
+        skip_unsupported: bool = False,
+        simbody_early_return: bool = False,
+        show: bool = False,
+    ) -> None:
+        make = engine_factory(engine)
+        self.mechanism: Mechanism = build_mechanism(model)
+        self.forces = force_elements(
+            model, self.mechanism, skip_unsupported=skip_unsupported, simbody_early_return=simbody_early_return
+        )
+        self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show))
+        self.state = FreeState(self.mechanism, self.engine.order)
+        self._settings = {"skip_unsupported": skip_unsupported, "simbody_early_return": simbody_early_return}
+        self._show = show
+
+    def run(
+        self,
+        to: float = 2.0,
+        *,
+        accuracy: float = DEFAULT_ACCURACY,
+        fixed_step: float | None = None,
+        report_interval: float = 0.01,
+        initial: Mapping[str, float] | None = None,
+        initial_speeds: Mapping[str, float] | None = None,
+        progress: Progress | None = None,
+    ) -> Trajectory:
+        """Simulate once; arguments and errors as those of :func:`simulate`."""
+        started = time.perf_counter()
+        times = report_times(to, report_interval)
+        if self._show and fixed_step is None:
+            raise SimulationError("showing the motion needs a fixed step, for instance 0.001 s")
+        y = self._initial_state(initial or {}, initial_speeds or {})
+        settings = Settings(accuracy=accuracy, fixed_step=fixed_step, route=self.engine.route, show=self._show)
+        recorder = Recorder(self.engine)
+        stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
+        recorder.begin(stepper)
+        states: list[list[float]] = []
+        for t, state in stepper.reports(times):
+            states.append(state)
+            if progress is not None:
+                progress(t)
+        if not isfinite(sum(states[-1])):
+            raise SimulationError("the motion is not finite any more; ask for more accuracy")
+        wall = time.perf_counter() - started
+        wanted = {
+            "to": to,
+            **({"accuracy": accuracy} if fixed_step is None else {"fixed_step": fixed_step}),
+            "report_interval": report_interval,
+            "initial": dict(initial or {}),
+            "initial_speeds": dict(initial_speeds or {}),
+            **self._settings,
+        }
+        return self._trajectory(times, states, stepper, recorder, wanted, wall)
+
+    def close(self) -> None:
+        """Free what the engine holds; trajectories stay good."""
+        self.engine.close()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # --------------------------------------------------------------------------------------------- helpers
+    def _initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
+        infos = self.mechanism.coordinates
+        q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
+        for given, row, what in ((initial, q, "value"), (speeds, u, "speed")):
+            for name, value in given.items():
+                place = self.mechanism.coordinate_index(name)
+                if infos[place].locked:
+                    raise SimulationError(
+                        f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
+                        "be set; unlock it in the model"
+                    )
+                if not isfinite(value):
+                    raise SimulationError(f"the {what} of coordinate '{name}' is {value}; give a number")
+                row[place] = float(value)
+        return self.state.pack(q, u)
+
+    def _trajectory(
+        self,
+        times: list[float],
+        states: list[list[float]],
+        stepper: Stepper,
+        recorder: Recorder,
+        settings: dict[str, Any],
+        wall: float,
+    ) -> Trajectory:
+        engine = self.engine
+
+        def energies(t: float, y: list[float]) -> dict[str, float]:
+            kinetic, gravity, stored = engine.energies(t, y)
+            return {
+                "kinetic": kinetic,
+                "potential": gravity + stored,
+                "gravity": gravity,
+                "stored": stored,
+                "total": kinetic + gravity + stored,
+            }
+
+        def summary() -> dict[str, Any]:
+            attempted = stepper.attempted if isinstance(stepper, RungeKuttaMerson) else stepper.taken
+            return {
+                "model": self.mechanism.name,
+                "engine": engine.name,
+                "route": engine.route,
+                "integrator": type(stepper).__name__,
+                "settings": settings,
+                "steps": stepper.taken,
+                "attempted_steps": attempted,
+                "evaluations": stepper.evaluations,
+                "wall_time_s": wall,
+                "energy_J": {"start": energies(times[0], states[0]), "end": energies(times[-1], states[-1])},
+                "contact_events": [
+                    {"time_s": event.time, "contact": event.contact, "event": "begin" if event.begins else "end"}
+                    for event in recorder.events()
+                ],
+                "largest_contact_forces": {
+                    name: {"force_N": size, "time_s": t} for name, (size, t) in recorder.largest_forces().items()
+                },
+                "skipped_forces": list(self.forces.skipped),
+                "versions": _versions(engine),
+            }
+
+        report = Report(
+            lambda: (engine.columns, [engine.force_records(*moment) for moment in zip(times, states, strict=True)]),
+            lambda: [engine.energies(*moment) for moment in zip(times, states, strict=True)],
+            summary,
+        )
+        values = [self.state.values(y) for y in states]
+        speeds = [self.state.speeds(y) for y in states]
+        return Trajectory(self.mechanism, times, values, speeds, report)
+
+
+def report_times(to: float, interval: float) -> list[float]:
+    """0, interval, 2 interval ... and `to` (s).
+
+    Raises:
+        SimulationError: a number has no meaning.
+    """
+    if not (isfinite(to) and to > 0.0):
+        raise SimulationError(f"a simulation goes on for a positive time, not {to:g} s")
+    if not (isfinite(interval) and interval > 0.0):
+        raise SimulationError(f"the report interval is a positive time, not {interval:g} s")
+    if to / interval > 1e7:
+        raise SimulationError(f"a report every {interval:g} s makes more than ten million rows; take a longer interval")
+    times = [number * interval for number in range(floor(to / interval) + 1)]
+    # A last moment that differs from `to` only by rounding is `to`.
+    if to - times[-1] <= 1e-9 * interval:
+        times.pop()
+    return [*times, to]
+
+
+def _versions(engine: Engine) -> dict[str, str]:
+    from osimlite import __version__
+
+    return {"osimlite": __version__, "engine": engine.version, "python": platform.python_version()}

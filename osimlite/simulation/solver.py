@@ -1,0 +1,64 @@
+"""M x = b for the mass matrix of a tree, written as straight-line code.
+
+Two joints of which neither carries the other do not couple, and a factorisation M = Lᵀ D L that starts at the leaves
+keeps those zeros (R. Featherstone, "Efficient factorization of the joint-space inertia matrix for branched kinematic
+trees", International Journal of Robotics Research 24 (2005) 487-500). The code names no entry that is zero, and runs
+on the nested tuples that an engine returns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from osimlite.simulation.script import Script
+
+
+class SingularMassError(ArithmeticError):
+    """The mass matrix is not positive definite: `joint` moves no mass, or the matrix is not a number."""
+
+    def __init__(self, joint: int) -> None:
+        super().__init__(f"degree of freedom {joint} moves no mass")
+        self.joint = joint
+
+
+def tree_solver(
+    parents: Sequence[int],
+) -> Callable[[Sequence[Sequence[float]], Sequence[float], Sequence[float]], list[float]]:
+    """The function of M (n, n), bias h (n) and forces t (n, or more) that returns M⁻¹ (t - h).
+
+    Args:
+        parents: for each of n joints the joint that carries it, which stands before it; -1 if none does.
+
+    Raises:
+        SingularMassError: (the function) M is not positive definite, or not a number.
+    """
+    size = len(parents)
+    above = [list(_ancestors(parents, joint)) for joint in range(size)]
+    script = Script("solve", ["M", "h", "t"])
+    for row in range(size):
+        script.line(f"M{row} = M[{row}]")
+        for column in (*above[row], row):
+            script.line(f"m{row}_{column} = M{row}[{column}]")
+        script.line(f"x{row} = t[{row}] - h[{row}]")
+    for k in reversed(range(size)):
+        script.line(f"if not m{k}_{k} > 0.0: raise SingularMassError({k})")
+        for place, i in enumerate(above[k]):
+            script.line(f"a = m{k}_{i} / m{k}_{k}")
+            for j in (i, *above[k][place + 1 :]):
+                script.line(f"m{i}_{j} -= a*m{k}_{j}")
+            script.line(f"x{i} -= a*x{k}")
+            script.line(f"m{k}_{i} = a")
+        script.line(f"x{k} /= m{k}_{k}")
+    for k in range(size):
+        if above[k]:
+            script.line(f"x{k} -= {' + '.join(f'm{k}_{i}*x{i}' for i in above[k])}")
+    script.line(f"return [{', '.join(f'x{joint}' for joint in range(size))}]")
+    return script.function({"SingularMassError": SingularMassError})
+
+
+def _ancestors(parents: Sequence[int], joint: int) -> Sequence[int]:
+    """The joints that carry a joint, the nearest first."""
+    found = []
+    while (joint := parents[joint]) >= 0:
+        found.append(joint)
+    return found

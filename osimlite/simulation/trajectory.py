@@ -1,0 +1,161 @@
+"""A recorded motion."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import OsimliteError
+from osimlite.files import write_atomically
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.storage import sto_text
+
+
+class Trajectory:
+    """The motion of a mechanism over time, with its forces, energies and summary.
+
+    Forces, energies and events are worked out when they are asked for.
+
+    Attributes:
+        mechanism: what moves.
+        times: moments (n,), s.
+        coordinates: names of the k coordinates, in the mechanism's order.
+        values: coordinate values (n, k), rad or m.
+        speeds: generalized speeds (n, k).
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        times: Sequence[float],
+        values: Sequence[Sequence[float]],
+        speeds: Sequence[Sequence[float]],
+        report: Report,
+    ) -> None:
+        count = len(mechanism.coordinates)
+        self.mechanism = mechanism
+        self.times: Array = np.array(times, dtype=float)
+        self.coordinates = mechanism.coordinate_names
+        self.values: Array = np.array(values, dtype=float).reshape(-1, count)
+        self.speeds: Array = np.array(speeds, dtype=float).reshape(-1, count)
+        self._report: Report | None = report
+
+    def __repr__(self) -> str:
+        return (
+            f"Trajectory of '{self.mechanism.name}': {len(self.times)} moments from {self.times[0]:g} to "
+            f"{self.times[-1]:g} s, {len(self.coordinates)} coordinates"
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What the report needs to work anything out cannot go to another process.
+        _ = self.forces, self.energy, self.summary
+        return {**self.__dict__, "_report": None}
+
+    @cached_property
+    def forces(self) -> Mapping[str, Array]:
+        """Columns (n,) of what the forces do, by the labels of OpenSim's ForceReporter, in SI units.
+
+        ``RFootForce.RightShank.force.X`` and its like are forces (N) and, about the body's origin, torques (N·m) on
+        bodies in ground; ``RKneeLimitTorque`` is a generalized force, ``RKneeLimitTorque.PotentialEnergy`` its energy
+        (J).
+        """
+        assert self._report is not None
+        labels, rows = self._report.forces()
+        table = np.array(rows, dtype=float).reshape(len(self.times), len(labels))
+        return {label: table[:, place] for place, label in enumerate(labels)}
+
+    @cached_property
+    def energy(self) -> Mapping[str, Array]:
+        """Columns (n,) ``kinetic``, ``gravity``, ``stored`` (in contacts and limit springs) and ``total``, in J."""
+        assert self._report is not None
+        table = np.array(self._report.energies(), dtype=float).reshape(len(self.times), 3)
+        parts = dict(zip(("kinetic", "gravity", "stored"), table.T, strict=True))
+        return {**parts, "total": table.sum(axis=1)}
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Counts, settings, energies, contact events and largest forces, as they are written to summary.json."""
+        assert self._report is not None
+        return self._report.summary()
+
+    def to_sto(self, path: str | Path) -> None:
+        """Write the states with OpenSim's column names, whole or not at all.
+
+        Raises:
+            OsimliteError: the file cannot be written.
+        """
+        write_atomically(path, self.states_text())
+
+    def to_frame(self) -> Any:
+        """All values, speeds and forces as a pandas DataFrame over time; speeds are called ``<coordinate>/speed``.
+
+        Raises:
+            MissingDependency: pandas is not installed.
+        """
+        pandas = require("pandas", extra="frame", purpose="a data frame")
+        columns: dict[str, Array] = {}
+        for place, name in enumerate(self.coordinates):
+            columns[name] = self.values[:, place]
+            columns[f"{name}/speed"] = self.speeds[:, place]
+        return pandas.DataFrame({**columns, **self.forces}, index=pandas.Index(self.times, name="time"))
+
+    def states_text(self) -> str:
+        """The text of states.sto: value and speed of every coordinate, in the order of OpenSim's states."""
+        paths = [info.path for info in self.mechanism.coordinates]
+        columns = [f"{path}/{what}" for path in paths for what in ("value", "speed")]
+        rows = np.stack([self.values, self.speeds], axis=2).reshape(len(self.times), -1)
+        return sto_text(self.mechanism.name, self.times.tolist(), columns, rows.tolist())
+
+    def forces_text(self) -> str:
+        """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
+        # There, the energy of every limit force has one and the same label.
+        labels = ["PotentialEnergy" if label.endswith(".PotentialEnergy") else label for label in self.forces]
+        rows = np.array([*self.forces.values()]).reshape(len(labels), len(self.times)).T
+        return sto_text("ModelForces", self.times.tolist(), labels, rows.tolist())
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write ``states.sto``, ``forces.sto`` and ``summary.json`` into a folder, which is made if it is not there.
+
+        Raises:
+            OsimliteError: the folder cannot be made or a file cannot be written.
+        """
+        base = Path(folder)
+        texts = {
+            "states.sto": self.states_text(),
+            "forces.sto": self.forces_text(),
+            "summary.json": json.dumps(self.summary, indent=2, ensure_ascii=False) + "\n",
+        }
+        try:
+            base.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(base)) from None
+        for name, text in texts.items():
+            write_atomically(base / name, text)
+        return [base / name for name in texts]
+
+
+class Report:
+    """How a trajectory gets what it works out later.
+
+    Args:
+        forces: labels, and one row for each moment.
+        energies: kinetic energy, potential energy of gravity and stored energy at each moment, J.
+        summary: what goes into summary.json.
+    """
+
+    def __init__(
+        self,
+        forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]],
+        energies: Callable[[], Sequence[Sequence[float]]],
+        summary: Callable[[], dict[str, Any]],
+    ) -> None:
+        self.forces = forces
+        self.energies = energies
+        self.summary = summary
