@@ -134,7 +134,7 @@ class _Printer:
             # OpenSim closes empty lists of its first property system like this, and all else with an end tag.
             short = not text and spec.legacy and kind.shape == "list"  # type: ignore[attr-defined]
             self.lines.append(f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>")
-        elif kind.form == "single":
+        elif kind.form == "single" and not (isinstance(value, Unknown) and value.class_name in field_specs(type(item))):
             self.object(value, spec.tag, depth)
         elif kind.form == "unnamed":
             self.object(value, value.name, depth)

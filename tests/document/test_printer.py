@@ -67,6 +67,18 @@ def test_markup_in_texts_is_escaped() -> None:
     assert osimlite.read_text(osimlite.to_text(model)) == model
 
 
+def test_an_unknown_object_called_like_a_property_keeps_its_wrapper() -> None:
+    axis = "<function> <function> <scale>2</scale> </function> </function>"
+    text = (
+        '<OpenSimDocument Version="40600"><Model> <JointSet> <objects> <CustomJoint name="j"> <SpatialTransform> '
+        f'<TransformAxis name="rotation1"> {axis} </TransformAxis> </SpatialTransform> </CustomJoint> </objects> '
+        "</JointSet> </Model></OpenSimDocument>"
+    )
+    printed = osimlite.to_text(osimlite.read_text(text))
+    assert "<scale>2</scale>" in printed
+    assert osimlite.to_text(osimlite.read_text(printed)) == printed
+
+
 def test_what_was_never_set_is_not_printed() -> None:
     model = Model(name="m")
     model.add(Body(name="b"))
