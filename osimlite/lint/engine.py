@@ -17,6 +17,7 @@ from osimlite.document.survey import survey
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
 from osimlite.lint.subject import Subject
+from osimlite.lint.suppressions import suppressions
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
 
@@ -132,12 +133,33 @@ def run(subject: Subject) -> Report:
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
+    if subject.source is not None and "osimlite:" in subject.source.text:
+        findings = _not_ignored(subject, findings)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
     report = Report(unique)
     if unique and subject.source is not None and subject.source.file is not None:
         report.texts[subject.source.file] = subject.source.text
     return report
+
+
+def _not_ignored(subject: Subject, findings: list[Finding]) -> list[Finding]:
+    """The findings without those that a comment of the file ignores, and with one for each comment without use."""
+    assert subject.source is not None
+    comments = suppressions(subject.source)
+    kept = [finding for finding in findings if not any([comment.covers(finding) for comment in comments])]
+    unused = next(known for known in all_rules() if known.name == "unused-ignore")
+    if subject.config.wants(unused):
+        found = _collector(unused, subject, kept)
+        for comment in comments:
+            for code in comment.codes:
+                # Of a rule that did not run nobody can say that nothing was found.
+                ran = any(known.matches(code) and subject.config.wants(known) for known in all_rules())
+                if code not in comment.used and (ran or not any(known.matches(code) for known in all_rules())):
+                    found(f"nothing is found here that '{code}' would ignore", at=comment.place)
+            if not comment.codes:
+                found("this comment names no code to ignore", at=comment.place)
+    return kept
 
 
 def _applies(known: Rule, subject: Subject) -> bool:
@@ -179,7 +201,8 @@ def _collector(known: Rule, subject: Subject, findings: list[Finding]) -> Found:
                 max(1, length),
                 subject.path(item),
                 suggestion,
-                fix,
+                # What is said of an upgraded document need not be said of its text.
+                None if subject.upgraded else fix,
             )
         )
 

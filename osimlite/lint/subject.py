@@ -32,6 +32,7 @@ class Subject:
         self.notes: list[Note] = []
         self.sure_until: int | None = None
         self.version: int | None = None
+        self.upgraded = False
         self.kept: dict[str, object] = {}
         # The uses are kept alive by `uses`, so that their identities stay theirs.
         self._resolutions: dict[int, Resolution] = {}
@@ -44,6 +45,7 @@ class Subject:
             self.model = found.document.model if found.document else None
             self.notes = found.document.notes if found.document else []
             self.version = found.document.version if found.document else None
+            self.upgraded = bool(found.document and found.document.changes)
 
     @property
     def file(self) -> str | None:

@@ -85,3 +85,38 @@ def test_the_table_and_the_page_of_a_rule():
     page = run("rule", "osim301").stdout
     assert page.startswith("# unresolved-reference (OSIM301, error)\n")
     assert "## Use instead" in page
+
+
+def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):
+    path = tmp_path / "walker.osim"
+    path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "rfootcontact PlatformContact"))
+    before = path.read_text()
+    shown = run("validate", path, "--diff")
+    assert shown.returncode == 1 and path.read_text() == before
+    assert "+++" in shown.stdout and "RFootContact PlatformContact" in shown.stdout
+    done = run("validate", path, "--fix")
+    assert done.returncode == 0 and "Mended 1 place." in done.stderr
+    assert path.read_text() == WALKER.read_text()
+
+
+def test_unsafe_fixes_must_be_asked_for(faulty):
+    before = faulty.read_text()
+    assert run("validate", faulty, "--fix").returncode == 1
+    assert faulty.read_text() == before
+    assert run("validate", faulty, "--unsafe-fixes").returncode == 0
+    assert faulty.read_text() == WALKER.read_text()
+
+
+def test_a_baseline_lets_an_old_repository_begin(faulty):
+    baseline = faulty.parent / "baseline.json"
+    assert run("validate", faulty, "--write-baseline", baseline).returncode == 0
+    done = run("validate", faulty, "--baseline", baseline)
+    assert done.returncode == 0 and done.stdout == "Nothing found in 1 model.\n"
+
+
+def test_settings_of_the_project_hold(faulty):
+    (faulty.parent / "pyproject.toml").write_text('[tool.osimlite]\nignore = ["OSIM3", "OSIM5"]\nfail-on = "info"\n')
+    assert run("validate", faulty).returncode == 0
+    (faulty.parent / "pyproject.toml").write_text("[tool.osimlite]\nignores = []\n")
+    done = run("validate", faulty)
+    assert done.returncode == 2 and "did you mean 'ignore'?" in done.stderr

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from osimlite.document.lexical import shortest
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
@@ -340,7 +342,8 @@ def inverted_range(subject: Subject, found: Found) -> None:
                 coordinate,
                 tag="range",
                 severity=ERROR if coordinate.clamped else None,
-                suggestion=f"{quantity(high)} {quantity(low)}",
+                suggestion=(better := f"{shortest(high)} {shortest(low)}"),
+                fix=replaced(subject.source, subject.position(coordinate, tag="range"), better, safe=False),
             )
 
 

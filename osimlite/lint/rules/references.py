@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple, cast
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Object, Unknown, reference_specs
@@ -247,14 +248,14 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     last = text.rstrip("/").rpartition("/")[2]
     same_name = [word for word in right if word.rpartition("/")[2] == last]
     if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
-        return Broken(use, text, "form", None, _closest(text, same_name))
+        return Broken(use, text, "form", None, _closest(text, same_name), "" if len(same_name) == 1 else "several")
     other = resolution.found or _elsewhere(subject, use, text)
     if other is not None and not same_name:
         return Broken(use, text, "wrong-type", other, nearest(text, right, cutoff=75))
     if same_name and resolution.failure == "wrong-type":
         if other is not None and text.startswith("/"):
             return Broken(use, text, "wrong-type", other, _closest(text, same_name))
-        return Broken(use, text, "form", None, _closest(text, same_name))
+        return Broken(use, text, "form", None, _closest(text, same_name), "" if len(same_name) == 1 else "several")
     lowered = [word for word in right if word.lower() == text.lower()]
     if lowered:
         return Broken(use, text, "case", None, lowered[0])
@@ -344,6 +345,10 @@ def _special(use: Use, text: str) -> bool:
     return use.position == 0 and text.lower() == "all" and use.reference.rule in ("actuator-name", "joint-name")
 
 
+def _has_ignored_parts(subject: Subject, owner: Component) -> bool:
+    return any(note.owner is owner and note.kind in ("unknown-tag", "unknown-class") for note in subject.notes)
+
+
 def _names(subject: Subject, use: Use) -> str:
     """``HuntCrossleyForce 'foot': geometry names``."""
     return f"{_holder(subject, use)}: {use.spec.tag} names"
@@ -370,6 +375,13 @@ def _report(subject: Subject, found: Found, broken: Broken, message: str) -> Non
     # OpenSim drops what a group names wrongly and goes on.
     severity = WARNING if use.reference.rule == "set-member" else None
     by_name = use.spec.name == "name"
+    place = None if by_name else subject.position(use.holder, tag=use.spec.tag, word=broken.text, nth=nth)
+    certain = broken.hint == "comma" or (broken.why in ("case", "form") and not broken.hint)
+    # A frame deep in another component only happens to have the name.
+    certain = certain and (broken.suggestion or "").count("/") < 3
+    if _has_ignored_parts(subject, use.owner):
+        # What OpenSim ignores here may hold what is meant.
+        place = None
     found(
         message,
         use.holder,
@@ -379,4 +391,5 @@ def _report(subject: Subject, found: Found, broken: Broken, message: str) -> Non
         nth=nth,
         suggestion=broken.suggestion,
         severity=severity,
+        fix=replaced(subject.source, place, broken.suggestion, safe=certain),
     )

@@ -6,6 +6,7 @@ import re
 
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.fixes import renamed, replaced, without_attribute, without_element, without_text
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, shown
 from osimlite.schema.base import FieldSpec, Object, field_specs
@@ -51,7 +52,10 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         else:
             homes = _homes(note.word)
             message += f": it is a property of {listed(homes, most=3)}" if homes else ""
-        found(message, owner, number=note.number, suggestion=suggestion)
+        same = suggestion is not None and suggestion.lower() == note.word.lower()
+        free = suggestion is not None and suggestion not in _present(owner)
+        fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None
+        found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
 
 
 @rule("OSIM102", "unknown-class", severity=ERROR)
@@ -87,7 +91,9 @@ def unknown_class(subject: Subject, found: Found) -> None:
         message = f"OpenSim has no class '{note.word}' and {fate}"
         if suggestion is None:
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
-        found(message, owner, number=note.number, suggestion=suggestion)
+        same = suggestion is not None and suggestion.lower() == note.word.lower()
+        fix = renamed(subject.source, note.number, suggestion, safe=same)
+        found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
 
 
 @rule("OSIM103", "wrong-class", severity=ERROR)
@@ -155,6 +161,7 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
             f"{called(owner)} has <{note.word}> more than once; OpenSim takes the first{taken} and ignores this one",
             owner,
             number=note.number,
+            fix=without_element(subject.source, note.number),
         )
 
 
@@ -183,7 +190,8 @@ def unknown_attribute(subject: Subject, found: Found) -> None:
         if note.word in field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
         suggestion = "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
-        found(message, owner, at=subject.attribute_name(note.number, note.word), suggestion=suggestion)
+        fix = without_attribute(subject.source, note.number, note.word) if suggestion is None else None
+        found(message, owner, at=subject.attribute_name(note.number, note.word), suggestion=suggestion, fix=fix)
 
 
 @rule("OSIM106", "stray-text", severity=WARNING)
@@ -224,7 +232,9 @@ def stray_text(subject: Subject, found: Found) -> None:
         if any(first < start < last for first, last in in_values):
             continue
         text = plain[start:end].strip().splitlines()[0]
-        found(f"OpenSim ignores the text '{text}' between elements", at=source.position(start, len(text)))
+        begin = start + len(plain[start:end]) - len(plain[start:end].lstrip())
+        whole = without_text(source, begin, begin + len(plain[start:end].strip()))
+        found(f"OpenSim ignores the text '{text}' between elements", at=source.position(start, len(text)), fix=whole)
 
 
 @rule("OSIM107", "element-in-value", severity=ERROR)
@@ -292,6 +302,9 @@ def wrong_part_name(subject: Subject, found: Found) -> None:
                 number=note.number,
                 attribute="name",
                 suggestion=spec.tag,
+                fix=replaced(
+                    subject.source, subject.position(None, number=note.number, attribute="name"), spec.tag, safe=False
+                ),
             )
 
 
@@ -364,7 +377,8 @@ def defaults_block(subject: Subject, found: Found) -> None:
     if number is not None and source.children(number):
         found("<defaults> changes the defaults of every model loaded from now on", model, number=number)
     elif number is not None:
-        found("<defaults> is empty and can go", model, number=number, severity=INFO)
+        fix = without_element(source, number)
+        found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
 
 
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")

@@ -6,7 +6,8 @@ import re
 
 from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError, VersionError
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -74,14 +75,46 @@ def lenient_xml(subject: Subject, found: Found) -> None:
             offset = _word_behind(subject.source, max(offset + 1, subject.source.line_start(note.line or 1)), note.word)
             found(
                 f"'{note.word}' is not XML here; OpenSim reads it, others refuse the file",
-                at=subject.source.position(offset, len(note.word)),
+                at=(place := subject.source.position(offset, len(note.word))),
                 suggestion=meant[note.kind],
+                fix=replaced(subject.source, place, meant[note.kind].replace("&amp;", f"&amp;{note.word[1:]}")),
             )
 
 
 def _word_behind(source: Source, start: int, word: str) -> int:
     place = source.text.find(word, start)
     return place if place >= 0 else start
+
+
+@rule("OSIM010", "unused-ignore", severity=INFO)
+def unused_ignore(subject: Subject, found: Found) -> None:
+    """A comment ignores what is not there.
+
+    ## What it does
+    Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place. Such a comment speaks
+    of its own line, or alone on a line of the element that follows, or before the root element of the whole file.
+
+    ## Why is this bad
+    The fault was mended and the comment was forgotten; it would hide the next one.
+
+    ## Example
+    ```xml
+    <Body name="thigh">
+        <!-- osimlite: ignore OSIM203 -->
+        <mass>8</mass>
+        <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh">
+        <mass>8</mass>
+        <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    </Body>
+    ```
+    """
+    # The engine knows what was ignored, and reports it in the name of this rule.
 
 
 @rule("OSIM002", "encoding", severity=WARNING)
@@ -328,8 +361,9 @@ def character_reference(subject: Subject, found: Found) -> None:
         if 127 < number < 0x110000:
             found(
                 f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character itself",
-                at=source.position(match.start(), len(match[0])),
+                at=(place := source.position(match.start(), len(match[0]))),
                 suggestion=chr(number),
+                fix=replaced(source, place, chr(number)),
             )
 
 

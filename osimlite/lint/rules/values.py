@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from osimlite.document.lexical import Unclean, flag, real, whole
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity, shown
 from osimlite.schema.base import FieldSpec, Object, field_specs, value_specs
@@ -51,7 +52,8 @@ def unreadable_value(subject: Subject, found: Found) -> None:
             owner,
             number=note.number,
             word=note.word,
-            suggestion=_readable(text, kind),
+            suggestion=(better := _readable(text, kind)),
+            fix=replaced(subject.source, subject.position(owner, tag=spec.tag), better) if "\n" not in text else None,
         )
 
 
@@ -115,7 +117,8 @@ def cut_number(subject: Subject, found: Found) -> None:
             owner,
             number=note.number,
             word=note.word,
-            suggestion=_whole_number(note.word),
+            suggestion=(better := _whole_number(note.word)),
+            fix=replaced(subject.source, subject.position(owner, tag=spec.tag, word=note.word), better, safe=False),
         )
 
 

@@ -1,0 +1,49 @@
+"""A baseline: the findings an old repository has and does not want to hear of again."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+
+from osimlite.errors import OsimliteError
+from osimlite.files import write_atomically
+from osimlite.lint.diagnostic import Finding, Report
+
+_FORMAT = 1
+
+
+def write_baseline(path: str | Path, report: Report) -> int:
+    """Write the findings of a report as the baseline, and return how many there are."""
+    counts = Counter(map(_key, report.findings))
+    findings = [[*key, count] for key, count in sorted(counts.items())]
+    text = json.dumps({"format": _FORMAT, "findings": findings}, indent=1, ensure_ascii=False) + "\n"
+    write_atomically(path, text)
+    return len(report.findings)
+
+
+def without_baseline(path: str | Path, report: Report) -> Report:
+    """The report without what the baseline has, each as often as it has it. Lines may have moved since.
+
+    Raises:
+        OsimliteError: the file is missing or is no baseline.
+    """
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        counts = Counter({tuple(key): int(count) for *key, count in data["findings"]})
+    except OSError as error:
+        raise OsimliteError(f"cannot read the baseline: {error.strerror}", file=str(path)) from None
+    except (ValueError, KeyError, TypeError):
+        raise OsimliteError("this is no baseline; write one with --write-baseline", file=str(path)) from None
+    kept = []
+    for finding in report.findings:
+        if counts[_key(finding)] > 0:
+            counts[_key(finding)] -= 1
+        else:
+            kept.append(finding)
+    return Report(kept, report.texts, report.checked)
+
+
+def _key(finding: Finding) -> tuple[str, str, str, str]:
+    file = Path(finding.file).as_posix() if finding.file is not None else ""
+    return finding.code, file, finding.component, finding.message

@@ -1,0 +1,122 @@
+"""Settings of a project: ``[tool.osimlite]`` of the nearest pyproject.toml, or an osimlite.toml."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from osimlite.errors import OsimliteError
+from osimlite.lint.config import Config, checked_words
+from osimlite.lint.diagnostic import Severity
+from osimlite.text import did_you_mean, listed
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a project asks for. `file` is where it says so; paths and patterns in it count from that folder."""
+
+    file: Path | None = None
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+    per_file_ignores: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    severity: Mapping[str, Severity] = field(default_factory=dict)
+    mesh_paths: tuple[str, ...] = ()
+    fail_on: Severity | None = None
+
+    def config_for(self, path: str | Path, overriding: Config) -> Config:
+        """The configuration of one file; what `overriding` says comes before what the project says."""
+        return Config(
+            overriding.select or self.select,
+            (*self.ignore, *self._ignored_in(Path(path)), *overriding.ignore),
+            {**self.severity, **overriding.severity},
+            (*overriding.mesh_paths, *self.mesh_paths),
+        )
+
+    def _ignored_in(self, path: Path) -> tuple[str, ...]:
+        if not self.per_file_ignores or self.file is None:
+            return ()
+        try:
+            relative = path.resolve().relative_to(self.file.parent.resolve()).as_posix()
+        except ValueError:
+            relative = path.as_posix()
+        codes = (
+            words
+            for pattern, words in self.per_file_ignores.items()
+            if fnmatch(relative, pattern) or fnmatch(path.name, pattern)
+        )
+        return tuple(code for words in codes for code in words)
+
+
+@cache
+def settings_for(folder: Path) -> Settings:
+    """The settings that hold in a folder: those of the nearest file that has any.
+
+    Raises:
+        OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.
+    """
+    for place in (folder, *folder.parents):
+        for name in ("osimlite.toml", "pyproject.toml"):
+            file = place / name
+            if not file.is_file():
+                continue
+            table = _table(file, whole=name == "osimlite.toml")
+            if table is not None:
+                return _settings(file, table)
+    return Settings()
+
+
+def _table(file: Path, *, whole: bool) -> dict[str, Any] | None:
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise OsimliteError(f"this is no TOML: {error}", file=str(file)) from None
+    except OSError as error:
+        raise OsimliteError(f"cannot read the settings: {error.strerror}", file=str(file)) from None
+    table = data if whole else data.get("tool", {}).get("osimlite")
+    return table if isinstance(table, dict) else None
+
+
+def _settings(file: Path, table: dict[str, Any]) -> Settings:
+    known = ("select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on")
+    for key in table:
+        if key not in known:
+            raise OsimliteError(
+                f"there is no setting '{key}'{did_you_mean(key, known)} Settings are {listed(known)}", file=str(file)
+            )
+    try:
+        return Settings(
+            file,
+            checked_words(_words(table, "select")),
+            checked_words(_words(table, "ignore")),
+            {pattern: checked_words(words) for pattern, words in _mapping(table, "per-file-ignores").items()},
+            {checked_words([code])[0]: _severity(word) for code, word in _mapping(table, "severity").items()},
+            tuple(str(file.parent.resolve() / path) for path in _words(table, "mesh-paths")),
+            _severity(table["fail-on"]) if "fail-on" in table else None,
+        )
+    except OsimliteError as error:
+        raise OsimliteError(error.message, file=str(file)) from None
+
+
+def _words(table: dict[str, Any], key: str) -> list[str]:
+    value = table.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
+        raise OsimliteError(f"'{key}' must be a list of texts")
+    return value
+
+
+def _mapping(table: dict[str, Any], key: str) -> dict[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise OsimliteError(f"'{key}' must be a table")
+    return value
+
+
+def _severity(word: object) -> Severity:
+    if word not in tuple(Severity):
+        raise OsimliteError(f"a severity is one of {listed(Severity)}, not '{word}'")
+    return Severity(str(word))

@@ -1,0 +1,58 @@
+"""``<!-- osimlite: ignore OSIM203 -->``: findings that the author of a file has looked at."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from osimlite.document.source import Position, Source
+from osimlite.lint.diagnostic import Finding
+
+_COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^>]*?)-->")
+
+
+@dataclass(slots=True)
+class Suppression:
+    """One comment: the codes it names, the lines it speaks of, and the codes that were found there."""
+
+    place: Position
+    codes: tuple[str, ...]
+    first: int
+    last: int
+    used: set[str] = field(default_factory=set)
+
+    def covers(self, finding: Finding) -> bool:
+        """Whether the finding is one of those the comment is about; it is noted as used then."""
+        if finding.line is None or not self.first <= finding.line <= self.last:
+            return False
+        code = next((code for code in self.codes if finding.code.startswith(code) or finding.name == code), None)
+        if code is None:
+            return False
+        self.used.add(code)
+        return True
+
+
+def suppressions(source: Source) -> list[Suppression]:
+    """Every ignoring comment of a text.
+
+    Before the root element it speaks of the whole file, alone on its line of the element that follows, at the end of a
+    line of that line.
+    """
+    if "osimlite:" not in source.text:
+        return []
+    found = []
+    root = source.spans[0].start if source.spans else len(source.text)
+    for match in _COMMENT.finditer(source.text):
+        place = source.position(match.start(), match.end() - match.start())
+        words = tuple(word for word in re.split(r"[\s,]+", match[1]) if word)
+        codes = tuple(word.upper() if word.upper().startswith("OSIM") else word for word in words)
+        line_before = source.text[source.text.rfind("\n", 0, match.start()) + 1 : match.start()]
+        first = last = place.line
+        if match.start() < root:
+            first, last = 1, len(source.lines)
+        elif not line_before.strip():
+            following = next((span for span in source.spans if span.start >= match.end()), None)
+            if following is not None:
+                last = source.position(following.end - 1).line
+        found.append(Suppression(place, codes, first, last))
+    return found

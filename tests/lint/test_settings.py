@@ -1,0 +1,100 @@
+"""Settings of a project, comments that ignore, and baselines."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.errors import OsimliteError
+from osimlite.lint import Config, Severity, validate
+from osimlite.lint.baseline import without_baseline, write_baseline
+from osimlite.lint.settings import settings_for
+
+TEXT = """\
+<OpenSimDocument Version="40600">
+<Model name="m">
+<gravity>0 -9806 0</gravity>
+<foo/>
+</Model>
+</OpenSimDocument>
+"""
+
+
+def test_settings_come_from_the_nearest_file(tmp_path):
+    (tmp_path / "pyproject.toml").write_text(
+        '[tool.osimlite]\nignore = ["OSIM7"]\nmesh-paths = ["shapes"]\nfail-on = "warning"\n'
+        '[tool.osimlite.severity]\nstrange-gravity = "info"\n'
+        '[tool.osimlite.per-file-ignores]\n"old/*.osim" = ["structure"]\n'
+    )
+    (tmp_path / "old" / "deep").mkdir(parents=True)
+    found = settings_for(tmp_path / "old" / "deep")
+    assert found.file == tmp_path / "pyproject.toml" and found.fail_on is Severity.WARNING
+    old = found.config_for(tmp_path / "old" / "x.osim", Config(ignore=("OSIM505",)))
+    assert old.ignore == ("OSIM7", "structure", "OSIM505")
+    assert old.mesh_paths == (str(tmp_path / "shapes"),)
+    assert found.config_for(tmp_path / "x.osim", Config()).ignore == ("OSIM7",)
+    report = validate(Source(TEXT.encode()), config=found.config_for(tmp_path / "x.osim", Config()))
+    assert [(f.code, f.severity.value) for f in report] == [("OSIM505", "info"), ("OSIM101", "error")]
+
+
+def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed_over(tmp_path):
+    (tmp_path / "osimlite.toml").write_text('select = ["references"]\n')
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "pyproject.toml").write_text("[project]\nname = 'x'\n")
+    assert settings_for(tmp_path / "sub").select == ("references",)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("selct = []", "there is no setting 'selct'; did you mean 'select'?"),
+        ('select = ["OSIM999"]', "no rule has the code or name 'OSIM999'"),
+        ('select = "OSIM1"', "'select' must be a list of texts"),
+        ('severity = "error"', "'severity' must be a table"),
+        ('[severity]\nOSIM101 = "fatal"', "a severity is one of error, warning and info, not 'fatal'"),
+        ("select = [", "this is no TOML"),
+    ],
+)
+def test_a_setting_that_makes_no_sense_names_its_file(text, words, tmp_path):
+    (tmp_path / "osimlite.toml").write_text(text)
+    with pytest.raises(OsimliteError) as caught:
+        settings_for(tmp_path)
+    assert words in str(caught.value) and "osimlite.toml" in str(caught.value)
+
+
+def test_a_comment_ignores_on_its_line_on_the_next_element_or_everywhere():
+    assert validate(Source(TEXT.encode())).codes == {"OSIM505": 1, "OSIM101": 1}
+    line = TEXT.replace("<foo/>", "<foo/> <!-- osimlite: ignore OSIM101 -->")
+    assert validate(Source(line.encode())).codes == {"OSIM505": 1}
+    above = TEXT.replace("<gravity>", "<!-- osimlite: ignore strange-gravity -->\n<gravity>")
+    assert validate(Source(above.encode())).codes == {"OSIM101": 1}
+    everywhere = "<!-- osimlite: ignore OSIM1, OSIM505 -->\n" + TEXT
+    assert not validate(Source(everywhere.encode())).findings
+
+
+def test_a_comment_that_ignores_nothing_is_found():
+    text = TEXT.replace("<foo/>", "<foo/> <!-- osimlite: ignore OSIM101 OSIM203 -->")
+    (finding,) = validate(Source(text.encode()), ignore="OSIM505").findings
+    assert finding.code == "OSIM010" and "'OSIM203'" in finding.message and finding.line == 4
+    # Of a rule that did not run nobody knows.
+    assert not validate(Source(text.encode()), ignore="OSIM505,OSIM203").findings
+
+
+def test_a_baseline_hides_what_it_knows_and_no_more(tmp_path):
+    path = tmp_path / "baseline.json"
+    old = validate(Source(TEXT.encode(), "m.osim"))
+    assert write_baseline(path, old) == 2
+    moved = Source(TEXT.replace("<foo/>", "\n\n<foo/><foo/>").encode(), "m.osim")
+    assert validate(moved).codes == {"OSIM505": 1, "OSIM101": 2}
+    assert without_baseline(path, validate(moved)).codes == {"OSIM101": 1}
+    assert json.loads(path.read_text())["format"] == 1
+
+
+def test_a_file_that_is_no_baseline_is_refused(tmp_path):
+    with pytest.raises(OsimliteError, match="cannot read the baseline"):
+        without_baseline(tmp_path / "absent.json", validate(Source(TEXT.encode())))
+    (tmp_path / "odd.json").write_text("[1]")
+    with pytest.raises(OsimliteError, match="this is no baseline"):
+        without_baseline(tmp_path / "odd.json", validate(Source(TEXT.encode())))
