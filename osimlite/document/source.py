@@ -159,8 +159,13 @@ class Source:
         return Position(line + 1, offset - self._line_starts[line] + 1, length)
 
     def of_tag(self, number: int) -> Position:
-        """Where the start tag of element `number` is: the ``<`` and the name."""
-        span = self.spans[number]
+        """Where the start tag of element `number` is: the ``<`` and the name.
+
+        Of a text that breaks off in a tag, the last tag before stands for what comes after it.
+        """
+        if not self.spans:
+            return self.position(0)
+        span = self.spans[min(number, len(self.spans) - 1)]
         return self.position(span.start, len(span.tag) + 1)
 
     def of_text(self, number: int, word: str | None = None, nth: int = 0) -> Position:

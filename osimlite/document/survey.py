@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
-from osimlite.document.reader import Document, document_of, parse, read_document
+from osimlite.document.reader import Document, document_of, parse, read_document, version_of
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.schema.model import CURRENT_VERSION
@@ -58,7 +58,11 @@ def _recovered(source: Source, fault: NotWellFormedError) -> Survey:
 
 def _assembled(found: Survey, root: etree._Element) -> Survey:
     try:
-        found.document = document_of(found.source, root, CURRENT_VERSION)
+        version = version_of(found.source, root)
+    except DocumentError:
+        version = CURRENT_VERSION
+    try:
+        found.document = document_of(found.source, root, version)
     except DocumentError as fault:
         found.faults.append(fault)
     return found

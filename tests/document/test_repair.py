@@ -9,6 +9,7 @@ import pytest
 from osimlite.document.printer import to_text
 from osimlite.document.reader import Document, read_document, read_text
 from osimlite.document.source import Source
+from osimlite.document.survey import survey
 from osimlite.errors import DocumentError
 
 HEAD = '<?xml version="1.0" encoding="UTF-8" ?>\n'
@@ -166,6 +167,21 @@ def test_half_a_character_of_two_bytes() -> None:
     data = TEXT.encode("utf-16")
     for cut in (data[:-1], data[:101], b"\xff\xfe", b"\xfe\xff\x00", b"\xff\xfe\x00\x00\x00"):
         Source(cut)
+
+
+@pytest.mark.parametrize("cut", range(0, len(TEXT), 7))
+def test_a_text_that_breaks_off_is_surveyed_as_far_as_it_goes(cut: int) -> None:
+    found = survey(Source(TEXT[:cut].encode()))
+    assert found.faults
+    assert all(fault.line is not None for fault in found.faults)
+
+
+def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
+    old = '<OpenSimDocument Version="30000"><Model name="m"><ForceSet><objects><CoordinateActuator name="c">'
+    found = survey(Source((old + "<isDisabled>true</isDisabled></CoordinateActuator></objects>").encode()))
+    assert found.document is not None
+    assert found.document.model["/forceset/c"].appliesForce is False
+    assert found.document.notes == []
 
 
 # Nothing hangs on any text
