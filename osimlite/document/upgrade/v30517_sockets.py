@@ -19,6 +19,8 @@ def connectors(draft: Draft) -> None:
         old = component.find("connectors")
         if old is None:
             continue
+        if not all(re.fullmatch(r"\w+", connector.get("name", "")) for connector in elements(old)):
+            continue
         for connector in elements(old):
             connectee = connector.find("connectee_name")
             text = "" if connectee is None else plain(connectee)

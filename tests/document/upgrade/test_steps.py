@@ -290,5 +290,12 @@ def test_an_included_file_is_upgraded_by_its_own_version(tmp_path: Path) -> None
     assert model["/markerset/m"].socket_parent_frame == "/ground"
 
 
+def test_a_connector_whose_name_makes_no_tag_stays_as_it_is() -> None:
+    ground = '<Ground name="ground"><connectors><C name="a b"><connectee_name>x</connectee_name></C></connectors></Ground>'
+    old = document(ground, 30507)
+    assert [note.word for note in old.notes] == ["connectors"]
+    assert '<C name="a b">' in to_text(old.model)
+
+
 def test_an_empty_old_model() -> None:
     assert read_text('<OpenSimDocument Version="20000"><Model name="a b"/></OpenSimDocument>').name == "ab"
