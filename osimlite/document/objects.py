@@ -23,7 +23,6 @@ from osimlite.schema.base import (
     Unknown,
     defaults,
     field_specs,
-    object_specs,
 )
 from osimlite.schema.fields import Held, ObjectList
 from osimlite.schema.model import Model
@@ -352,8 +351,7 @@ class ObjectReader:
         block = self.defaults.get(cls)
         if block is None:
             return frozenset()
-        wanted = block.model_fields_set | {spec.name for spec in object_specs(cls)}
-        taken = frozenset(wanted - values.keys() - {"name"})
+        taken = frozenset(block.model_fields_set - values.keys() - {"name"})
         for name in taken:
             values[name] = copy.deepcopy(getattr(block, name))
         return taken
