@@ -34,7 +34,7 @@ def connectors_renamed(draft: Draft) -> None:
     """What was a connector is a socket."""
     for component in draft.every("Component"):
         for child in elements(component):
-            if "connector" in child.tag:
+            if child.tag.startswith("connector_"):
                 draft.rename(child, child.tag.replace("connector", "socket", 1))
                 draft.changed(component, at=child)
 

@@ -291,8 +291,8 @@ def test_an_included_file_is_upgraded_by_its_own_version(tmp_path: Path) -> None
 
 
 def test_a_connector_whose_name_makes_no_tag_stays_as_it_is() -> None:
-    ground = '<Ground name="ground"><connectors><C name="a b"><connectee_name>x</connectee_name></C></connectors></Ground>'
-    old = document(ground, 30507)
+    connectors = '<connectors><C name="a b"><connectee_name>x</connectee_name></C></connectors>'
+    old = document(f'<Ground name="ground">{connectors}</Ground>', 30507)
     assert [note.word for note in old.notes] == ["connectors"]
     assert '<C name="a b">' in to_text(old.model)
 
