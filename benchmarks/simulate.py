@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import opensim
-from _pair import pair, pair_commands, report
 from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _pair import pair, pair_commands, report
 from osimlite.simulation import Simulation
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -86,7 +86,9 @@ def run_opensim(model: Any, accuracy: float, runs: int) -> Callable[[], list[flo
         ready.append(manager)
 
     def run() -> list[float]:
-        end = ready.pop().integrate(TO)
+        # The state it returns lives as long as the manager.
+        manager = ready.pop()
+        end = manager.integrate(TO)
         return [coordinates.get(place).getValue(end) for place in range(coordinates.getSize())]
 
     return run

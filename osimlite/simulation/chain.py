@@ -101,8 +101,9 @@ class Chain:
 
     def velocity(self, script: Script, columns: Sequence[Column], *, turning: bool = False) -> Vector:
         """Velocity of the point of some columns, or the angular velocity."""
-        pick = 1 if turning else 2
-        return script.combine(*((f"r{column.joint}", column[pick]) for column in columns))
+        return script.combine(
+            *((f"r{column.joint}", column.turning if turning else column.moving) for column in columns)
+        )
 
     # --------------------------------------------------------------------------------------------- helpers
     def _axis(self, script: Script, joint: int) -> tuple[Vector, Vector]:

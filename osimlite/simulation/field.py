@@ -178,7 +178,9 @@ class ForceField:
 
     def stored_energy(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> float:
         """Potential energy of all force elements, J."""
-        return sum(value[-1] for _, values, _ in self._reported(q, rates, u) for value in values if value is not None)
+        return sum(
+            float(value[-1]) for _, values, _ in self._reported(q, rates, u) for value in values if value is not None
+        )
 
     def energies(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, and energy stored in the force elements, J."""

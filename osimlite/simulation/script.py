@@ -84,7 +84,8 @@ class Script:
         """A sum of products: a number if all is known, a variable that equals it if there is one."""
         constant, products = 0.0, dict[tuple[str, ...], float]()
         for term in terms:
-            factor, names = 1.0, []
+            factor = 1.0
+            names: list[str] = []
             for scalar in term:
                 if isinstance(scalar, str):
                     names.append(scalar)
@@ -95,13 +96,13 @@ class Script:
             elif factor != 0.0:
                 key = tuple(sorted(names))
                 products[key] = products.get(key, 0.0) + factor
-        products = {names: factor for names, factor in products.items() if factor != 0.0}
+        products = {key: factor for key, factor in products.items() if factor != 0.0}
         if not products:
             return constant
         if constant == 0.0 and len(products) == 1:
-            ((names, factor),) = products.items()
-            if factor == 1.0 and len(names) == 1:
-                return names[0]
+            ((key, factor),) = products.items()
+            if factor == 1.0 and len(key) == 1:
+                return key[0]
         return self._named(constant, products)
 
     def _named(self, constant: float, products: dict[tuple[str, ...], float]) -> str:

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite.errors import UnsupportedError
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
 
 
 class Speeds:
@@ -84,10 +86,10 @@ class Speeds:
         return result
 
 
-def _pick(values: Sequence[float], joints: Sequence[int]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _pick(values: Sequence[float], joints: Sequence[int]) -> Array:
     return np.array([values[joint] for joint in joints])
 
 
-def _put(values: list[float], joints: Sequence[int], own: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-    for joint, value in zip(joints, own.tolist(), strict=True):
+def _put(values: list[float], joints: Sequence[int], own: ArrayLike) -> None:
+    for joint, value in zip(joints, np.asarray(own).tolist(), strict=True):
         values[joint] = value
