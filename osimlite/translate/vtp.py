@@ -1,0 +1,201 @@
+"""Reading surfaces in VTK's XML format (``.vtp``, PolyData), in every encoding that VTK writes.
+
+The format: https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html. Numbers stand as text, or as
+base64 in place, or after the tree, raw or as base64; either of the last three may be compressed in blocks. Vertices
+and lines have no surface and are passed over.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import lzma
+import re
+import zlib
+from collections.abc import Callable
+
+import numpy as np
+from lxml import etree
+from numpy.typing import NDArray
+
+from osimlite.errors import OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.translate.surface import Indices, Surface, strip_triangles, triangulated
+
+_DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
+    "vtkZLibDataCompressor": zlib.decompress,
+    "vtkLZMADataCompressor": lzma.decompress,
+}
+
+_TYPES = {
+    **{f"Int{bits}": f"i{bits // 8}" for bits in (8, 16, 32, 64)},
+    **{f"UInt{bits}": f"u{bits // 8}" for bits in (8, 16, 32, 64)},
+    "Float32": "f4",
+    "Float64": "f8",
+}
+
+
+class _Unreadable(Exception):
+    """What is wrong with a file, without its name."""
+
+
+def read_vtp(content: bytes, name: str) -> Surface:
+    """The surface in a ``.vtp`` file, its polygons cut into triangles.
+
+    Args:
+        content: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        OsimliteError: it is not such a file, is damaged, or is compressed in a way that osimlite does not know.
+    """
+    try:
+        # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the way.
+        with np.errstate(all="ignore"):
+            return _File(content).surface()
+    except _Unreadable as problem:
+        raise OsimliteError(f"{problem}; save it again as PolyData (.vtp) or as .obj", file=name) from None
+
+
+class _File:
+    def __init__(self, content: bytes) -> None:
+        # What is appended may be no XML at all, so it is cut out before the rest is read.
+        self.appended = b""
+        mark = content.find(b"<AppendedData")
+        if mark >= 0:
+            first, last = content.find(b"_", content.find(b">", mark)) + 1, content.rfind(b"</AppendedData")
+            if not 0 < first <= last:
+                raise _Unreadable("the file ends in the middle")
+            self.appended, content = content[first:last], content[:first] + content[last:]
+        try:
+            parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
+            self.root = etree.fromstring(content, parser)
+        except etree.XMLSyntaxError as error:
+            raise _Unreadable(f"it is not a VTK file in XML ({error.msg})") from None
+        if self.root.tag != "VTKFile" or self.root.get("type") != "PolyData":
+            raise _Unreadable("it is not a VTK file with a surface (type PolyData)")
+        section = self.root.find("AppendedData")
+        self.raw = section is not None and section.get("encoding") == "raw"
+        self.order = ">" if self.root.get("byte_order") == "BigEndian" else "<"
+        self.header = np.dtype(self.order + _TYPES.get(self.root.get("header_type", "UInt32"), "u4"))
+        self.compressor = self.root.get("compressor", "")
+        try:
+            offsets = {int(array.get("offset", "0")) for array in self.root.iter("DataArray")}
+        except ValueError:
+            raise _Unreadable("one of its offsets is no number") from None
+        self.offsets = [*sorted(offsets), len(self.appended)]
+
+    def surface(self) -> Surface:
+        points, triangles, normals = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros((0, 3))]
+        count, all_normals = 0, True
+        for piece in self.root.iterfind("PolyData/Piece"):
+            own = self._vectors(piece.find("Points/DataArray"))
+            points.append(own)
+            triangles += [part + count for part in self._triangles(piece, own)]
+            at_points = self._normals(piece, len(own))
+            all_normals = all_normals and at_points is not None
+            normals += [] if at_points is None else [at_points]
+            count += len(own)
+        found = np.concatenate(triangles)
+        if not len(found):
+            raise _Unreadable("it has no polygons")
+        return Surface(np.concatenate(points), found, np.concatenate(normals) if all_normals else None)
+
+    def _triangles(self, piece: etree._Element, points: Array) -> list[Indices]:
+        corners, ends = self._cells(piece, "Polys", len(points))
+        parts = [triangulated(points, corners, ends)] if len(ends) else []
+        corners, ends = self._cells(piece, "Strips", len(points))
+        strips = np.split(corners, ends[:-1]) if len(ends) else []
+        return parts + [strip_triangles(strip) for strip in strips if len(strip) >= 3]
+
+    def _cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
+        """Corners of all cells of a kind, one after the other, and where each cell ends."""
+        corners, ends = (
+            np.zeros(0, dtype=np.int64) if array is None else self._numbers(array).astype(np.int64)
+            for array in (piece.find(f"{tag}/DataArray[@Name='{name}']") for name in ("connectivity", "offsets"))
+        )
+        if not len(ends):
+            return corners[:0], ends
+        if ends[0] < 0 or np.any(np.diff(ends) < 0) or ends[-1] > len(corners):
+            raise _Unreadable(f"the offsets of its {tag} do not fit their connectivity")
+        corners = corners[: ends[-1]]
+        if len(corners) and not 0 <= corners.min() <= corners.max() < count:
+            raise _Unreadable(f"its {tag} name points that are not there")
+        return corners, ends
+
+    def _normals(self, piece: etree._Element, count: int) -> Array | None:
+        data = piece.find("PointData")
+        if data is None:
+            return None
+        wanted = data.get("Normals", "Normals")
+        array = next((item for item in data.iterfind("DataArray") if item.get("Name") == wanted), None)
+        if array is None or array.get("NumberOfComponents") != "3":
+            return None
+        normals = self._vectors(array)
+        return normals if len(normals) == count else None
+
+    def _vectors(self, array: etree._Element | None) -> Array:
+        if array is None:
+            raise _Unreadable("it has a piece without points")
+        numbers = self._numbers(array).astype(np.float64)
+        if len(numbers) % 3 or not np.isfinite(numbers).all():
+            raise _Unreadable(f"its {array.get('Name', 'points')} are not three finite numbers each")
+        return numbers.reshape(-1, 3)
+
+    def _numbers(self, array: etree._Element) -> NDArray[np.generic]:
+        """The numbers of a DataArray."""
+        kind, form = array.get("type", ""), array.get("format", "ascii")
+        if kind not in _TYPES:
+            raise _Unreadable(f"it has numbers of the type '{kind}'")
+        dtype = np.dtype(self.order + _TYPES[kind])
+        try:
+            match form:
+                case "ascii":
+                    return np.array((array.text or "").split(), dtype=dtype)
+                case "binary":
+                    data = self._payload(_base64((array.text or "").encode()))
+                case "appended":
+                    data = self._payload(self._after(int(array.get("offset", "0"))))
+                case _:
+                    raise _Unreadable(f"it has numbers in the format '{form}'")
+            return np.frombuffer(data, dtype)
+        except (ValueError, IndexError, OverflowError, binascii.Error, zlib.error, lzma.LZMAError):
+            raise _Unreadable(f"its numbers named '{array.get('Name', '')}' are damaged or cut off") from None
+
+    def _after(self, offset: int) -> bytes:
+        """The bytes of the array that starts at an offset of what is appended."""
+        if not 0 <= offset < len(self.appended):
+            raise ValueError
+        end = next(place for place in self.offsets if place > offset)
+        part = self.appended[offset:end]
+        return part if self.raw else _base64(part)
+
+    def _payload(self, stream: bytes) -> bytes:
+        """What a block of bytes holds after its header, decompressed."""
+        width = self.header.itemsize
+        if not self.compressor:
+            size = int(np.frombuffer(stream, self.header, 1)[0])
+            data = stream[width : width + size]
+            if len(data) != size:
+                raise ValueError
+            return data
+        if self.compressor not in _DECOMPRESS:
+            raise _Unreadable(f"it is compressed by {self.compressor}, which osimlite does not read")
+        blocks = int(np.frombuffer(stream, self.header, 1)[0])
+        if not blocks:
+            return b""
+        _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
+        place, parts = (3 + blocks) * width, []
+        for size in sizes:
+            parts.append(_DECOMPRESS[self.compressor](stream[place : place + size]))
+            place += size
+        # A last block that is as long as the others is written as having length zero.
+        if sum(map(len, parts)) != whole * (blocks - bool(last)) + last:
+            raise ValueError
+        return b"".join(parts)
+
+
+def _base64(text: bytes) -> bytes:
+    """The bytes of base64 text, in which header and data may each be encoded, and padded, on their own."""
+    parts = re.findall(rb"[^=]+=*", b"".join(text.split()))
+    return b"".join(base64.b64decode(part, validate=True) for part in parts)
