@@ -35,7 +35,21 @@ FAMILIES = {
 }
 """The families of rules by the first digit of their codes."""
 
-_MODULES = ("text", "structure", "values", "references", "names", "contact", "topology", "physics", "files")
+_MODULES = (
+    "text",
+    "structure",
+    "leftovers",
+    "values",
+    "domains",
+    "references",
+    "names",
+    "contact",
+    "topology",
+    "joints",
+    "bodies",
+    "physics",
+    "files",
+)
 
 
 class Found(Protocol):

@@ -110,6 +110,10 @@ class Subject:
         owner = self.owner(item)
         return called(item if item.name and item is not owner else owner)
 
+    def titled(self, item: Object, spec: FieldSpec) -> str:
+        """What people call a property: ``mass of Body 'pelvis'``."""
+        return f"{spec.tag} of {called(item) if item.name else self.called(item)}"
+
     def noted(self, item: Object, spec: FieldSpec) -> bool:
         """Whether the reader noticed something about the text of this property."""
         return (id(item), spec.name) in self._noted

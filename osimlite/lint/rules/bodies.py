@@ -1,0 +1,168 @@
+"""OSIM50x: masses and inertias."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, quantity
+from osimlite.schema.frames import Body
+
+_SLACK = 1e-6
+"""Relative excess below which an inertia counts as on the edge of what is possible; files have rounded numbers."""
+
+
+@rule("OSIM501", "missing-mass", severity=ERROR)
+def missing_mass(subject: Subject, found: Found) -> None:
+    """A body has no mass.
+
+    ## What it does
+    Reports bodies whose mass is not given.
+
+    ## Why is this bad
+    The default is NaN, so that nobody can forget it: OpenSim refuses to load the file.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    mass = Body.field_specs()["mass"]
+    for body in subject.each(Body):
+        if body.mass != body.mass and "mass" not in body.model_fields_set and not subject.noted(body, mass):
+            found(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
+
+
+@rule("OSIM502", "impossible-inertia", severity=WARNING)
+def impossible_inertia(subject: Subject, found: Found) -> None:
+    """No distribution of mass has this inertia.
+
+    ## What it does
+    Reports inertias of which one principal moment is larger than the other two together, and by how much.
+
+    ## Why is this bad
+    Such a body cannot exist. OpenSim computes with it all the same, and accelerations about that axis are too small.
+    Often two numbers are swapped, or the inertia was scaled axis by axis.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    for body, moments in _inertias(subject):
+        small, middle, large = moments
+        if small >= 0 and large > (small + middle) * (1 + _SLACK):
+            excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
+            found(
+                f"the inertia of {called(body)} is impossible: its largest principal moment, {quantity(large)}, is "
+                f"more than the sum of the others, {quantity(small + middle)}"
+                + (f", by {excess:.3g} %" if math.isfinite(excess) else ""),
+                body,
+                tag="inertia",
+            )
+
+
+@rule("OSIM503", "inertia-not-positive", severity=WARNING)
+def inertia_not_positive(subject: Subject, found: Found) -> None:
+    """An inertia has a negative principal moment.
+
+    ## What it does
+    Reports inertias that are negative about some axis: a negative moment, or products that are too large for the
+    moments.
+
+    ## Why is this bad
+    A torque about that axis turns the body the other way. OpenSim does not check, and the simulation blows up or
+    quietly shows nonsense.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.003 0 0</inertia> </Body>
+    ```
+    """
+    for body, moments in _inertias(subject):
+        if moments[0] < -_SLACK * max(map(abs, moments)):
+            cause = "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
+            found(
+                f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}",
+                body,
+                tag="inertia",
+            )
+
+
+@rule("OSIM504", "no-inertia", severity=WARNING)
+def no_inertia(subject: Subject, found: Found) -> None:
+    """A body has mass and no inertia.
+
+    ## What it does
+    Reports bodies with a mass whose inertia is zero or not given.
+
+    ## Why is this bad
+    All the mass is then in one point. A joint that turns about this point has no resistance at all, and the integrator
+    takes ever smaller steps.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    inertia = Body.field_specs()["inertia"]
+    for body in subject.each(Body):
+        if body.mass > 0 and not any(body.inertia) and not subject.noted(body, inertia):
+            state = "is zero" if "inertia" in body.model_fields_set else "is not given"
+            found(
+                f"the inertia of {called(body)} {state} though its mass is {quantity(body.mass, 'kg')}",
+                body,
+                tag="inertia",
+            )
+
+
+def _inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:
+    """Each body with a finite inertia that is not zero, and its principal moments in rising order."""
+    return [
+        (body, principal_moments(body.inertia))
+        for body in subject.each(Body)
+        if any(body.inertia) and all(map(math.isfinite, body.inertia))
+    ]
+
+
+def principal_moments(inertia: Sequence[float]) -> tuple[float, float, float]:
+    """Eigenvalues, in rising order, of a symmetric matrix given as xx yy zz xy xz yz.
+
+    The roots of the characteristic polynomial in trigonometric form (O. K. Smith, Commun. ACM 4, 168, 1961).
+    """
+    xx, yy, zz, xy, xz, yz = inertia
+    off = xy * xy + xz * xz + yz * yz
+    if off == 0:
+        low, middle, high = sorted((xx, yy, zz))
+        return low, middle, high
+    mean = (xx + yy + zz) / 3
+    spread = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * off) / 6)
+    a, b, c = (xx - mean) / spread, (yy - mean) / spread, (zz - mean) / spread
+    d, e, f = xy / spread, xz / spread, yz / spread
+    half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / 2
+    angle = math.acos(max(-1.0, min(1.0, half))) / 3
+    high = mean + 2 * spread * math.cos(angle)
+    low = mean + 2 * spread * math.cos(angle + 2 * math.pi / 3)
+    return low, 3 * mean - high - low, high

@@ -1,0 +1,257 @@
+"""OSIM4xx: single joints, their frames and coordinates."""
+
+from __future__ import annotations
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.skeleton import base_of, skeleton
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, times
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import Ground
+from osimlite.schema.joints import Joint
+from osimlite.text import listed
+
+
+@rule("OSIM402", "joint-to-itself", severity=ERROR)
+def joint_to_itself(subject: Subject, found: Found) -> None:
+    """A joint connects a body to itself.
+
+    ## What it does
+    Reports joints whose two frames are the same or are fixed to the same body.
+
+    ## Why is this bad
+    OpenSim refuses the model.
+
+    ## Example
+    ```xml
+    <WeldJoint name="strange">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+    </WeldJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    <WeldJoint name="ankle">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/foot</socket_child_frame>
+    </WeldJoint>
+    ```
+    """
+    for link in skeleton(subject).links:
+        if link.child_base is not None and link.parent_base is link.child_base:
+            found(
+                f"both frames of {called(link.joint)} are fixed to {called(link.child_base)}; OpenSim refuses this",
+                link.joint,
+                tag="socket_child_frame",
+            )
+
+
+@rule("OSIM405", "wrong-coordinate-count", severity=ERROR)
+def wrong_coordinate_count(subject: Subject, found: Found) -> None:
+    """A joint has not as many coordinates as it needs.
+
+    ## What it does
+    Reports joints with more or fewer coordinates than their class moves by, and (as a warning) with none at all.
+
+    ## Why is this bad
+    OpenSim refuses the model. Without any it makes coordinates up, with a name such as `_coord_0` and the value 0.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle" /> <Coordinate name="knee_twist" /> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle" /> </coordinates>
+    </PinJoint>
+    ```
+    """
+    for joint in subject.each(Joint):
+        if joint.motion_types is None:
+            continue
+        wanted, given = len(joint.motion_types), len(joint.coordinates)
+        declared = "coordinates" in joint.model_fields_set and given > 0
+        if not declared and wanted and subject.source is not None:
+            found(
+                f"{called(joint)} gives no coordinates; OpenSim makes {wanted} up, called '_coord_0'"
+                + (f" to '_coord_{wanted - 1}'" if wanted > 1 else ""),
+                joint,
+                severity=WARNING,
+            )
+        elif given != wanted and (declared or given):
+            found(
+                f"{called(joint)} has {times(given, 'coordinate')}, {a_joint(joint)} has {wanted}: "
+                "OpenSim refuses the model",
+                joint,
+                number=subject.element_of(joint, "coordinates"),
+            )
+
+
+@rule("OSIM406", "shared-coordinate-name", severity=ERROR)
+def shared_coordinate_name(subject: Subject, found: Found) -> None:
+    """Two joints have a coordinate of the same name.
+
+    ## What it does
+    Reports the second coordinate of a name, with the forces and others that look the name up. Without any it is a
+    warning.
+
+    ## Why is this bad
+    Forces, actuators and constraints find a coordinate by its bare name, and always find the first: two limit forces
+    then act on one knee, and none on the other.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+    </PinJoint>
+    <CoordinateLimitForce name="knee_limit"> <coordinate>hip_flexion</coordinate> </CoordinateLimitForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle" /> </coordinates>
+    </PinJoint>
+    ```
+    """
+    first: dict[str, Coordinate] = {}
+    tree = subject.tree
+    for component in tree.components:
+        if not isinstance(component, Coordinate):
+            continue
+        joint = tree.parent_of(component)
+        known = first.setdefault(component.name, component)
+        if known is component or not component.name or tree.parent_of(known) is joint:
+            continue
+        users = [
+            called(use.owner) for use in subject.uses if use.value == component.name and _by_name(use.reference.rule)
+        ]
+        message = f"{called(component)} has the name of a coordinate of {called(tree.parent_of(known) or known)}"
+        if users:
+            message += f"; {listed(dict.fromkeys(users), most=3)} {'finds' if len(users) == 1 else 'all find'} that one"
+        found(message, component, attribute="name", severity=None if users else WARNING)
+
+
+@rule("OSIM408", "ground-as-child", severity=INFO)
+def ground_as_child(subject: Subject, found: Found) -> None:
+    """A joint has ground as its child.
+
+    ## What it does
+    Reports joints whose child frame is fixed to ground.
+
+    ## Why is this bad
+    It is allowed: OpenSim turns the joint round inside, and the coordinate keeps its meaning from parent to child. But
+    other programs expect chains that start at ground.
+
+    ## Example
+    ```xml
+    <PlanarJoint name="ground_pelvis">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/ground</socket_child_frame>
+        <coordinates>
+            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" /> <Coordinate name="pelvis_ty" />
+        </coordinates>
+    </PlanarJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PlanarJoint name="ground_pelvis">
+        <socket_parent_frame>/ground</socket_parent_frame>
+        <socket_child_frame>/bodyset/pelvis</socket_child_frame>
+        <coordinates>
+            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" /> <Coordinate name="pelvis_ty" />
+        </coordinates>
+    </PlanarJoint>
+    ```
+    """
+    for link in skeleton(subject).links:
+        if isinstance(link.child_base, Ground) and link.parent_base is not link.child_base:
+            found(
+                f"the child of {called(link.joint)} is ground; OpenSim turns the joint round",
+                link.joint,
+                tag="socket_child_frame",
+            )
+
+
+@rule("OSIM409", "stray-joint-frame", severity=WARNING)
+def stray_joint_frame(subject: Subject, found: Found) -> None:
+    """A joint holds a frame that has nothing to do with it.
+
+    ## What it does
+    Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects. It is an error if
+    that body is further from ground than the joint's child.
+
+    ## Why is this bad
+    OpenSim builds joints from ground outwards, and the frames of a joint with it: a frame on a body that is not there
+    yet ends in a message about an invalid index. Usually a socket names the wrong frame.
+
+    ## Example
+    ```xml
+    <PinJoint name="hip">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>/bodyset/thigh</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+        <frames>
+            <PhysicalOffsetFrame name="shank_offset">
+                <socket_parent>/bodyset/shank</socket_parent>
+            </PhysicalOffsetFrame>
+        </frames>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="hip">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+        <socket_child_frame>thigh_offset</socket_child_frame>
+        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+        <frames>
+            <PhysicalOffsetFrame name="thigh_offset">
+                <socket_parent>/bodyset/thigh</socket_parent>
+            </PhysicalOffsetFrame>
+        </frames>
+    </PinJoint>
+    ```
+    """
+    bones = skeleton(subject)
+    if not bones.complete:
+        return
+    depth = bones.depths()
+    for link in bones.links:
+        for frame in link.joint.frames:
+            base = base_of(subject, frame)
+            if base is None or base is link.parent_base or base is link.child_base:
+                continue
+            deepest = max(depth.get(id(end), 0) for end in (link.parent_base, link.child_base))
+            late = depth.get(id(base), 0) > deepest
+            found(
+                f"{called(frame)} of {called(link.joint)} is fixed to {called(base)}, which the joint does not connect"
+                + ("; OpenSim refuses the model" if late else ""),
+                frame,
+                tag="socket_parent",
+                severity=ERROR if late else None,
+            )
+
+
+def a_joint(joint: Joint) -> str:
+    """``a PinJoint``."""
+    return f"a {type(joint).tag}"
+
+
+def _by_name(rule_name: str) -> bool:
+    return rule_name == "coordinate-name"

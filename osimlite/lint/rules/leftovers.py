@@ -1,0 +1,130 @@
+"""OSIM1xx: attributes, text and blocks that mean nothing, or not what they seem."""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.document.notes import Note
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.fixes import without_attribute, without_element, without_text
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called
+from osimlite.schema.base import Object, field_specs
+from osimlite.text import nearest
+
+
+@rule("OSIM105", "unknown-attribute", severity=ERROR)
+def unknown_attribute(subject: Subject, found: Found) -> None:
+    """An element has an attribute that means nothing.
+
+    ## What it does
+    Reports attributes of objects other than `name` and `file`.
+
+    ## Why is this bad
+    OpenSim ignores them: properties are elements, not attributes.
+
+    ## Example
+    ```xml
+    <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
+    ```
+    """
+    for note, owner in _of_kind(subject, "unknown-attribute"):
+        message = f"OpenSim ignores the attribute '{note.word}' of {called(owner)}"
+        if note.word in field_specs(type(owner)):
+            message += f"; write <{note.word}>{note.value}</{note.word}> inside"
+        suggestion = "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
+        fix = without_attribute(subject.source, note.number, note.word) if suggestion is None else None
+        found(message, owner, at=subject.attribute_name(note.number, note.word), suggestion=suggestion, fix=fix)
+
+
+@rule("OSIM106", "stray-text", severity=WARNING)
+def stray_text(subject: Subject, found: Found) -> None:
+    """There is text between elements.
+
+    ## What it does
+    Reports text that stands beside elements, where only elements have a meaning.
+
+    ## Why is this bad
+    OpenSim drops it in silence. It is often what is left of a tag: a value that lost its element, or half a comment.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    source = subject.source
+    for note in subject.notes:
+        if note.kind == "stray-text" and source is not None:
+            start = source.text.find(note.word, source.line_start(note.line or 1))
+            found(f"OpenSim ignores the text '{note.word}' outside the document", at=source.position(max(start, 0)))
+    if source is None or not (_AFTER.search(source.text) or _BEFORE.search(source.text)):
+        return
+    plain = _REMARKS.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source.text)
+    texts = {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}
+    in_values = [
+        (source.spans[note.number].start, source.spans[note.number].end)
+        for note in subject.notes
+        if note.kind == "child-in-value"
+    ]
+    for start, end in sorted(texts):
+        if any(first < start < last for first, last in in_values):
+            continue
+        text = plain[start:end].strip().splitlines()[0]
+        begin = start + len(plain[start:end]) - len(plain[start:end].lstrip())
+        whole = without_text(source, begin, begin + len(plain[start:end].strip()))
+        found(f"OpenSim ignores the text '{text}' between elements", at=source.position(start, len(text)), fix=whole)
+
+
+@rule("OSIM110", "defaults", severity=WARNING)
+def defaults_block(subject: Subject, found: Found) -> None:
+    """The file has a `<defaults>` block.
+
+    ## What it does
+    Reports `<defaults>`: a warning if there is something in it, else for information.
+
+    ## Why is this bad
+    Each object inside replaces the defaults of its class in the whole running program, for this file and for all that
+    are loaded later. What a model means then depends on what was loaded before. Here the block counts for its own file.
+
+    ## Example
+    ```xml
+    <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
+    ```
+    """
+    model, source = subject.model, subject.source
+    if model is None or source is None or b"<defaults" not in source.data:
+        return
+    number = subject.element_of(model, "defaults")
+    if number is not None and source.children(number):
+        found("<defaults> changes the defaults of every model loaded from now on", model, number=number)
+    elif number is not None:
+        fix = without_element(source, number)
+        found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
+
+
+_AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
+
+
+_BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")
+
+
+_REMARKS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
+
+
+def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:
+    return [(note, note.owner) for note in subject.notes if note.kind == kind and note.owner is not None]
