@@ -2,8 +2,7 @@
 
 OpenSim assembles a model by minimising half the sum of squared changes of the coordinates under the constraints;
 coordinates that depend on others and those free to satisfy constraints do not count, locked ones keep their values,
-and clamped ones stay in their range. The minimum is sought here by Newton's method on the constraints, each step
-going as near to the wanted values as it can.
+and clamped ones stay in their range. Here Newton's method leads to the constraints and then along them to the minimum.
 """
 
 from __future__ import annotations
@@ -22,6 +21,9 @@ from osimlite.text import listed
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
 
+_STEPS = 100
+_FURTHEST = 0.5
+"""The longest step of a coordinate (m or rad)."""
 _TOLERANCE = 1e-10
 """What a constraint may be off (m or rad): what OpenSim's default assembly accuracy allows."""
 
@@ -60,42 +62,109 @@ def projected(state: Kinematics) -> Array:
 
 
 def _nearest(mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]) -> Array:
-    counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
-    places, targets = list(held), np.array(list(held.values()))
-    q = wanted.copy()
-    q[places] = targets
-    state = kinematics(mechanism, q, np.zeros(len(q)), time)
-    errors = _errors(state)
-    for _ in range(200):
-        turning = mechanism.rate_matrix(q)
-        rows = np.concatenate([_rows(state), turning[places]])
-        step, free = solutions(rows, np.concatenate([-errors, targets - q[places]]))
-        left = counted * (wanted - q - turning @ step)
-        step = step + free @ np.linalg.lstsq(counted[:, None] * (turning @ free), left, rcond=1e-9)[0]
-        size = 1.0
+    """The nearest pose with some coordinates held at given values, whatever their ranges."""
+    search = _Search(mechanism, wanted, time, held)
+    q = search.restored(search.start)
+    for _ in range(_STEPS):
+        step = search.step(q)
+        if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
+            return q
+        before, size = search.cost(q), 1.0
         while True:
-            trial = q + size * (turning @ step)
-            state = kinematics(mechanism, trial, np.zeros(len(q)), time)
-            new = _errors(state)
-            better = np.linalg.norm(new) <= (1.0 - 0.1 * size) * np.linalg.norm(errors)
-            if better or size < 1e-3 or np.abs(new).max(initial=0.0) < _TOLERANCE:
+            trial = search.restored(q + size * step)
+            if search.cost(trial) < before:
                 break
             size *= 0.5
-        moved = float(np.abs(trial - q).max(initial=0.0))
-        q, errors = trial, new
-        if moved < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
-            break
-    if not np.abs(errors).max(initial=0.0) < _TOLERANCE:
+            if size < 1e-3:
+                # Nothing nearer within rounding.
+                return q
+        q = trial
+    return q
+
+
+class _Search:
+    """Half the sum of squared changes of the coordinates that count, on the surface where the constraints hold."""
+
+    def __init__(self, mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]) -> None:
+        self.mechanism, self.wanted, self.time = mechanism, wanted, time
+        self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
+        self.free = [place for place in range(len(wanted)) if place not in held]
+        self.start = wanted.copy()
+        self.start[list(held)] = list(held.values())
+
+    def cost(self, q: Array) -> float:
+        """What is to be as small as possible."""
+        return 0.5 * float(np.sum(self.counted * (q - self.wanted) ** 2))
+
+    def step(self, q: Array) -> Array:
+        """Newton's step (n,) along the surface, with the curvature of the constraints."""
+        rows = self._rows(self._state(q))
+        gradient, weights = (self.counted * (q - self.wanted))[self.free], self.counted[self.free]
+        multipliers, _ = solutions(rows.T, -gradient)
+        _, along = solutions(rows, np.zeros(len(rows)))
+        curvature = along.T @ (weights[:, None] * along)
+        if np.abs(multipliers).max(initial=0.0) > 1e-12:
+            bends = [self._bend(q, direction, multipliers) for direction in along.T]
+            curvature = curvature + along.T @ np.array(bends).T.reshape(len(self.free), -1)
+        values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+        slopes = np.asarray(vectors.T @ (along.T @ gradient), dtype=np.float64)
+        # Downhill where the surface bends away; not at all along what does not count.
+        flat = np.abs(values) < 1e-7
+        lengths: Array = np.where(flat, 0.0, slopes / np.where(flat, 1.0, np.abs(values)))
+        return self._spread(-(along @ (vectors @ lengths)))
+
+    def restored(self, q: Array) -> Array:
+        """The pose on the surface that Newton's method leads to, in the shortest steps.
+
+        Raises:
+            SimulationError: it leads nowhere.
+        """
+        state = self._state(q)
+        errors = _errors(state)
+        for _ in range(_STEPS):
+            step, _ = solutions(self._rows(state), -errors)
+            # Far away the equations say little about where to go; small steps, even to worse places, find out.
+            size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
+            trial = q + size * self._spread(step)
+            state = self._state(trial)
+            new = _errors(state)
+            near = np.abs(errors).max(initial=0.0) < _TOLERANCE
+            if near and np.abs(new).max(initial=0.0) >= 0.5 * np.abs(errors).max(initial=0.0):
+                break
+            q, errors = trial, new
+        if np.abs(errors).max(initial=0.0) < _TOLERANCE:
+            return q
+        state = self._state(q)
         broken = [
             item.name
-            for item in mechanism.constraints
-            if not np.abs(item.position_errors(state)).max(initial=0) < 1e-10
+            for item in self.mechanism.constraints
+            if not np.abs(item.position_errors(state)).max(initial=0.0) < _TOLERANCE
         ]
         raise SimulationError(
-            f"no pose of '{mechanism.name}' near the given one fulfils {listed(broken)}; change the coordinate values, "
-            "unlock or unclamp coordinates, or set isEnforced of a constraint to false"
+            f"no pose of '{self.mechanism.name}' near the given one fulfils {listed(broken)}; change the coordinate "
+            "values, unlock or unclamp coordinates, or set isEnforced of a constraint to false"
         )
-    return q
+
+    def _state(self, q: Array) -> Kinematics:
+        return kinematics(self.mechanism, q, np.zeros(len(q)), self.time)
+
+    def _rows(self, state: Kinematics) -> Array:
+        """Derivatives of the errors by the free coordinates (p, f)."""
+        by_speeds = _rows(state)
+        by_values = np.linalg.solve(self.mechanism.rate_matrix(state.q).T, by_speeds.T).T
+        return np.asarray(by_values[:, self.free], dtype=np.float64)
+
+    def _bend(self, q: Array, direction: Array, multipliers: Array) -> Array:
+        """How the multipliers' pull on the free coordinates changes along a direction of them (f,)."""
+        change = 1e-6 * self._spread(direction)
+        ahead, behind = (self._rows(self._state(place)).T @ multipliers for place in (q + change, q - change))
+        result: Array = (ahead - behind) / 2e-6
+        return result
+
+    def _spread(self, step: Array) -> Array:
+        full = np.zeros(len(self.wanted))
+        full[self.free] = step
+        return full
 
 
 def _errors(state: Kinematics) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.multibody.body_constraints import WeldConstraint
+from osimlite.multibody.body_constraints import RollingConstraint, WeldConstraint
 from osimlite.multibody.constraints import Constraint, Coupler
 from osimlite.multibody.functions import Function
 from osimlite.multibody.joints import Mobilizer, motion_types
@@ -37,13 +37,14 @@ from osimlite.schema.model import Model
 from osimlite.text import listed
 
 
-def build_mechanism(model: Model, *, opensim_derivatives: bool = False) -> Mechanism:
+def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling: bool = False) -> Mechanism:
     """The tree of bodies and mobilizers that a model describes, with its constraints.
 
     Bodies come level by level from ground, within a level in the order of the joints that carry them; coordinates
     come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is
     reversed. Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is
-    split into halves, one of which the joint carries, and the halves are welded by a constraint. Forces and
+    split into halves, one of which the joint carries, and the halves are welded by a constraint. (OpenSim 4.6 does
+    the same, but then counts the child of the WeldJoint twice, and gives the half a wrong inertia.) Forces and
     geometry play no part.
 
     Args:
@@ -54,6 +55,7 @@ def build_mechanism(model: Model, *, opensim_derivatives: bool = False) -> Mecha
             knee of Rajagopal's model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
             gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without this switch both are
             right.
+        rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves them off until a program turns them on.
 
     Raises:
         ModelError: something names what does not exist, bodies are not connected to ground, a joint connects
@@ -61,7 +63,7 @@ def build_mechanism(model: Model, *, opensim_derivatives: bool = False) -> Mecha
         UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop closed by a FreeJoint or
             by a joint whose child is ground.
     """
-    return _Builder(model, opensim_derivatives).mechanism()
+    return _Builder(model, opensim_derivatives, rolling).mechanism()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,9 +92,9 @@ class _Edge:
 
 
 class _Builder:
-    def __init__(self, model: Model, opensim_derivatives: bool) -> None:
+    def __init__(self, model: Model, opensim_derivatives: bool, rolling: bool) -> None:
         self.model = model
-        self.opensim_derivatives = opensim_derivatives
+        self.opensim_derivatives, self.rolling = opensim_derivatives, rolling
         self.tree = model.tree()
         self.placements = Placements(self.tree)
         self.coordinates: list[CoordinateInfo] = []
@@ -170,7 +172,7 @@ class _Builder:
         return _Edge(joint, path, parent, child, parent_frame, child_frame, motions, own)
 
     def _prescribed(self, coordinate: Coordinate, path: str) -> Function | None:
-        # OpenSim leaves a prescribed coordinate without a function free, and a locked one locked.
+        # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one is locked too.
         if not coordinate.prescribed or coordinate.prescribed_function is None or coordinate.locked:
             return None
         return numeric(
@@ -230,6 +232,8 @@ class _Builder:
             if not isinstance(component, schema.Constraint) or not component.isEnforced:
                 continue
             constraint = reader.constraint(component)
+            if isinstance(constraint, RollingConstraint) and not self.rolling:
+                continue
             self.constraints.append(constraint)
             if isinstance(constraint, Coupler):
                 place = constraint.dependent

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import osimlite
+from osimlite.multibody import build_mechanism
 from osimlite.multibody import functions as f
 from osimlite.multibody.joints import (
     MOTIONS,
@@ -107,4 +108,4 @@ def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechani
 @cache
 def mixed_tree() -> Mechanism:
     """The tree of fixtures/kinematics/mixed_joint_tree.osim: 10 bodies, 24 coordinates, 10 joint types."""
-    return osimlite.mechanism(osimlite.read(FIXTURES / "mixed_joint_tree.osim"))
+    return build_mechanism(osimlite.read(FIXTURES / "mixed_joint_tree.osim"))

@@ -12,9 +12,10 @@ from osimlite.multibody import Mechanism, Wrench, build_mechanism
 from osimlite.multibody.spatial import inverse, offset
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.frames import Body, PhysicalOffsetFrame
+from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.functions import ExpressionBasedFunction
 from osimlite.schema.joints import BallJoint, FreeJoint, Joint, PinJoint, PlanarJoint, WeldJoint
+from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
 from tests.multibody.cases import load
 
@@ -200,6 +201,19 @@ def test_a_body_without_mass_has_no_inertia():
     assert build_mechanism(model).mass_matrix(q) == pytest.approx(build_mechanism(alone).mass_matrix(q))
 
 
+def test_a_frame_is_laid_through_stations():
+    model, body, _ = _pendulum()
+    _stations(model, body, (1.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.0, 0.0, 3.0), (0.1, 0.2, 0.3))
+    frame = model.subcomponents[-1]
+    frame.ab_axis, frame.ab_x_ac_axis = "-z", "+y"
+    matrix = build_mechanism(model).frames["/laid"].transform
+    # a to b is body y, and frame -z; (b - a) × (c - a) is body x, and frame y.
+    assert matrix[:3, 2] == pytest.approx((0.0, -1.0, 0.0), abs=1e-15)
+    assert matrix[:3, 1] == pytest.approx((1.0, 0.0, 0.0), abs=1e-15)
+    assert np.linalg.det(matrix) == pytest.approx(1.0)
+    assert matrix[:3, 3].tolist() == [0.1, 0.2, 0.3]
+
+
 # ------------------------------------------------------------------------------------------ what is refused
 def _pendulum() -> tuple[Model, Body, Joint]:
     model = Model(name="m")
@@ -259,6 +273,25 @@ def _unknown_constraint(model: Model, body: Body, joint: Joint) -> None:
     model.constraint_set.objects = objects
 
 
+def _stations(model: Model, body: Body, *points: tuple[float, float, float], last: Body | Ground | None = None) -> None:
+    frame = StationDefinedFrame(name="laid")
+    for word, point in zip(("point_a", "point_b", "point_c", "origin_point"), points, strict=True):
+        carrier = last if last is not None and word == "origin_point" else body
+        station = Station(name=word, socket_parent_frame=carrier, location=point)
+        model.subcomponents.append(station)
+        setattr(frame, f"socket_{word}", station)
+    model.subcomponents.append(frame)
+
+
+def _stations_on_a_line(model: Model, body: Body, joint: Joint) -> None:
+    _stations(model, body, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def _stations_on_two_bodies(model: Model, body: Body, joint: Joint) -> None:
+    points = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 0.0)
+    _stations(model, body, *points, last=model.ground)
+
+
 def _no_mass(model: Model, body: Body, joint: Joint) -> None:
     body.mass = float("nan")
 
@@ -288,6 +321,8 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
         ),
         (_unknown_joint, UnsupportedError, "'/jointset/odd' is a ScrewJoint.*PinJoint"),
         (_unknown_constraint, UnsupportedError, "'/constraintset/odd' \\(GearConstraint\\) cannot be computed"),
+        (_stations_on_a_line, ModelError, "point_c of the frame '/laid' lie on a line; move one"),
+        (_stations_on_two_bodies, ModelError, "stations of the frame '/laid' are fixed to /bodyset/rod and /ground"),
         (_no_mass, ModelError, "'/bodyset/rod' has mass nan"),
         (_negative_mass, ModelError, "'/bodyset/rod' has mass -2"),
         (_no_inertia, ModelError, "'/bodyset/rod' has a mass centre or inertia that is not finite"),

@@ -1,0 +1,319 @@
+"""Constraints, prescribed coordinates and loops against OpenSim 4.6, live, in models made for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.multibody.mechanism import MassProperties
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+Bodies = list[Any]
+Change = Callable[[Any, Bodies], None]
+
+
+def _vec(*values: float) -> Any:
+    return opensim.Vec3(*values)
+
+
+def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
+    """Ground, a body on a ball joint, one on a pin beyond, one that floats."""
+    opensim.Logger.setLevelString("off")
+    model = opensim.Model()
+    model.setName("m")
+    model.setGravity(_vec(0.3, -9.5, 0.7))
+    bodies = []
+    for name in ("inner", "outer", "loose"):
+        body = opensim.Body()
+        body.setName(name)
+        body.set_mass(rng.uniform(0.5, 2.0))
+        body.set_mass_center(_vec(*rng.uniform(-0.2, 0.2, 3)))
+        body.set_inertia(opensim.Vec6(*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))
+        model.addBody(body)
+        bodies.append(body)
+    inner, outer, loose = bodies
+    for kind, name, parent, child, count in (
+        ("BallJoint", "ball", model.getGround(), inner, 3),
+        ("PinJoint", "pin", inner, outer, 1),
+        ("FreeJoint", "free", model.getGround(), loose, 6),
+    ):
+        spots = [_vec(*rng.uniform(-size, size, 3)) for size in (0.3, 1.0, 0.3, 1.0)]
+        joint = getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3])
+        for place in range(count):
+            coordinate = joint.upd_coordinates(place)
+            coordinate.setName(f"{name}_{place}")
+            coordinate.set_default_value(0.2 * (place + 1))
+        model.addJoint(joint)
+    return model, bodies
+
+
+def _point(model: Any, bodies: Bodies) -> None:
+    model.addConstraint(opensim.PointConstraint(bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1)))
+
+
+def _rod(model: Any, bodies: Bodies) -> None:
+    constraint = opensim.ConstantDistanceConstraint(
+        bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1), 0.8
+    )
+    model.addConstraint(constraint)
+
+
+def _line(model: Any, bodies: Bodies) -> None:
+    constraint = opensim.PointOnLineConstraint(
+        bodies[1], _vec(0.3, 1.0, -0.2), _vec(0.1, 0.0, 0.2), bodies[2], _vec(0.2, -0.1, 0.1)
+    )
+    model.addConstraint(constraint)
+
+
+def _weld(model: Any, bodies: Bodies) -> None:
+    constraint = opensim.WeldConstraint(
+        "weld", bodies[1], _vec(0.1, 0.2, 0.3), _vec(0.3, 0.2, 0.1), bodies[2], _vec(0.0, 0.1, 0.0), _vec(0.1, 0.3, 0.2)
+    )
+    model.addConstraint(constraint)
+
+
+def _point_on_offset_frame(model: Any, bodies: Bodies) -> None:
+    """OpenSim takes the location in the body, not in the frame."""
+    frame = opensim.PhysicalOffsetFrame(
+        "spot", bodies[1], opensim.Transform(opensim.Rotation(0.5, opensim.CoordinateAxis(1)), _vec(0.3, 0.0, 0.1))
+    )
+    bodies[1].addComponent(frame)
+    constraint = opensim.PointConstraint(bodies[0], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1))
+    constraint.updSocket("body_1").connect(frame)
+    model.addConstraint(constraint)
+
+
+def _rolling(model: Any, bodies: Bodies) -> None:
+    """OpenSim's Python has no such class, its files have."""
+    text = """<?xml version="1.0"?><OpenSimDocument Version="40600"><RollingOnSurfaceConstraint name="roll">
+        <socket_rolling_body>/bodyset/loose</socket_rolling_body>
+        <socket_surface_body>/bodyset/outer</socket_surface_body>
+        <surface_normal>0 1 0</surface_normal><surface_height>0.4</surface_height>
+        </RollingOnSurfaceConstraint></OpenSimDocument>"""
+    with NamedTemporaryFile("w", suffix=".xml") as file:
+        file.write(text)
+        file.flush()
+        constraint = opensim.Constraint.safeDownCast(opensim.OpenSimObject.makeObjectFromFile(file.name))
+    model.addConstraint(constraint.clone())
+
+
+def _coupler(
+    names: tuple[str, ...], dependent: str, function: Any, scale: float = 1.0
+) -> Callable[[Any, Bodies], None]:
+    def add(model: Any, bodies: Bodies) -> None:
+        constraint = opensim.CoordinateCouplerConstraint()
+        independent = opensim.ArrayStr()
+        for name in names:
+            independent.append(name)
+        constraint.setIndependentCoordinateNames(independent)
+        constraint.setDependentCoordinateName(dependent)
+        constraint.setFunction(function)
+        opensim.PropertyHelper.setValueDouble(scale, constraint.updPropertyByName("scale_factor"))
+        model.addConstraint(constraint)
+
+    return add
+
+
+def _spline() -> Any:
+    spline = opensim.SimmSpline()
+    for x, y in ((-2.0, 0.4), (-0.7, 0.1), (0.3, 0.5), (1.1, 0.2), (2.5, -0.3)):
+        spline.addPoint(x, y)
+    return spline
+
+
+def _polynomial() -> Any:
+    return opensim.PolynomialFunction(opensim.Vector.createFromMat(np.array((0.3, -0.5, 0.2, 0.1))))
+
+
+def _linear(coefficients: tuple[float, ...]) -> Any:
+    array = opensim.ArrayDouble()
+    for value in coefficients:
+        array.append(value)
+    function = opensim.LinearFunction()
+    function.setCoefficients(array)
+    return function
+
+
+def _prescribed(model: Any, bodies: Bodies) -> None:
+    for joint, place, function in (("pin", 0, opensim.Sine(0.4, 3.0, 0.2, 0.1)), ("ball", 1, _linear((0.5, 0.2)))):
+        coordinate = model.updJointSet().get(joint).upd_coordinates(place)
+        coordinate.setPrescribedFunction(function)
+        coordinate.set_prescribed(True)
+
+
+def _prescribed_with_rod(model: Any, bodies: Bodies) -> None:
+    _prescribed(model, bodies)
+    _rod(model, bodies)
+
+
+LOOP = (_vec(0.1, 0.0, 0.2), _vec(0.3, 0.2, 0.1), _vec(0.0, 0.1, 0.0), _vec(0.1, 0.3, 0.2))
+
+
+def _weld_like_loop(model: Any, bodies: Bodies) -> None:
+    model.addConstraint(opensim.WeldConstraint("weld", bodies[2], *LOOP[:2], bodies[1], *LOOP[2:]))
+
+
+def _loop(kind: str, count: int) -> Change:
+    """A joint that closes a loop from the floating body to the outer one."""
+
+    def add(model: Any, bodies: Bodies) -> None:
+        joint = getattr(opensim, kind)(
+            "loop",
+            bodies[2],
+            _vec(0.1, 0.0, 0.2),
+            _vec(0.3, 0.2, 0.1),
+            bodies[1],
+            _vec(0.0, 0.1, 0.0),
+            _vec(0.1, 0.3, 0.2),
+        )
+        for place in range(count):
+            joint.upd_coordinates(place).setName(f"loop_{place}")
+        model.addJoint(joint)
+
+    return add
+
+
+CASES: dict[str, Change] = {
+    "point": _point,
+    "rod": _rod,
+    "line": _line,
+    "weld": _weld,
+    "point-on-offset-frame": _point_on_offset_frame,
+    "coupler-spline": _coupler(("pin_0",), "free_3", _spline()),
+    "coupler-of-ball-angles": _coupler(("ball_1",), "ball_0", _polynomial(), 0.6),
+    "coupler-of-two": _coupler(("ball_0", "pin_0"), "free_1", _linear((0.4, -0.7, 0.1))),
+    "prescribed": _prescribed,
+    "prescribed-with-rod": _prescribed_with_rod,
+}
+
+
+def _built(model: Any, folder: Path) -> Mechanism:
+    model.finalizeConnections()
+    path = folder / "model.osim"
+    model.printToXML(str(path))
+    return build_mechanism(osimlite.read(path))
+
+
+def _no_further_than(mechanism: Mechanism, ours: Any, theirs: Any) -> None:
+    """Our default pose is as near to the default values as OpenSim's, if that fulfils the constraints."""
+    wanted, state = mechanism.values({}), mechanism.at(theirs)
+    if any(np.abs(item.position_errors(state)).max(initial=0.0) > 1e-9 for item in mechanism.constraints):
+        # It never assembles loops that only joints close, and cannot always reach what it wants.
+        return
+    counted = np.array([not info.yielding for info in mechanism.coordinates])
+    our_cost, their_cost = (float(np.sum((counted * (q - wanted)) ** 2)) for q in (ours, theirs))
+    assert our_cost <= their_cost * (1.0 + 1e-9) + 1e-12
+    if our_cost >= their_cost * (1.0 - 1e-6):
+        assert ours == pytest.approx(theirs, abs=1e-5)
+
+
+def _loaded(folder: Path, mechanism: Mechanism) -> tuple[Any, Any, list[Any]]:
+    model = opensim.Model(str(folder / "model.osim"))
+    state = model.initSystem()
+    coordinates = [model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))]
+    assert [item.getAbsolutePathString() for item in coordinates] == [info.path for info in mechanism.coordinates]
+    return model, state, coordinates
+
+
+def _numbers(what: str, state: Any, coordinates: list[Any]) -> Any:
+    return np.array([getattr(item, f"get{what}Value")(state) for item in coordinates])
+
+
+def _go(rng: np.random.Generator, mechanism: Mechanism, state: Any, coordinates: list[Any]) -> tuple[Any, Any, float]:
+    """Both to the same random state that fulfils the constraints."""
+    time = float(rng.uniform(0.0, 2.0))
+    q, _ = mechanism.default_state()
+    moved = [0.0 if info.locked else rng.uniform(-0.2, 0.2) for info in mechanism.coordinates]
+    q = mechanism.assemble(q + moved, time)
+    u = mechanism.project_speeds(q, rng.uniform(-1.0, 1.0, len(q)), time)
+    state.setTime(time)
+    for coordinate, value, speed in zip(coordinates, q, u, strict=True):
+        if not coordinate.getLocked(state):
+            coordinate.setValue(state, value, False)
+        coordinate.setSpeedValue(state, speed)
+    return q, u, time
+
+
+def _unbroken(model: Any, state: Any) -> None:
+    """OpenSim sees no violation either, so it means the same by the constraints."""
+    model.realizeAcceleration(state)
+    for errors in (state.getQErr(), state.getUErr()):
+        assert np.abs(errors.to_numpy()).max() < 1e-8
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_constrained_motion(case: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    model, bodies = _chain(rng)
+    CASES[case](model, bodies)
+    mechanism = _built(model, tmp_path)
+    model, state, coordinates = _loaded(tmp_path, mechanism)
+    _no_further_than(mechanism, mechanism.default_state()[0], _numbers("", state, coordinates))
+    for _ in range(3):
+        q, u, time = _go(rng, mechanism, state, coordinates)
+        _unbroken(model, state)
+        udot = _numbers("Acceleration", state, coordinates)
+        found = mechanism.acceleration(q, u, time=time)
+        assert np.abs(found - udot).max() < 1e-9 * (1.0 + np.abs(udot).max())
+
+
+@pytest.mark.parametrize(("kind", "count"), [("PinJoint", 1), ("BallJoint", 3), ("UniversalJoint", 2)])
+def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(12)
+    model, bodies = _chain(rng)
+    _loop(kind, count)(model, bodies)
+    mechanism = _built(model, tmp_path)
+    model, state, coordinates = _loaded(tmp_path, mechanism)
+    assert mechanism.total_mass == pytest.approx(model.getTotalMass(state), rel=1e-14)
+    # OpenSim gives the half that it adds the unit inertia about the body's origin for an inertia.
+    half = mechanism.bodies[-1]
+    properties, arm = half.mass_properties, half.mass_properties.center
+    wrong = properties.inertia / properties.mass + (arm @ arm) * np.eye(3) - np.outer(arm, arm)
+    spoilt = replace(half, mass_properties=MassProperties(properties.mass, arm, wrong))
+    theirs = replace(mechanism, bodies=(*mechanism.bodies[:-1], spoilt))
+    for _ in range(3):
+        q, u, time = _go(rng, mechanism, state, coordinates)
+        _unbroken(model, state)
+        udot = _numbers("Acceleration", state, coordinates)
+        assert np.abs(theirs.acceleration(q, u, time=time) - udot).max() < 1e-9 * (1.0 + np.abs(udot).max())
+
+
+def test_a_weld_that_closes_a_loop_is_a_constraint(tmp_path: Path) -> None:
+    built = []
+    for change in (_loop("WeldJoint", 0), _weld_like_loop):
+        model, bodies = _chain(np.random.default_rng(13))
+        change(model, bodies)
+        built.append(_built(model, tmp_path))
+    by_joint, by_constraint = built
+    assert by_joint.total_mass == by_constraint.total_mass
+    q, _ = by_joint.default_state()
+    u = by_joint.project_speeds(q, np.random.default_rng(1).uniform(-1.0, 1.0, len(q)))
+    assert by_joint.acceleration(q, u) == pytest.approx(by_constraint.acceleration(q, u), abs=1e-12)
+
+
+def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
+    """OpenSim leaves it off until told, and sees no violation of positions or speeds in our states."""
+    rng = np.random.default_rng(14)
+    model, bodies = _chain(rng)
+    _rolling(model, bodies)
+    plain = _built(model, tmp_path)
+    mechanism = build_mechanism(osimlite.read(tmp_path / "model.osim"), rolling=True)
+    model, state, coordinates = _loaded(tmp_path, mechanism)
+    roll = model.getConstraintSet().get("roll")
+    assert not roll.isEnforced(state)
+    assert plain.constraints == ()
+    q, u, _ = _go(rng, mechanism, state, coordinates)
+    assert roll.setIsEnforced(state, True)
+    _unbroken(model, state)
+    assert len(state.getUErr().to_numpy()) == 4
+    assert len(mechanism.constraints[0].velocity_equations(mechanism.at(q, u))[1]) == 4

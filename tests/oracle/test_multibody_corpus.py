@@ -1,0 +1,100 @@
+"""Real models against OpenSim 4.6, live: poses, mass matrices and accelerations with all forces but gravity removed."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from osimlite.document.reader import read_text
+from osimlite.errors import SimulationError
+from osimlite.multibody import Mechanism, build_mechanism
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+# Models in whose knees one coordinate drives several rotations.
+_SEVERAL_ROTATIONS = {"m0097", "m0116", "m0225", "m0954"}
+
+
+def _without_forces(path: Path) -> tuple[Any, Any]:
+    """The model at rest in its default pose, nothing acting on it but gravity and constraints."""
+    opensim.Logger.setLevelString("off")
+    model = opensim.Model(str(path))
+    for part in ("ForceSet", "ControllerSet", "ProbeSet"):
+        getattr(model, f"upd{part}")().clearAndDestroy()
+    model.finalizeFromProperties()
+    try:
+        state = model.initSystem()
+    except RuntimeError as problem:
+        pytest.skip(f"OpenSim needs the forces of this model: {problem}")
+    for component in model.getComponentsList():
+        force = opensim.Force.safeDownCast(component)
+        if force:
+            force.setAppliesForce(state, False)
+    return model, state
+
+
+def _random_state(mechanism: Mechanism, rng: np.random.Generator) -> tuple[Any, Any]:
+    q, _ = mechanism.default_state()
+    moved = [0.0 if info.locked else rng.uniform(-0.2, 0.2) for info in mechanism.coordinates]
+    q = mechanism.assemble(q + moved)
+    return q, mechanism.project_speeds(q, rng.uniform(-1.0, 1.0, len(q)))
+
+
+def _assign(model: Any, state: Any, q: Any, u: Any) -> list[Any]:
+    coordinates = [model.getCoordinateSet().get(index) for index in range(len(q))]
+    for coordinate, value, speed in zip(coordinates, q, u, strict=True):
+        if not coordinate.getLocked(state):
+            coordinate.setValue(state, value, False)
+        coordinate.setSpeedValue(state, speed)
+    return coordinates
+
+
+def test_real_models_move_as_in_opensim(corpus_model: Any, tmp_path: Path) -> None:
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    text = gzip.decompress(corpus_model.converted.read_bytes()).decode()
+    path = tmp_path / "model.osim"
+    path.write_text(text)
+    model, state = _without_forces(path)
+    read = read_text(text)
+    ours, theirs = build_mechanism(read), build_mechanism(read, opensim_derivatives=True)
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        q, u = _random_state(ours, rng)
+        coordinates = _assign(model, state, q, u)
+        model.realizeAcceleration(state)
+        _same_bodies(model, state, ours, q, u)
+        expected = np.array([item.getAccelerationValue(state) for item in coordinates])
+        if len(q) and ours.total_mass == 0.0:
+            assert np.isnan(expected).all()
+            with pytest.raises(SimulationError, match="moves no mass"):
+                ours.acceleration(q, u)
+            continue
+        scale = 1e-3 + np.abs(expected).max(initial=0.0)
+        assert np.abs(theirs.acceleration(q, u) - expected).max(initial=0.0) < 1e-10 * scale
+        apart = np.abs(ours.acceleration(q, u) - expected).max(initial=0.0) / scale
+        if corpus_model.id in _SEVERAL_ROTATIONS:
+            assert 1e-6 < apart < 1e-2
+        else:
+            assert apart < 1e-10
+
+
+def _same_bodies(model: Any, state: Any, mechanism: Mechanism, q: Any, u: Any) -> None:
+    kinematics = mechanism.at(q, u)
+    for index, body in enumerate(mechanism.bodies):
+        their_body = opensim.Body.safeDownCast(model.getComponent(body.path))
+        position = their_body.getPositionInGround(state).to_numpy()
+        assert kinematics.origins[index] == pytest.approx(position, abs=1e-11)
+        velocity = their_body.getVelocityInGround(state)
+        expected = np.concatenate([velocity.get(part).to_numpy() for part in (0, 1)])
+        assert kinematics.velocities[index] == pytest.approx(expected, abs=1e-9 * (1.0 + np.abs(expected).max()))
+    if mechanism.total_mass == 0.0:
+        return
+    assert mechanism.center_of_mass(q) == pytest.approx(model.calcMassCenterPosition(state).to_numpy(), abs=1e-11)
+    energy = model.calcKineticEnergy(state)
+    assert mechanism.kinetic_energy(q, u) == pytest.approx(energy, rel=1e-10, abs=1e-12)
