@@ -60,8 +60,7 @@ def _muted() -> Iterator[None]:
 
 
 with _muted():
-    with _standard_error_closed():
-        require("pybullet", extra="sim", purpose="the PyBullet engine")
+    require("pybullet", extra="sim", purpose="the PyBullet engine")
     import pybullet as bullet
 
 MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
@@ -512,17 +511,3 @@ def _temporary_file(text: str) -> Iterator[str]:
         yield name
     finally:
         Path(name).unlink(missing_ok=True)
-
-
-@contextmanager
-def _standard_error_closed() -> Iterator[None]:
-    """Keep what a library writes to the process's standard error: pybullet announces its build time on import."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with open(os.devnull, "wb") as nowhere:
-        os.dup2(nowhere.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
