@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,7 +36,8 @@ def demo(
 
     from osimlite._require import require
 
-    require("pybullet", extra="sim", purpose="the simulation")
+    if find_spec("pybullet") is None:
+        require("pybullet", extra="sim", purpose="the simulation")
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
     output.mkdir(parents=True, exist_ok=True)
