@@ -12,7 +12,7 @@ def build(
     source: Annotated[
         str | None,
         typer.Argument(
-            help="A built-in model (see --list), a Python file, or module:function that returns a Model.",
+            help="A built-in model (see --list), a Python file or module:function that returns a Model, or YAML or JSON.",
             show_default=False,
         ),
     ] = None,

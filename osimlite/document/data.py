@@ -18,7 +18,7 @@ from osimlite._require import require
 from osimlite.document.lexical import Unclean, real
 from osimlite.document.objects import layout_of
 from osimlite.document.printer import has_content
-from osimlite.errors import DocumentError, ModelError
+from osimlite.errors import DocumentError, MissingFileError, ModelError
 from osimlite.files import write_atomically
 from osimlite.schema.base import Component, FieldSpec, Object, Remark, Unknown, field_specs
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
@@ -45,7 +45,7 @@ def read_data(path: str | Path) -> Model:
         text = place.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = "no such file" if isinstance(error, FileNotFoundError) else str(error)
-        raise DocumentError(f"cannot read the file: {reason}", file=str(path)) from None
+        raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
     return from_data(_parsed_json(text, str(path)) if place.suffix == ".json" else _parsed_yaml(text, str(path)))
 
 

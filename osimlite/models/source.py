@@ -1,4 +1,4 @@
-"""Where a model made in Python comes from: a built-in name, a file, or ``module:function``."""
+"""Where a model to build comes from: a built-in name, Python, or a data file."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
+from osimlite.document.data import read_data
 from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.models import BUILT_IN
 from osimlite.schema.model import Model
@@ -23,12 +24,17 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     """Make the model that `source` describes.
 
     Args:
-        source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function`` or ``package.module:function``.
-        parameters: arguments of the model function, as text.
+        source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function``, ``package.module:function``,
+            or a ``.yaml`` or ``.json`` model.
+        parameters: arguments of the model function, as text; a data file takes none.
 
     Raises:
         OsimliteError: there is no such source, it has no such parameter, or it does not return a Model.
     """
+    if source.endswith((".yaml", ".yml", ".json")):
+        if parameters:
+            raise OsimliteError(f"'{source}' is data and takes no parameters; edit the file, or build from Python")
+        return read_data(source)
     function = _function(source)
     arguments = _arguments(function, parameters or {}, source)
     model = function(**arguments)
@@ -56,7 +62,7 @@ def _function(source: str) -> Callable[..., Any]:
         module = _module_named(place)
     else:
         known = did_you_mean(source, BUILT_IN) or f"; the built-in models are {listed(BUILT_IN)}"
-        raise OsimliteError(f"'{source}' is no built-in model, Python file or module:function{known}")
+        raise OsimliteError(f"'{source}' is no built-in model, Python file, module:function or data file{known}")
     if name:
         found = getattr(module, name, None)
         if not callable(found):

@@ -119,3 +119,16 @@ def test_errors_are_one_sentence(tmp_path: Path) -> None:
     code, out, error = run("info", "nowhere.osim", folder=tmp_path)
     assert (code, out) == (2, "")
     assert error == "osimlite: nowhere.osim: cannot read the file: no such file\n"
+
+
+def test_build_takes_data(fixtures: Path, tmp_path: Path) -> None:
+    from osimlite.document.data import write_data
+
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    write_data(model, tmp_path / "w.json")
+    code, _, error = run("build", "w.json", "-o", "w.osim", folder=tmp_path)
+    assert code == 0, error
+    assert osimlite.read(tmp_path / "w.osim") == model
+    code, _, error = run("build", "w.json", "-p", "a=1", folder=tmp_path)
+    assert code == 2 and "takes no parameters" in error
+    assert run("build", "nowhere.yaml", folder=tmp_path)[0] == 2
