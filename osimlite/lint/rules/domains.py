@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
+from osimlite.lint.consequences import STRICTER, consequence
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import quantity, shown
@@ -166,28 +167,6 @@ class Verdict(NamedTuple):
 _NAN_FATE = "what is computed with it becomes NaN, without a message"
 
 
-_TOUCH = "forces and motion become NaN as soon as the surfaces touch"
-
-
-_FATES: dict[tuple[str, str], tuple[Callable[[float], bool], str]] = {
-    ("Body", "mass"): (lambda v: v < 0, "OpenSim refuses to load the file"),
-    ("HuntCrossleyContactParameters", "stiffness"): (lambda v: v <= 0, _TOUCH),
-    ("ElasticFoundationContactParameters", "stiffness"): (lambda v: v <= 0, _TOUCH),
-    ("CoordinateLimitForce", "transition"): (lambda v: v == 0, "OpenSim refuses the model"),
-    ("CoordinateLimitForce", "upper_stiffness"): (lambda v: v == 0, "the limit force is 0/0, the motion NaN"),
-    ("CoordinateLimitForce", "lower_stiffness"): (lambda v: v == 0, "the limit force is 0/0, the motion NaN"),
-}
-"""What OpenSim 4.6 does with a number outside its domain, where it does not simply compute with it."""
-
-
-_DOUBTS: dict[tuple[str, str], str] = {
-    ("ContactSphere", "radius"): "it touches nothing",
-    ("HuntCrossleyContactParameters", "dissipation"): "each impact adds energy",
-    ("HuntCrossleyForce", "transition_velocity"): "friction no longer passes from rest to sliding",
-    ("CoordinateLimitForce", "damping"): "the limit adds energy",
-}
-
-
 def _outside(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any, Verdict]]:
     for cls, items in subject.by_class.items():
         for spec, inside in _domains(cls):
@@ -199,12 +178,9 @@ def _outside(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any, Verdict
                 wrong = [number for number in _numbers(value) if not inside(number) and math.isfinite(number)]
                 if not wrong or (subject.noted(item, spec) and wrong == list(_numbers(spec.default))):
                     continue
-                known, fate = _FATES.get((cls.__name__, spec.name), (None, ""))
-                if known is not None and known(wrong[0]):
-                    yield item, spec, value, Verdict(wrong[0], spec.kind.domain, fate, True)
-                else:
-                    doubt = _DOUBTS.get((cls.__name__, spec.name), "")
-                    yield item, spec, value, Verdict(wrong[0], spec.kind.domain, doubt, False)
+                fate, fails = consequence(cls, spec.name, wrong[0])
+                domain = STRICTER.get((cls.__name__, spec.name), spec.kind.domain)
+                yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
 
 
 def _report_domain(subject: Subject, found: Found, item: Object, spec: FieldSpec, value: Any, verdict: Verdict) -> None:
@@ -228,7 +204,7 @@ def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool
     for spec in value_specs(cls):
         assert isinstance(spec.kind, Value)
         if spec.kind.domain and spec.kind.scalar in ("double", "int"):
-            found.append((spec, _test(spec.kind.domain)))
+            found.append((spec, _test(STRICTER.get((cls.__name__, spec.name), spec.kind.domain))))
     return tuple(found)
 
 

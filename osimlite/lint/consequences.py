@@ -1,0 +1,83 @@
+"""What OpenSim 4.6 makes of a number outside the domain of its property.
+
+Each entry was measured: the number was put into a sound model, which was loaded, initialised and asked for
+accelerations. Where nothing is said, OpenSim computes with the number.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from osimlite.schema.base import Object
+
+REFUSED: Final = "OpenSim refuses the model"
+TOUCHING: Final = "forces and motion become NaN as soon as the surfaces touch"
+NAN: Final = "accelerations become NaN, without a message"
+
+_REFUSED_OUTSIDE: Final = {
+    "ActiveForceLengthCurve": "min_norm_active_fiber_length transition_norm_fiber_length max_norm_active_fiber_length "
+    "shallow_ascending_slope minimum_value",
+    "Body": "mass",
+    "ConstantDistanceConstraint": "constant_distance",
+    "DeGrooteFregly2016Muscle": "pennation_angle_at_optimal activation_time_constant deactivation_time_constant "
+    "default_activation default_normalized_tendon_force fiber_damping passive_fiber_strain_at_one_norm_force "
+    "tendon_strain_at_one_norm_force activation_dynamics_smoothing",
+    "FiberForceLengthCurve": "strain_at_one_norm_force stiffness_at_low_force stiffness_at_one_norm_force curviness",
+    "ForceVelocityCurve": "concentric_slope_at_vmax concentric_slope_near_vmax isometric_slope eccentric_slope_at_vmax "
+    "eccentric_slope_near_vmax max_eccentric_velocity_force_multiplier concentric_curviness eccentric_curviness",
+    "Millard2012EquilibriumMuscle": "optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
+    "deactivation_time_constant minimum_activation maximum_pennation_angle",
+    "MultivariatePolynomialFunction": "dimension order",
+    "PathSpring": "resting_length stiffness dissipation",
+    "TendonForceLengthCurve": "strain_at_one_norm_force stiffness_at_one_norm_force norm_force_at_toe_end curviness",
+    "Thelen2003Muscle": "optimal_fiber_length pennation_angle_at_optimal FmaxTendonStrain FmaxMuscleStrain "
+    "KshapeActive KshapePassive Af Flen fv_linear_extrap_threshold maximum_pennation_angle activation_time_constant "
+    "deactivation_time_constant minimum_activation",
+    "WrapCylinder": "radius length",
+    "WrapSphere": "radius",
+    "WrapTorus": "inner_radius outer_radius",
+}
+
+_REFUSED_AT_ZERO: Final = {"CoordinateLimitForce": "transition"}
+
+_NAN_OUTSIDE: Final = {
+    "ElasticFoundationContactParameters": "stiffness",
+    "HuntCrossleyContactParameters": "stiffness",
+    "SmoothSphereHalfSpaceForce": "stiffness constant_contact_force",
+}
+
+_NAN_AT_ZERO: Final = {
+    "CoordinateLimitForce": "upper_stiffness lower_stiffness",
+    "DeGrooteFregly2016Muscle": "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity",
+    "RigidTendonMuscle": "optimal_fiber_length max_contraction_velocity",
+    "Schutte1993Muscle_Deprecated": "optimal_fiber_length",
+}
+
+_DOUBTS: Final = {
+    ("CoordinateLimitForce", "damping"): "the limit adds energy",
+    ("ContactSphere", "radius"): "it touches nothing",
+    ("HuntCrossleyContactParameters", "dissipation"): "each impact adds energy",
+    ("HuntCrossleyForce", "transition_velocity"): "friction no longer passes from rest to sliding",
+    ("Millard2012EquilibriumMuscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
+    ("Thelen2003Muscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
+}
+
+STRICTER: Final = {("Thelen2003Muscle", "minimum_activation"): "0.01 to 1"}
+"""Domains that one class narrows for a property it shares with others."""
+
+
+def consequence(cls: type[Object], name: str, number: float) -> tuple[str, bool]:
+    """What happens with `number`, outside its domain, in a property; and whether that is a failure."""
+    for base in cls.__mro__:
+        known = base.__name__
+        if name in _REFUSED_OUTSIDE.get(known, "").split() or (
+            number == 0 and name in _REFUSED_AT_ZERO.get(known, "").split()
+        ):
+            return REFUSED, True
+        if name in _NAN_OUTSIDE.get(known, "").split():
+            return TOUCHING if known.endswith("ContactParameters") else NAN, True
+        if number == 0 and name in _NAN_AT_ZERO.get(known, "").split():
+            return NAN, True
+        if (known, name) in _DOUBTS:
+            return _DOUBTS[known, name], False
+    return "", False

@@ -1,0 +1,38 @@
+"""The table of what OpenSim makes of numbers outside their domain."""
+
+from __future__ import annotations
+
+import pytest
+
+from osimlite.lint import consequences
+from osimlite.lint.consequences import NAN, REFUSED, consequence
+from osimlite.schema.base import field_specs
+from osimlite.schema.fields import Value
+from osimlite.schema.registry import MODULES, class_for
+
+TABLES = ("_REFUSED_OUTSIDE", "_REFUSED_AT_ZERO", "_NAN_OUTSIDE", "_NAN_AT_ZERO")
+ENTRIES = [
+    (cls, name) for table in TABLES for cls, words in getattr(consequences, table).items() for name in words.split()
+]
+ENTRIES += [*consequences._DOUBTS, *consequences.STRICTER]
+
+
+def known_class(name):
+    from importlib import import_module
+
+    return getattr(import_module(MODULES[name]), name)
+
+
+@pytest.mark.parametrize(("cls", "name"), ENTRIES)
+def test_an_entry_is_a_property_with_a_domain(cls, name):
+    spec = next(spec for spec in field_specs(known_class(cls)).values() if spec.name == name)
+    assert isinstance(spec.kind, Value) and spec.kind.domain
+
+
+def test_a_derived_class_inherits_and_zero_differs_from_less():
+    thelen = class_for("Thelen2003Muscle")
+    limit = class_for("CoordinateLimitForce")
+    assert consequence(thelen, "minimum_activation", 0.0) == (REFUSED, True)
+    assert consequence(limit, "transition", 0.0) == (REFUSED, True)
+    assert consequence(limit, "transition", -1.0) == ("", False)
+    assert consequence(limit, "upper_stiffness", 0.0) == (NAN, True)
