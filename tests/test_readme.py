@@ -1,0 +1,42 @@
+"""What the README says is run."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.cli import COMMANDS
+from osimlite.models.dynamic_walker import dynamic_walker
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def test_the_library_examples_run(repo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    monkeypatch.chdir(tmp_path)
+    osimlite.write(dynamic_walker(), "walker.osim")
+    found = blocks((repo / "README.md").read_text(), "python")
+    assert found
+    for block in found:
+        exec(compile(block, "README.md", "exec"), {})
+    assert (tmp_path / "states.sto").exists() and (tmp_path / "copy.osim").exists()
+
+
+def test_every_command_named_exists_and_every_command_is_named(repo: Path) -> None:
+    named = set(re.findall(r"^osimlite ([a-z-]+)", "\n".join(blocks((repo / "README.md").read_text(), "sh")), re.M))
+    assert named | {"demo"} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "osimlite", command, "--help"], capture_output=True, text=True, check=True
+    )
+    assert "Usage: osimlite" in done.stdout and len(done.stdout.splitlines()) > 5
