@@ -173,6 +173,7 @@ def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable
                     return numbers
             except ValueError:
                 pass
+        cut: str | None = None
         if read is str:
             values: list[Any] = list(words)
         else:
@@ -183,10 +184,12 @@ def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable
                 except Unclean as unclean:
                     if unclean.value is ABSENT:
                         raise
-                    # A stream of numbers ends at the first word that is not one to its last character.
-                    raise Unclean("cut", word, (*values, unclean.value)) from None
+                    values.append(unclean.value)
+                    cut = cut or word
         if len(values) < least:
             raise Unclean("too-few" if values else "empty", raw.strip())
+        if cut is not None:
+            raise Unclean("cut", cut, tuple(values[:most]))
         if most is not None and len(values) > most:
             raise Unclean("too-many", raw.strip(), tuple(values[:most]))
         return tuple(values)

@@ -90,6 +90,23 @@ def test_a_range_takes_two() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "trouble", "value"),
+    [
+        ("1,5 2", "cut", (1.0, 2.0)),
+        ("1 2x", "cut", (1.0, 2.0)),
+        ("1x 2 3", "cut", (1.0, 2.0)),
+        ("1x", "too-few", ABSENT),
+        ("1 abc", "unreadable", ABSENT),
+        ("1 2 abc", "unreadable", ABSENT),
+    ],
+)
+def test_of_every_word_of_a_list_the_number_it_begins_with_counts(text: str, trouble: str, value: object) -> None:
+    with pytest.raises(Unclean) as caught:
+        converter(RANGE)(text)
+    assert (caught.value.trouble, caught.value.value) == (trouble, value)
+
+
+@pytest.mark.parametrize(
     ("text", "value"), [("true", True), ("True", True), ("1", True), ("FALSE", False), ("0", False)]
 )
 def test_switches(text: str, value: bool) -> None:
