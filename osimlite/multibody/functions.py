@@ -249,6 +249,15 @@ class SimmSpline(Univariate):
             zip(self.y, np.append(left, last).tolist(), (3.0 * sigma).tolist(), cubic.tolist(), strict=True)
         )
 
+    @property
+    def pieces(self) -> tuple[tuple[float, float, float, float], ...]:
+        """For every point k the factors of 1, t, t² and t³ from it on, t = argument - x[k].
+
+        Of the last point the first two count; they are the line beyond it. The line before the first point has the
+        first two of that.
+        """
+        return tuple(self._pieces)
+
     def _at(self, x: float) -> tuple[float, float, float]:
         last = len(self.x) - 1
         if x < self.x[0] or x > self.x[last]:
