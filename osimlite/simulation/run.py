@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from math import floor, isfinite
 from typing import Any
 
-from osimlite.errors import SimulationError
+from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
@@ -18,6 +19,7 @@ from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson, Stepper
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.trajectory import Report, Trajectory
+from osimlite.text import listed
 
 Progress = Callable[[float], object]
 """Called with the simulated time (s) reached."""
@@ -82,6 +84,16 @@ def simulate(
         )
 
 
+def _refuse_constraints(mechanism: Mechanism) -> None:
+    """Stop at what holds besides joints and locks: no engine keeps it up."""
+    kept = [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
+    if kept:
+        raise UnsupportedError(
+            f"the simulation cannot keep up {listed(kept)}; set isEnforced of a constraint and prescribed of a "
+            "coordinate to false, or lock the coordinate"
+        )
+
+
 class Simulation:
     """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
 
@@ -100,6 +112,7 @@ class Simulation:
     ) -> None:
         make = engine_factory(engine)
         self.mechanism: Mechanism = build_mechanism(model)
+        _refuse_constraints(self.mechanism)
         self.forces = force_elements(
             model, self.mechanism, skip_unsupported=skip_unsupported, simbody_early_return=simbody_early_return
         )
