@@ -1,0 +1,53 @@
+"""The walker, OpenSim's converged motion of it, and our motion at high accuracy."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.schema.model import Model
+
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+
+Table = dict[str, "np.ndarray[Any, Any]"]
+
+
+@pytest.fixture(scope="session")
+def walker(fixtures: Path) -> Model:
+    """The dynamic walker as OpenSim wrote it."""
+    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+
+
+@pytest.fixture(scope="session")
+def reference(fixtures: Path) -> Callable[[str], Table]:
+    """Columns of a reference table by their labels."""
+
+    def table(name: str) -> Table:
+        text = gzip.decompress((fixtures / "walker" / f"{name}_reference.csv.gz").read_bytes()).decode()
+        rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))
+        numbers = np.array(rows[1:], dtype=float)
+        return {label: numbers[:, place] for place, label in enumerate(rows[0])}
+
+    return table
+
+
+@pytest.fixture(scope="session")
+def simulation(walker: Model) -> Iterator[Any]:
+    """The walker made ready, Bullet choosing the route."""
+    from osimlite.simulation import Simulation
+
+    with Simulation(walker) as ready:
+        yield ready
+
+
+@pytest.fixture(scope="session")
+def precise(simulation: Any) -> Any:
+    """The walker's first two seconds at accuracy 1e-9, every millisecond."""
+    return simulation.run(2.0, accuracy=1e-9, report_interval=1e-3)
