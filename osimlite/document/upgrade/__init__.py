@@ -7,42 +7,53 @@ rounding of numbers to six digits and without the references it breaks.
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from lxml import etree
 
-from osimlite.document.upgrade import (
-    v10601_engine,  # noqa: F401
-    v10901_scale_factors,  # noqa: F401
-    v10901_transform_axes,  # noqa: F401
-    v10905_point_actuators,  # noqa: F401
-    v20002_conditional_points,  # noqa: F401
-    v20101_geometry_files,  # noqa: F401
-    v20302_muscles,  # noqa: F401
-    v30000_moving_points,  # noqa: F401
-    v30500_bodies,  # noqa: F401
-    v30500_names,  # noqa: F401
-    v30501_ground_and_joints,  # noqa: F401
-    v30502_geometry,  # noqa: F401
-    v30505_offset_frames,  # noqa: F401
-    v30505_references,  # noqa: F401
-    v30506_components,  # noqa: F401
-    v30507_coordinates_and_contact,  # noqa: F401
-    v30509_switches,  # noqa: F401
-    v30512_frame_set,  # noqa: F401
-    v30513_controls,  # noqa: F401
-    v30514_reverse,  # noqa: F401
-    v30515_wrap_objects,  # noqa: F401
-    v30516_paths,  # noqa: F401
-    v30517_sockets,  # noqa: F401
-    v40000_axis_functions,  # noqa: F401
-    v40000_meaningless,  # noqa: F401
-    v40500_path_names,  # noqa: F401
-    v40600_controllers,  # noqa: F401
-)
-from osimlite.document.upgrade.draft import STEPS, Change, Draft, Element, Refused
+from osimlite.document.upgrade import v40500_path_names, v40600_controllers  # noqa: F401
+from osimlite.document.upgrade.draft import REGISTERED, Change, Draft, Element, Refused, Step
 from osimlite.document.upgrade.v40600_class_names import class_names
 from osimlite.schema.model import CURRENT_VERSION
 
-__all__ = ["STEPS", "Change", "Refused", "Upgraded", "upgrade", "with_present_names"]
+__all__ = ["Change", "Refused", "Step", "Upgraded", "steps", "upgrade", "with_present_names"]
+
+_BEFORE_4 = (
+    "v10601_engine",
+    "v10901_scale_factors",
+    "v10901_transform_axes",
+    "v10905_point_actuators",
+    "v20002_conditional_points",
+    "v20101_geometry_files",
+    "v20302_muscles",
+    "v30000_moving_points",
+    "v30500_bodies",
+    "v30500_names",
+    "v30501_ground_and_joints",
+    "v30502_geometry",
+    "v30505_offset_frames",
+    "v30505_references",
+    "v30506_components",
+    "v30507_coordinates_and_contact",
+    "v30509_switches",
+    "v30512_frame_set",
+    "v30513_controls",
+    "v30514_reverse",
+    "v30515_wrap_objects",
+    "v30516_paths",
+    "v30517_sockets",
+    "v40000_axis_functions",
+    "v40000_meaningless",
+)
+"""The modules that only documents from before version 4 need."""
+
+
+def steps(version: int = 0) -> list[Step]:
+    """The steps that a document of this version needs, oldest first."""
+    if version < 40000:
+        for module in _BEFORE_4:
+            import_module(f"{__name__}.{module}")
+    return sorted((step for step in REGISTERED if version < step.below), key=lambda step: step.order)
 
 
 class Upgraded:
@@ -83,10 +94,9 @@ def upgrade(root: Element, version: int) -> Upgraded:
     draft = Draft(root, version)
     if root.tag == "Model":
         draft.wrap("OpenSimDocument")
-    for step in sorted(STEPS, key=lambda step: step.order):
-        if version < step.below:
-            draft.step = step
-            step.apply(draft)
+    for step in steps(version):
+        draft.step = step
+        step.apply(draft)
     return Upgraded(draft)
 
 
@@ -96,6 +106,6 @@ def with_present_names(root: Element) -> Upgraded | None:
     OpenSim takes the old names in documents of every version.
     """
     draft = Draft(root, CURRENT_VERSION)
-    draft.step = next(step for step in STEPS if step.apply is class_names)
+    draft.step = next(step for step in REGISTERED if step.apply is class_names)
     class_names(draft)
     return Upgraded(draft) if draft.touched else None

@@ -72,8 +72,8 @@ class Step(NamedTuple):
     apply: Callable[[Draft], None]
 
 
-STEPS: list[Step] = []
-"""Every step; `upgrade` runs them oldest first."""
+REGISTERED: list[Step] = []
+"""Every step whose module has been imported."""
 
 
 def step(*, below: int, order: int | None = None) -> Callable[[Callable[[Draft], None]], Callable[[Draft], None]]:
@@ -85,7 +85,7 @@ def step(*, below: int, order: int | None = None) -> Callable[[Callable[[Draft],
 
     def register(function: Callable[[Draft], None]) -> Callable[[Draft], None]:
         what = (function.__doc__ or "").strip().splitlines()[0].rstrip(".")
-        STEPS.append(Step(below, below if order is None else order, function.__name__, what, function))
+        REGISTERED.append(Step(below, below if order is None else order, function.__name__, what, function))
         return function
 
     return register

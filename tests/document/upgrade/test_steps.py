@@ -6,12 +6,15 @@ from pathlib import Path
 
 import pytest
 
+import osimlite.document.upgrade as upgrade_package
 from osimlite.document.printer import to_text
 from osimlite.document.reader import Document, read_document, read_text
 from osimlite.document.source import Source
-from osimlite.document.upgrade import STEPS
+from osimlite.document.upgrade import steps
 from osimlite.errors import VersionError
 from osimlite.schema.model import CURRENT_VERSION, Model
+
+STEPS = steps()
 
 BODIES = """
 <BodySet> <objects>
@@ -63,6 +66,13 @@ def test_steps_run_oldest_first_and_only_where_needed(fixtures: Path) -> None:
     assert {change.step for change in old.changes} == {"path_names"}
     assert all(step.below <= CURRENT_VERSION for step in STEPS)
     assert len({step.name for step in STEPS}) == len(STEPS)
+    assert [step.name for step in steps(CURRENT_VERSION)] == []
+
+
+def test_every_module_of_steps_is_listed() -> None:
+    folder = Path(upgrade_package.__file__).parent
+    listed = {step.apply.__module__.rpartition(".")[2] for step in STEPS}
+    assert listed == {path.stem for path in folder.glob("v*.py")}
 
 
 def test_the_model_knows_its_old_version() -> None:
