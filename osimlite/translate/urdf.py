@@ -24,8 +24,8 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
-from xml.sax.saxutils import quoteattr
 
+from osimlite.document.escape import quoted
 from osimlite.multibody.spatial import Array
 from osimlite.translate.passes.principal_axes import principal_axes
 from osimlite.translate.robot import Link, Robot, RobotJoint
@@ -177,7 +177,7 @@ class _Writer:
         return "\n".join(self._lines) + "\n"
 
     def _start(self, tag: str, attributes: Attributes, end: str) -> None:
-        for line in _wrapped([f"<{tag}", *(f"{name}={quoteattr(value)}" for name, value in attributes.items())], end):
+        for line in _wrapped([f"<{tag}", *(f"{name}={quoted(value)}" for name, value in attributes.items())], end):
             self.line(line)
 
 
