@@ -30,7 +30,7 @@ FAMILIES = {
     "3": "references",
     "4": "topology",
     "5": "physics",
-    "6": "muscles",
+    "6": "paths",
     "7": "files",
 }
 """The families of rules by the first digit of their codes."""
@@ -48,6 +48,7 @@ _MODULES = (
     "joints",
     "bodies",
     "physics",
+    "paths",
     "files",
 )
 

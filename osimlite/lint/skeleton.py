@@ -8,7 +8,6 @@ from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.frames import Body, Ground
 from osimlite.schema.joints import Joint
-from osimlite.schema.tree import Use
 
 
 @dataclass(slots=True)
@@ -61,8 +60,8 @@ def skeleton(subject: Subject) -> Skeleton:
     assert subject.model is not None
     bones = Skeleton([*subject.each(Body)], subject.model.ground)
     for joint in subject.each(Joint):
-        parent = _follow(subject, joint, "socket_parent_frame")
-        child = _follow(subject, joint, "socket_child_frame")
+        parent = subject.target_of(joint, "socket_parent_frame")
+        child = subject.target_of(joint, "socket_child_frame")
         bones.links.append(Link(joint, parent, child, base_of(subject, parent), base_of(subject, child)))
     subject.kept["skeleton"] = bones
     return bones
@@ -83,11 +82,5 @@ def base_of(subject: Subject, frame: Component | None) -> Component | None:
         if id(frame) in seen or "socket_parent" not in type(frame).field_specs():
             return None
         seen.add(id(frame))
-        frame = _follow(subject, frame, "socket_parent")
+        frame = subject.target_of(frame, "socket_parent")
     return frame
-
-
-def _follow(subject: Subject, owner: Component, tag: str) -> Component | None:
-    spec = type(owner).field_specs()[tag]
-    value = getattr(owner, spec.name)
-    return subject.tree.resolve(Use(owner, owner, spec, value)).target if value else None

@@ -114,6 +114,27 @@ class Subject:
         """What people call a property: ``mass of Body 'pelvis'``."""
         return f"{spec.tag} of {called(item) if item.name else self.called(item)}"
 
+    def called_with(self, item: Object) -> str:
+        """What people call a part without a name of its own: ``the SimmSpline of Coordinate 'knee'``."""
+        return called(item) if item.name else f"the {called(item)} of {called(self.owner(item))}"
+
+    def target_of(self, owner: Component, tag: str) -> Component | None:
+        """The component that a single reference of `owner` leads to."""
+        spec = type(owner).field_specs()[tag]
+        value = getattr(owner, spec.name)
+        return self.tree.resolve(Use(owner, owner, spec, value)).target if value else None
+
+    def word_at(self, item: Object, tag: str, index: int) -> tuple[str | None, int]:
+        """The word at `index` in the text of a list, and how many equal ones stand before it."""
+        number = self.element_of(item, tag)
+        if number is None or self.source is None:
+            return None, 0
+        span = self.source.spans[number]
+        words = self.source.text[span.tag_end : span.inner_end].replace(",", " ").split()
+        if index >= len(words):
+            return None, 0
+        return words[index], words[:index].count(words[index])
+
     def noted(self, item: Object, spec: FieldSpec) -> bool:
         """Whether the reader noticed something about the text of this property."""
         return (id(item), spec.name) in self._noted
