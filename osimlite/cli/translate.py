@@ -21,6 +21,15 @@ def translate(
     merge: Annotated[
         bool, typer.Option("--merge", help="Make bodies that do not move relative to each other one link.")
     ] = False,
+    geometry: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--geometry",
+            metavar="FOLDER",
+            help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
+            "Folders in the environment variable OSIMLITE_GEOMETRY, separated by colons, come last.",
+        ),
+    ] = None,
 ) -> None:
     """Translate a model: writes <model>.urdf, its meshes, and fidelity.json.
 
@@ -34,7 +43,7 @@ def translate(
     from rich.table import Table
 
     from osimlite.document.reader import read
-    from osimlite.errors import OsimliteError
+    from osimlite.errors import MissingFileError, OsimliteError
     from osimlite.text import listed
     from osimlite.translate.export import Limits, to_urdf
 
@@ -42,7 +51,10 @@ def translate(
         raise OsimliteError(f"--to is 'urdf', not '{to}'")
     if limits not in ("none", "range"):
         raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
-    urdf = to_urdf(read(file), limits=cast("Limits", limits), merge=merge, folder=file.parent)
+    for place in geometry or ():
+        if not place.is_dir():
+            raise MissingFileError("--geometry names a folder that is not there", file=str(place))
+    urdf = to_urdf(read(file), limits=cast("Limits", limits), merge=merge, folder=file.parent, geometry=geometry or ())
     written = urdf.write(output)
 
     console = Console()

@@ -12,6 +12,7 @@ from osimlite.files import write_atomically
 from osimlite.multibody import build_mechanism
 from osimlite.schema.model import Model
 from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.mesh_files import MeshFiles, geometry_folders
 from osimlite.translate.passes.merge_fixed import merge_fixed
 from osimlite.translate.passes.names import legal, legal_names
 from osimlite.translate.passes.range_limits import range_limits
@@ -74,6 +75,7 @@ def to_urdf(
     locked: Locked = "fixed",
     merge: bool = False,
     folder: str | Path | None = None,
+    geometry: Sequence[str | Path] = (),
 ) -> Urdf:
     """Translate a model to URDF.
 
@@ -84,6 +86,8 @@ def to_urdf(
         locked: whether a locked coordinate becomes a fixed joint at its default value, or a joint that moves.
         merge: make bodies that do not move relative to each other one link.
         folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
+        geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
+            separated as in PATH, follow them.
 
     Raises:
         ModelError: the model is not a mechanism: something it names is not there, or a body is not connected.
@@ -91,8 +95,9 @@ def to_urdf(
     """
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
-    places: Sequence[Path] = () if folder is None else (Path(folder), Path(folder) / "Geometry")
-    shapes = collect_visuals(model, mechanism, fidelity, places) if visuals else Visuals()
+    places = geometry_folders(None if folder is None else Path(folder), [Path(place) for place in geometry])
+    mesh_files = MeshFiles(places)
+    shapes = collect_visuals(model, mechanism, fidelity, mesh_files=mesh_files) if visuals else Visuals()
     robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body)
     if merge:
         robot = merge_fixed(robot)
@@ -100,4 +105,4 @@ def to_urdf(
         robot = range_limits(robot)
     robot = legal_names(robot)
     survey(model, robot, fidelity)
-    return Urdf(legal(model.name or "model"), urdf_text(robot), fidelity, robot, shapes.files)
+    return Urdf(legal(model.name or "model"), urdf_text(robot), fidelity, robot, mesh_files.files)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import copysign
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,8 @@ from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, FrameGeometry, 
 from osimlite.schema.model import Model
 from osimlite.translate import meshes
 from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.mesh_files import MeshFiles, MeshProblem
 from osimlite.translate.shapes import Ball, Box, MeshFile, Shape, Tube, Visual
-
-MESH_FOLDER = "meshes"
-"""Folder of the mesh files, beside the robot's own file."""
-
-READABLE = (".obj", ".stl")
-"""Kinds of mesh files that robot programs read as they are."""
 
 _Y_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""
@@ -37,7 +33,11 @@ class Visuals:
 
 
 def collect_visuals(
-    model: Model, mechanism: Mechanism, fidelity: Fidelity | None = None, folders: Sequence[Path] = ()
+    model: Model,
+    mechanism: Mechanism,
+    fidelity: Fidelity | None = None,
+    folders: Sequence[Path] = (),
+    mesh_files: MeshFiles | None = None,
 ) -> Visuals:
     """Gather the shapes of a model, each placed in the frame of the body that carries it.
 
@@ -46,19 +46,19 @@ def collect_visuals(
         mechanism: of the same model; knows where frames are.
         fidelity: is told of what cannot be drawn.
         folders: where mesh files are looked for.
+        mesh_files: takes the mesh files up, and knows the folders, instead.
     """
     account = Fidelity(model.name, "picture") if fidelity is None else fidelity
-    return _Collector(model, mechanism, account, folders).collect()
+    return _Collector(model, mechanism, account, mesh_files or MeshFiles(folders)).collect()
 
 
 class _Collector:
-    def __init__(self, model: Model, mechanism: Mechanism, fidelity: Fidelity, folders: Sequence[Path]) -> None:
+    def __init__(self, model: Model, mechanism: Mechanism, fidelity: Fidelity, mesh_files: MeshFiles) -> None:
         self.tree = model.tree()
         self.mechanism = mechanism
         self.fidelity = fidelity
-        self.folders = folders
-        self.found = Visuals()
-        self._made: dict[tuple[object, ...], str] = {}
+        self.mesh_files = mesh_files
+        self.found = Visuals(files=mesh_files.files)
 
     def collect(self) -> Visuals:
         for component in self.tree.components:
@@ -130,36 +130,48 @@ class _Collector:
         return None
 
     def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
-        name = geometry.mesh_file
-        missing, note = f"a mesh in the file {name}", self.fidelity.add
-        kind = Path(name).suffix.lower()
-        if kind not in READABLE:
-            note("mesh", path, missing, f"left out: robot programs do not read {kind or 'such'} files")
-            return None
-        source = next((folder / name for folder in self.folders if (folder / name).is_file()), None)
-        if source is None:
-            note("mesh", path, missing, "left out: the file is not beside the model, nor in its Geometry folder")
-            return None
-        try:
-            content = source.read_bytes()
-        except OSError as error:
-            note("mesh", path, missing, f"left out: {error.strerror}")
-            return None
-        if min(geometry.scale_factors) < 0.0:
-            note("mesh", path, "a mirrored mesh", "a negative scale, which not every program understands")
-        file = self._named((str(source),), Path(name).stem, kind, content)
-        return MeshFile(file, geometry.scale_factors), np.eye(4)
+        shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.fidelity, geometry.scale_factors)
+        return None if shape is None else (shape, np.eye(4))
 
     def _mesh_file(self, name: str, key: tuple[float, ...], content: str) -> str:
-        return self._named((name, *key), name, ".obj", content.encode())
+        return self.mesh_files.add((name, *key), name, ".obj", content.encode())
 
-    def _named(self, key: tuple[object, ...], stem: str, kind: str, content: bytes) -> str:
-        """Relative name of a mesh file, the same for the same key and unlike any other."""
-        if key not in self._made:
-            name, count = f"{MESH_FOLDER}/{stem}{kind}", 1
-            while name in self.found.files:
-                count += 1
-                name = f"{MESH_FOLDER}/{stem}_{count}{kind}"
-            self._made[key] = name
-            self.found.files[name] = content
-        return self._made[key]
+
+def mesh_shape(
+    name: str,
+    path: str,
+    mesh_files: MeshFiles,
+    fidelity: Fidelity,
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> MeshFile | None:
+    """A mesh file of the model as a shape; None, and a record that tells why, if nothing can be made of it.
+
+    Args:
+        name: of the file, as in the model.
+        path: absolute path of the component that names it.
+        mesh_files: finds the file and takes it up.
+        fidelity: is told what became of the file.
+        scale: factors, of which negative ones mirror the surface.
+    """
+    what, note = f"a mesh in the file {name}", fidelity.add
+    signs = (copysign(1.0, scale[0]), copysign(1.0, scale[1]), copysign(1.0, scale[2]))
+    try:
+        copy = mesh_files.copy(name, signs)
+    except MeshProblem as problem:
+        note("mesh", path, what, str(problem))
+        return None
+    if copy.converted:
+        form = "VTK's format" if copy.source.suffix.lower() == ".vtp" else "a form that not every program reads"
+        note("mesh-format", path, f"a mesh in {form}", copy.converted, f"{name} as {copy.file}")
+    if copy.misspelt:
+        note(
+            "mesh-name",
+            path,
+            "a file name in other capitals than the file's",
+            "the file taken",
+            f"{name} as {copy.source.name}",
+        )
+    if min(scale) < 0.0 and not copy.mirrored:
+        note("mesh", path, "a mirrored mesh", "a negative scale, which not every program understands")
+    x, y, z = (abs(factor) for factor in scale) if copy.mirrored else scale
+    return MeshFile(copy.file, (x, y, z))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +13,7 @@ import pytest
 
 import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.geometry import Mesh
 
 
 def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
@@ -20,7 +23,11 @@ def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
         text=True,
         cwd=folder,
         check=False,
-        env={"PATH": "", "PYTHONPATH": str(Path(osimlite.__file__).parents[1])},
+        env={
+            "PATH": "",
+            "PYTHONPATH": str(Path(osimlite.__file__).parents[1]),
+            "OSIMLITE_GEOMETRY": os.environ.get("OSIMLITE_GEOMETRY", ""),
+        },
     )
     assert "Traceback" not in done.stderr
     return done.returncode, done.stdout, done.stderr
@@ -50,12 +57,34 @@ def test_translate_takes_options(walker: Path) -> None:
     assert '<joint name="RKnee_rz" type="revolute">' in (walker / "DynamicWalkerModel.urdf").read_text()
 
 
+def test_folders_of_meshes_are_named_by_options_and_the_environment(
+    tmp_path: Path, fixtures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = osimlite.Model(name="bones")
+    for name in ("ascii", "binary", "strips"):
+        body = model.add(osimlite.Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        body.attach(Mesh(mesh_file=f"{name}.vtp"))
+        model.add(osimlite.WeldJoint(name=f"w_{name}").between(model.ground, body))
+        (tmp_path / name).mkdir()
+        shutil.copy(fixtures / "meshes" / f"{name}.vtp", tmp_path / name)
+    osimlite.write(model, tmp_path / "bones.osim")
+    monkeypatch.setenv("OSIMLITE_GEOMETRY", "nowhere:strips")
+    code, out, _ = run("bones.osim", "--geometry", "ascii", "--geometry", "binary", "-o", "robot", folder=tmp_path)
+    assert code == 0 and "VTK's format" in out
+    assert sorted(path.name for path in (tmp_path / "robot/meshes").iterdir()) == [
+        "ascii.obj",
+        "binary.obj",
+        "strips.obj",
+    ]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("walker.osim", "--to", "mjcf"), "--to is 'urdf', not 'mjcf'"),
         (("walker.osim", "--limits", "all"), "--limits is 'none' or 'range'"),
         (("gone.osim",), "gone.osim"),
+        (("walker.osim", "--geometry", "gone"), "gone: --geometry names a folder that is not there"),
         (("walker.osim", "-o", "walker.osim"), "cannot make this folder"),
     ],
 )
@@ -67,7 +96,9 @@ def test_what_cannot_be_done_is_said_in_one_line(walker: Path, arguments: tuple[
 
 def test_a_model_that_is_no_mechanism_is_refused(walker: Path) -> None:
     text = (walker / "walker.osim").read_text()
-    (walker / "loose.osim").write_text(text.replace("/bodyset/RightShank</socket_parent>", "/bodyset/RightShnk</socket_parent>"))
+    (walker / "loose.osim").write_text(
+        text.replace("/bodyset/RightShank</socket_parent>", "/bodyset/RightShnk</socket_parent>")
+    )
     code, _, error = run("loose.osim", "-o", "robot", folder=walker)
     assert code == 1 and "did you mean '/bodyset/RightShank'" in error
     assert not (walker / "robot").exists()

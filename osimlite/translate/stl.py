@@ -1,0 +1,59 @@
+"""STL files, of which many robot programs read only the binary form: 80 bytes, a count, 50 bytes a triangle."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+
+_HEAD = b"binary STL".ljust(80)
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_CORNER = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re.IGNORECASE)
+
+
+def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.0)) -> bytes:
+    """A text or binary STL file as an exact binary one.
+
+    Args:
+        content: of the file.
+        name: of the file, for messages.
+        signs: (3,) of 1 and -1 that multiply the coordinates; the outside remains outside.
+
+    Raises:
+        OsimliteError: it is not an STL file, is cut off, or has no triangle.
+    """
+    mirrored = any(sign < 0.0 for sign in signs)
+    count = int.from_bytes(content[80:84], "little")
+    if len(content) >= 84 and count and len(content) == 84 + 50 * count and not mirrored:
+        return content
+    # Some programs begin binary files with the word that text files begin with, so the length decides.
+    if len(content) >= 84 and count and len(content) >= 84 + 50 * count:
+        triangles = np.frombuffer(content, _TRIANGLE, count, 84).copy()
+    elif content.lstrip()[:5].lower() == b"solid":
+        triangles = _from_text(content, name)
+    else:
+        raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
+    if mirrored:
+        triangles["corners"] *= np.array(signs, dtype="<f4")
+        triangles["normal"] *= np.array(signs, dtype="<f4")
+        if np.prod(signs) < 0.0:
+            triangles["corners"] = triangles["corners"][:, ::-1]
+    return _HEAD + len(triangles).to_bytes(4, "little") + triangles.tobytes()
+
+
+def _from_text(content: bytes, name: str) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)
+    corners_said = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
+    if not len(numbers) or len(numbers) % 3 or len(numbers) != corners_said or b"endsolid" not in content.lower():
+        raise OsimliteError("its triangles are damaged or cut off; save it again", file=name)
+    corners = numbers.reshape(-1, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    triangles = np.zeros(len(corners), _TRIANGLE)
+    triangles["corners"] = corners
+    triangles["normal"] = normals / np.where(lengths > 0.0, lengths, 1.0)
+    return triangles
