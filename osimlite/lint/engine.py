@@ -216,8 +216,8 @@ def _collector(known: Rule, subject: Subject, findings: list[Finding]) -> Found:
                 max(1, length),
                 subject.path(item),
                 suggestion,
-                # What is said of an upgraded document need not be said of its text.
-                None if subject.upgraded else fix,
+                # What is said of an upgraded document, or of one that was guessed at, need not be said of its text.
+                None if subject.upgraded or subject.sure_until is not None else fix,
             )
         )
 

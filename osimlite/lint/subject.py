@@ -46,6 +46,13 @@ class Subject:
             self.notes = found.document.notes if found.document else []
             self.version = found.document.version if found.document else None
             self.upgraded = bool(found.document and found.document.changes)
+            if self.sure_until is not None:
+                self.notes = [note for note in self.notes if self._is_sure(note)]
+
+    def _is_sure(self, note: Note) -> bool:
+        """Whether a note is about what stands before a syntax error; only there elements are numbered rightly."""
+        assert self.source is not None and self.sure_until is not None
+        return note.number < len(self.source.spans) and self.source.of_tag(note.number).line < self.sure_until
 
     @property
     def file(self) -> str | None:

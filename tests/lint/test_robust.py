@@ -1,0 +1,90 @@
+"""Whatever stands in a file, the validator answers with findings."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.lint import validate
+from osimlite.lint.reporters import render
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXTS = [
+    path.read_text()
+    for path in (ROOT / "fixtures/lint/skeleton.osim", ROOT / "fixtures/walker/DynamicWalkerModel.osim")
+]
+SCRAPS = [
+    "<",
+    ">",
+    "&",
+    "</objects>",
+    "<objects>",
+    "<Body name='x'/>",
+    "NaN",
+    "1e999",
+    "\x00",
+    "é",
+    "<!--",
+    "-->",
+    "]]>",
+    "'",
+]
+
+
+def spoilt(text: str, draw: random.Random) -> str:
+    for _ in range(draw.randint(1, 4)):
+        at = draw.randrange(len(text))
+        match draw.randrange(5):
+            case 0:
+                text = text[:at] + text[at + draw.randint(1, 200) :]
+            case 1:
+                text = text[:at] + draw.choice(SCRAPS) + text[at:]
+            case 2:
+                text = text[:at] + text[at : at + draw.randint(1, 400)] * 2 + text[at:]
+            case 3:
+                words = text.split(" ")
+                draw.shuffle(words[: draw.randint(1, 3)])
+                first, second = draw.sample(range(len(words)), 2)
+                words[first], words[second] = words[second], words[first]
+                text = " ".join(words)
+            case _:
+                lines = text.splitlines(keepends=True)
+                del lines[draw.randrange(len(lines))]
+                text = "".join(lines)
+    return text
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_spoilt_text_has_findings_in_places_that_exist(seed):
+    draw = random.Random(seed)
+    text = spoilt(draw.choice(TEXTS), draw)
+    source = Source(text.encode(), "spoilt.osim")
+    report = validate(source)
+    lines = source.lines
+    for finding in report:
+        assert finding.line is not None and 1 <= finding.line <= len(lines) + 1
+        assert finding.column is not None and finding.column >= 1
+    assert render(report)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\xff\xfe",
+        b"\x00" * 100,
+        b"<" * 1000,
+        b"<OpenSimDocument Version='40600'/>",
+        b"<OpenSimDocument Version='40600'><Model/></OpenSimDocument>",
+        b"<OpenSimDocument Version='-1'><Model/></OpenSimDocument>",
+        b"<OpenSimDocument Version='40600'><Model>" + b"<a>" * 5000 + b"</a>" * 5000 + b"</Model></OpenSimDocument>",
+        b"<!DOCTYPE a [<!ENTITY b 'c'>]><OpenSimDocument Version='40600'><Model/></OpenSimDocument>",
+        '<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'.encode("utf-16"),
+    ],
+    ids=range(10),
+)
+def test_odd_bytes_raise_nothing(data):
+    assert render(validate(Source(data, "odd.osim")), "json")
