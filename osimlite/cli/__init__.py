@@ -11,8 +11,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from typer import Typer
 
-COMMANDS = ("build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "simulate", "demo")
-"""Every command in the order of the help; ``osimlite.cli.<name>.<name>`` is its function."""
+COMMANDS = (
+    "build",
+    "validate",
+    "rule",
+    "format",
+    "upgrade",
+    "diff",
+    "info",
+    "translate",
+    "simulate",
+    "kinematics",
+    "inverse-dynamics",
+    "demo",
+)
+"""Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
 
 
 def app(names: Sequence[str] = COMMANDS) -> Typer:
@@ -28,7 +41,8 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     for name in names:
-        application.command(name)(getattr(import_module(f"osimlite.cli.{name}"), name))
+        function = name.replace("-", "_")
+        application.command(name)(getattr(import_module(f"osimlite.cli.{function}"), function))
 
     @application.callback(invoke_without_command=True)
     def osimlite(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:

@@ -6,6 +6,7 @@ moving frame.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +53,16 @@ def rotation_xyz(angles: Array) -> Array:
             (s1 * s3 - c1 * s2 * c3, s1 * c3 + c1 * s2 * s3, c1 * c2),
         )
     )
+
+
+def angles_xyz(rotation: Array) -> Array:
+    """Body-fixed X-Y-Z angles (3,) of a rotation matrix, the second from -90 to 90 degrees (rad)."""
+    (r11, r12, r13), (r21, r22, r23), (_, _, r33) = rotation.tolist()
+    second = math.asin(min(1.0, max(-1.0, r13)))
+    if abs(r13) > 1.0 - 1e-14:
+        # Only the sum (or difference) of the other two shows; let the third be zero.
+        return np.array((math.atan2(r21, r22) * math.copysign(1.0, r13), second, 0.0))
+    return np.array((math.atan2(-r23, r33), second, math.atan2(-r12, r11)))
 
 
 def transform(rotation: Any = None, translation: Any = None) -> Array:

@@ -42,12 +42,19 @@ class StoTable:
         return values
 
 
-def sto_text(name: str, times: Iterable[float], columns: Sequence[str], rows: Iterable[Iterable[float]]) -> str:
+def sto_text(
+    name: str,
+    times: Iterable[float],
+    columns: Sequence[str],
+    rows: Iterable[Iterable[float]],
+    *,
+    in_degrees: bool = False,
+) -> str:
     """Write a table as OpenSim 4.6 does, but with all digits of every number."""
     lines = ["\t".join(map(_number, (t, *row))) for t, row in zip(times, rows, strict=True)]
     header = [
         name,
-        "inDegrees=no",
+        f"inDegrees={'yes' if in_degrees else 'no'}",
         f"nColumns={len(columns) + 1}",
         f"nRows={len(lines)}",
         "DataType=double",
@@ -59,14 +66,20 @@ def sto_text(name: str, times: Iterable[float], columns: Sequence[str], rows: It
 
 
 def write_sto(
-    path: str | Path, name: str, times: Iterable[float], columns: Sequence[str], rows: Iterable[Iterable[float]]
+    path: str | Path,
+    name: str,
+    times: Iterable[float],
+    columns: Sequence[str],
+    rows: Iterable[Iterable[float]],
+    *,
+    in_degrees: bool = False,
 ) -> None:
     """Write a table to a file, whole or not at all.
 
     Raises:
         OsimliteError: the file cannot be written.
     """
-    write_atomically(path, sto_text(name, times, columns, rows))
+    write_atomically(path, sto_text(name, times, columns, rows, in_degrees=in_degrees))
 
 
 def read_sto(path: str | Path) -> StoTable:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.multibody.smoothing_spline import rates_of_samples, smoothing_spline
 
 X = (0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.5, 3.1, 3.3)
 Y = (0.1, 0.5, 0.4, 1.2, 1.0, 0.3, -0.4, -0.5, -0.2, 0.3)
@@ -110,3 +110,17 @@ def test_the_residuals_have_the_variance_asked_for(half_order):
     spline = smoothing_spline(x, np.sin(x) + noise, half_order, 0.05**2)
     off = [_at(spline, knot)[0] - np.sin(knot) for knot in x]
     assert np.sqrt(np.mean(np.square(off))) < 0.5 * np.std(noise)
+
+
+@pytest.mark.parametrize("count", [6, 192, 193, 450])
+def test_rates_taken_in_blocks_are_those_of_the_whole_spline(count):
+    rng = np.random.default_rng(6)
+    x = np.cumsum(rng.uniform(0.01, 0.02, count))
+    y = np.cumsum(rng.normal(size=(count, 2)), axis=0)
+    first, second = rates_of_samples(x, y)
+    for column in range(2):
+        whole = smoothing_spline(x, y[:, column], 3, 0.0)
+        for row in {0, 1, count // 2, min(191, count - 1), min(192, count - 1), count - 1}:
+            _, slope, bend = _at(whole, x[row])
+            assert first[row, column] == pytest.approx(slope, rel=1e-8, abs=1e-8 * np.abs(first).max())
+            assert second[row, column] == pytest.approx(bend, rel=1e-8, abs=1e-8 * np.abs(second).max())

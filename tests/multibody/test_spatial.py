@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from osimlite.multibody.spatial import (
     RelativeMotion,
+    angles_xyz,
     cross,
     inverse,
     offset,
@@ -31,6 +32,16 @@ def test_cross_and_skew_are_the_cross_product(a, b):
 def test_body_fixed_angles_are_three_turns_in_a_row(angles):
     turns = [rotation_about(axis, angle) for axis, angle in zip(AXES, angles, strict=True)]
     assert rotation_xyz(angles) == pytest.approx(turns[0] @ turns[1] @ turns[2], abs=1e-15)
+
+
+@given(vectors, st.sampled_from([None, -np.pi / 2, np.pi / 2]))
+def test_angles_of_a_rotation_make_that_rotation(angles, second):
+    if second is not None:
+        angles[1] = second
+    rotation = rotation_xyz(angles)
+    found = angles_xyz(rotation)
+    assert abs(found[1]) <= np.pi / 2
+    assert rotation_xyz(found) == pytest.approx(rotation, abs=1e-7 if second is None else 1e-14)
 
 
 def test_a_rotation_keeps_its_axis_and_turns_the_right_way():

@@ -1,0 +1,36 @@
+"""What the commands on recorded motions share: opening a model with a motion, writing tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.console import Console
+
+from osimlite.document.reader import read
+from osimlite.multibody import build_mechanism
+from osimlite.simulation.recorded import RecordedMotion
+from osimlite.simulation.storage import StoTable, write_sto
+from osimlite.text import listed
+
+
+def opened(file: Path, motion: Path) -> RecordedMotion:
+    """The motion of the model."""
+    return RecordedMotion.read(build_mechanism(read(file)), motion)
+
+
+def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path) -> None:
+    """Write tables into a folder and say what they are made from."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, table in tables.items():
+        write_sto(
+            folder / name, table.name, table.times, table.columns, table.rows.tolist(), in_degrees=table.in_degrees
+        )
+    console = Console(highlight=False, soft_wrap=True)
+    if recorded.missing:
+        console.print(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
+    if recorded.ignored:
+        console.print(f"columns that name no coordinate, ignored: {listed(recorded.ignored)}")
+    times = recorded.times
+    paths = listed([str(folder / name) for name in tables])
+    console.print(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

@@ -1,0 +1,34 @@
+"""``osimlite kinematics``: where bodies and markers are during a recorded motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def kinematics(
+    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    motion: Annotated[Path, typer.Argument(help="Coordinates over time, .mot or .sto.", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
+    ] = Path("."),
+    assemble: Annotated[
+        bool, typer.Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
+    ] = False,
+) -> None:
+    """Follow a recorded motion: writes bodies.sto and markers.sto.
+
+    bodies.sto holds the mass centre (m) and the body-fixed X-Y-Z angles (degrees) of every body in ground, as OpenSim's
+    BodyKinematics does, and the whole mass centre; markers.sto the markers (m).
+
+    Example: osimlite kinematics gait2392.osim walk.mot -o results
+    """
+    from osimlite.cli._recorded import opened, written
+
+    recorded = opened(file, motion)
+    if assemble:
+        recorded = recorded.assembled()
+    written(recorded, {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}, output)

@@ -1,0 +1,147 @@
+"""Motions that were recorded: coordinate values from a file, what follows for bodies and markers, and inverse dynamics.
+
+The quantities, their names and their order are those of OpenSim's BodyKinematics analysis and InverseDynamicsTool.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.errors import DocumentError, ModelError
+from osimlite.multibody.dynamics import MassCentres
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.smoothing_spline import rates_of_samples
+from osimlite.multibody.spatial import Array, angles_xyz
+from osimlite.simulation.storage import StoTable, read_sto
+from osimlite.text import listed
+
+_HALF_ORDER = 3
+"""OpenSim differentiates coordinates by splines of fifth degree."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedMotion:
+    """Values of all coordinates of a mechanism at t times.
+
+    Attributes:
+        mechanism: whose coordinates they are.
+        times: (t,), s.
+        values: (t, n) in the order of the mechanism's coordinates, rad and m.
+        missing: coordinates that the record does not have; they keep their default values.
+        ignored: columns of the record that name no coordinate.
+    """
+
+    mechanism: Mechanism
+    times: Array
+    values: Array
+    missing: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+    @classmethod
+    def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
+        """The motion in a .mot or .sto file.
+
+        A column is named as the coordinate, or by the path of its value (``/jointset/knee/knee_angle/value``). If
+        the file is in degrees, rotational coordinates are converted, coupled ones are not, as in OpenSim.
+
+        Raises:
+            DocumentError: it is not a storage file, or its times do not increase.
+            ModelError: no column names a coordinate of the mechanism.
+        """
+        table = read_sto(path)
+        names = {info.path: place for place, info in enumerate(mechanism.coordinates)}
+        for place, info in enumerate(mechanism.coordinates):
+            names.setdefault(info.name, place)
+        values = np.tile(mechanism.values({}), (len(table.times), 1))
+        found: set[int] = set()
+        ignored = []
+        for column, label in enumerate(table.columns):
+            place = names.get(label.removesuffix("/value"), -1)
+            if place < 0:
+                ignored.append(label)
+            elif place not in found:
+                found.add(place)
+                turned = table.in_degrees and mechanism.coordinates[place].motion_type == "rotational"
+                values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
+        if not found:
+            raise ModelError(
+                f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
+                f"{listed(mechanism.coordinate_names)}",
+                file=str(path),
+            )
+        late = np.flatnonzero(np.diff(table.times) <= 0.0)
+        if len(late):
+            raise DocumentError(
+                f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
+                file=str(path),
+            )
+        missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in found)
+        return cls(mechanism, table.times, values, missing, tuple(ignored))
+
+    @cached_property
+    def rates(self) -> tuple[Array, Array]:
+        """First and second derivatives (t, n) of the values, by natural splines of fifth degree through them.
+
+        Raises:
+            ModelError: there are fewer than six times.
+        """
+        if len(self.times) < 2 * _HALF_ORDER:
+            raise ModelError(f"the motion has {len(self.times)} times; accelerations need at least {2 * _HALF_ORDER}")
+        return rates_of_samples(self.times, self.values, _HALF_ORDER)
+
+    def assembled(self) -> RecordedMotion:
+        """The motion with every pose changed as little as the constraints demand.
+
+        Raises:
+            SimulationError: a pose is too far from fulfilling them.
+        """
+        poses = [self.mechanism.assemble(q, float(time)) for time, q in zip(self.times, self.values, strict=True)]
+        return RecordedMotion(self.mechanism, self.times, np.array(poses), self.missing, self.ignored)
+
+    def bodies(self) -> StoTable:
+        """Mass centre of each body (m) and its body-fixed X-Y-Z angles (degrees) in ground, then the mass centre."""
+        mechanism = self.mechanism
+        columns = [f"{body.name}_{what}" for body in mechanism.bodies for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")]
+        rows = np.empty((len(self.times), len(columns) + 3))
+        for row, q in zip(rows, self.values, strict=True):
+            state = mechanism.at(q)
+            angles = [np.degrees(angles_xyz(rotation)) for rotation in state.rotations[:-1]]
+            centres = MassCentres.of(state).positions()
+            row[:-3] = np.concatenate([centres, np.reshape(angles, (-1, 3))], axis=1).ravel()
+            row[-3:] = mechanism.inertial[0] @ centres / (mechanism.total_mass or 1.0)
+        labels = (*columns, *(f"center_of_mass_{axis}" for axis in "XYZ"))
+        return StoTable("Positions", self.times, labels, rows, in_degrees=True)
+
+    def markers(self) -> StoTable:
+        """Position (m) in ground of every marker."""
+        mechanism = self.mechanism
+        places = {path: place for path, place in mechanism.stations.items() if path.startswith("/markerset/")}
+        columns = [f"{path.rsplit('/', 1)[1]}_{axis}" for path in places for axis in "XYZ"]
+        rows = np.empty((len(self.times), len(columns)))
+        for row, q in zip(rows, self.values, strict=True):
+            state = mechanism.at(q)
+            row[:] = [number for place in places.values() for number in state.point(*place)]
+        return StoTable("MarkerPositions", self.times, tuple(columns), rows)
+
+    def inverse_dynamics(self) -> StoTable:
+        """Generalized forces (N, N·m) that make the bodies move so against gravity.
+
+        Locks and other constraints are left aside, as in OpenSim. The forces belong to the generalized speeds: for
+        ball and free joints a moment about an axis of the joint's parent frame. There OpenSim's tool takes the
+        rates of the angles for the speeds, which is wrong unless the angles are small.
+        """
+        mechanism = self.mechanism
+        first, second = self.rates
+        rows = np.empty_like(self.values)
+        for row, q, qdot, qddot in zip(rows, self.values, first, second, strict=True):
+            u = mechanism.speeds_from_rates(q, qdot)
+            udot = mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u))
+            row[:] = mechanism.inverse_dynamics(q, u, udot)
+        order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
+        infos = [mechanism.coordinates[place] for place in order]
+        labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]
+        return StoTable("Inverse Dynamics Generalized Forces", self.times, tuple(labels), rows[:, order])

@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from osimlite.errors import DocumentError, ModelError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import rotation_xyz
+from osimlite.schema.frames import Body
+from osimlite.schema.joints import BallJoint, PinJoint
+from osimlite.schema.markers import Marker
+from osimlite.schema.model import Model
+from osimlite.simulation.recorded import RecordedMotion
+from osimlite.simulation.storage import write_sto
+
+
+@pytest.fixture(scope="module")
+def arm() -> Mechanism:
+    """A body on a ball joint, a second on a pin."""
+    model = Model(name="arm")
+    inner, outer = (
+        model.add(Body(name=name, mass=1.3, mass_center=(0.1, -0.2, 0.05), inertia=(0.2, 0.3, 0.25, 0.01, 0.0, 0.02)))
+        for name in ("inner", "outer")
+    )
+    for kind, name, parent, child in ((BallJoint, "shoulder", model.ground, inner), (PinJoint, "elbow", inner, outer)):
+        joint = model.add(kind(name=name).between(parent, child, at=(0.1, 0.3, 0.2), turned=(0.4, 0.1, 0.2)))
+        for place, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"{name}_{place}"
+    model.add(Marker(name="tip", socket_parent_frame=outer, location=(0.1, 0.2, 0.3)))
+    return build_mechanism(model)
+
+
+def _motion(mechanism: Mechanism, times: np.ndarray) -> np.ndarray:
+    places = range(len(mechanism.coordinates))
+    return np.array([0.3 * np.sin((1.0 + 0.3 * k) * times + k) for k in places]).T
+
+
+def _exact_forces(mechanism: Mechanism, time: float) -> np.ndarray:
+    step = 1e-3
+    q, before, after = (_motion(mechanism, np.array((time + shift,)))[0] for shift in (0.0, -step, step))
+    far = [_motion(mechanism, np.array((time + shift,)))[0] for shift in (-2 * step, 2 * step)]
+    qdot = (8.0 * (after - before) - (far[1] - far[0])) / (12.0 * step)
+    qddot = (16.0 * (after + before) - (far[0] + far[1]) - 30.0 * q) / (12.0 * step**2)
+    u = mechanism.speeds_from_rates(q, qdot)
+    return mechanism.inverse_dynamics(q, u, mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u)))
+
+
+def test_forces_of_a_known_motion(arm):
+    times = np.linspace(0.0, 3.0, 601)
+    motion = RecordedMotion(arm, times, _motion(arm, times))
+    table = motion.inverse_dynamics()
+    assert table.columns == ("shoulder_0_moment", "shoulder_1_moment", "shoulder_2_moment", "elbow_0_moment")
+    for row in (150, 192, 300, 384, 450):
+        assert table.rows[row] == pytest.approx(_exact_forces(arm, times[row]), abs=1e-6)
+
+
+def test_where_bodies_and_markers_are(arm):
+    times = np.array((0.0, 0.4))
+    motion = RecordedMotion(arm, times, _motion(arm, times))
+    bodies, markers = motion.bodies(), motion.markers()
+    assert bodies.in_degrees
+    for row, q in enumerate(motion.values):
+        state = arm.at(q)
+        for index, body in enumerate(arm.bodies):
+            place, angles = (
+                [bodies[f"{body.name}_{word}"][row] for word in words]
+                for words in (("X", "Y", "Z"), ("Ox", "Oy", "Oz"))
+            )
+            assert place == pytest.approx(state.point(index, body.mass_properties.center), abs=1e-14)
+            assert rotation_xyz(np.radians(angles)) == pytest.approx(state.rotations[index], abs=1e-14)
+        tip = [markers[f"tip_{axis}"][row] for axis in "XYZ"]
+        assert tip == pytest.approx(arm.station_position("outer", (0.1, 0.2, 0.3), q), abs=1e-14)
+        assert bodies.rows[row, -3:] == pytest.approx(arm.center_of_mass(q), abs=1e-14)
+
+
+def test_files_name_coordinates_in_either_way_and_in_degrees(arm, tmp_path: Path):
+    path = tmp_path / "motion.mot"
+    columns = ("elbow_0", "/jointset/shoulder/shoulder_1/value", "ground_force_vx")
+    write_sto(path, "motion", [0.0, 0.1], columns, [[90.0, 0.0, 700.0], [45.0, 30.0, 710.0]], in_degrees=True)
+    motion = RecordedMotion.read(arm, path)
+    assert motion.values[:, 3] == pytest.approx(np.radians((90.0, 45.0)))
+    assert motion.values[:, 1] == pytest.approx(np.radians((0.0, 30.0)))
+    assert (motion.missing, motion.ignored) == (("shoulder_0", "shoulder_2"), ("ground_force_vx",))
+
+
+def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
+    path = tmp_path / "motion.mot"
+    write_sto(path, "motion", [0.0, 0.1], ("knee",), [[1.0], [2.0]])
+    with pytest.raises(ModelError, match="no column is a coordinate of 'arm'; its coordinates are shoulder_0"):
+        RecordedMotion.read(arm, path)
+    write_sto(path, "motion", [0.0, 0.2, 0.1], ("elbow_0",), [[1.0], [2.0], [3.0]])
+    with pytest.raises(DocumentError, match=r"the time 0\.1 does not come after 0\.2"):
+        RecordedMotion.read(arm, path)
+    write_sto(path, "motion", [0.0, 0.1, 0.2], ("elbow_0",), [[1.0], [2.0], [3.0]])
+    with pytest.raises(ModelError, match="the motion has 3 times; accelerations need at least 6"):
+        RecordedMotion.read(arm, path).inverse_dynamics()
