@@ -357,8 +357,7 @@ class _Body:
     def _load(self, robot: Robot, gravity: Sequence[float]) -> None:
         client = self.client
         bullet.setGravity(*gravity, physicsClientId=client)
-        # Bullet keeps files by name, and temporary names may come again.
-        bullet.setPhysicsEngineParameter(enableFileCaching=0, numSubSteps=0, physicsClientId=client)
+        bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
         self.impossible = [link.name for link in robot.links if _excess(link) > 0.0]
         with _temporary_file(self._text(robot)) as path:
             self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)

@@ -1,0 +1,101 @@
+"""``osimlite simulate`` from the command line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from osimlite.errors import OsimliteError
+from osimlite.simulation import read_sto
+
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+
+
+@pytest.fixture
+def walker(fixtures: Path) -> str:
+    return str(fixtures / "walker" / "DynamicWalkerModel.osim")
+
+
+def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "osimlite", "simulate", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        check=False,
+        env={"PATH": "", "COLUMNS": "80", "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert "Traceback" not in done.stderr
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_files_and_table(walker, tmp_path):
+    code, out, err = run(
+        walker, "--to", "0.5", "--set", "RHip_rz=40deg", "--set-speed", "LKnee_rz=-1.5", "-o", "r", folder=tmp_path
+    )
+    assert (code, err) == (0, "")
+    assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["forces.sto", "states.sto", "summary.json"]
+    states = read_sto(tmp_path / "r" / "states.sto")
+    assert states["/jointset/RightThighToPelvis/RHip_rz/value"][0] == pytest.approx(0.6981317007977318)
+    assert states["/jointset/LeftShankToThigh/LKnee_rz/speed"][0] == -1.5
+    assert states.times[-1] == 0.5 and len(states.times) == 51
+    assert max(map(len, out.splitlines())) <= 80 and "RFootForce" in out
+    assert json.loads((tmp_path / "r" / "summary.json").read_text())["settings"]["initial_speeds"] == {"LKnee_rz": -1.5}
+
+
+def test_fixed_step(walker, tmp_path):
+    code, out, _ = run(walker, "--to", "0.1", "--fixed-step", "1e-3", "--report-interval", "0.05", folder=tmp_path)
+    assert code == 0 and "100 of 100" in out
+    assert len(read_sto(tmp_path / "states.sto").times) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--set", "RHip=1"], 1, "did you mean 'RHip_rz'"),
+        (["--set", "RHip_rz"], 2, "COORDINATE=VALUE"),
+        (["--set", "RHip_rz=fast"], 2, "a number such as 0.5 or 30deg"),
+        (["--set", "Pelvis_tx=3deg"], 2, "m, cm or mm"),
+        (["--set", "RHip_rz=3cm"], 2, "deg or rad"),
+        (["--set", "platform_rz=0"], 1, "is locked"),
+        (["--to", "-1"], 1, "positive time"),
+        (["--fixed-step", "0.1"], 1, "shorter fixed step"),
+        (["--fixed-step", "0.1", "--accuracy", "1e-3"], 2, "take one of them"),
+        (["--engine", "bulet"], 2, "did you mean 'bullet'"),
+        (["--gui"], 1, "no screen"),
+    ],
+)
+def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, arguments, code, words):
+    found, out, err = run(walker, *arguments, "-o", "r", folder=tmp_path)
+    assert found == code and out == ""
+    assert len(err.splitlines()) == 1 and words in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unsupported_force(walker, tmp_path):
+    text = Path(walker).read_text()
+    motor = '<CoordinateActuator name="motor"><coordinate>RHip_rz</coordinate></CoordinateActuator>'
+    place = text.index("<objects>", text.index("<ForceSet")) + len("<objects>")
+    (tmp_path / "m.osim").write_text(text[:place] + motor + text[place:])
+    code, _, err = run("m.osim", folder=tmp_path)
+    assert code == 1 and "/forceset/motor" in err and "--skip-unsupported" in err
+    code, out, _ = run("m.osim", "--skip-unsupported", "--to", "0.1", folder=tmp_path)
+    assert code == 0 and "left out" in out
+
+
+def test_pictures_fail_as_a_whole(walker, tmp_path, monkeypatch):
+    from osimlite.cli import simulate as command
+    from osimlite.view import plots
+
+    def fail(*_: object) -> list[Path]:
+        raise OsimliteError("no ink")
+
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
+    monkeypatch.setattr(plots, "plot_simulation", fail)
+    with pytest.raises(OsimliteError, match="no ink"):
+        command.simulate(Path(walker), to=0.05, output=tmp_path / "r", plot=True)
+    assert not (tmp_path / "r").exists()

@@ -1,0 +1,201 @@
+"""What Bullet does by default that is not mechanics, and that the engine mends it.
+
+Every test shows both: that the result is right, and that it is wrong once the mend is taken out. What is mended in
+the URDF file is tested with the URDF writer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import Body, Coordinate, Model
+from osimlite.errors import OsimliteError, UnsupportedError
+from osimlite.multibody import build_mechanism
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.engines import bullet as engine_module
+from osimlite.simulation.engines.bullet import BulletEngine, _Body
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.integrators import SemiImplicitEuler
+
+bullet = engine_module.bullet
+
+ROUTES = ("mass-matrix", "articulated-body")
+Q = [-0.17453292519943295, 0.1, 0.3, 0.9, 0.4, -0.2, -0.6, -0.3]
+U = [0.0, 0.5, 0.3, 1.0, 3.0, -4.0, -2.0, 5.0]
+
+
+@pytest.fixture(scope="module")
+def mechanism(walker):
+    return build_mechanism(walker)
+
+
+def error(mechanism, route="articulated-body", *, q=Q, u=U):
+    """Largest error of an acceleration against our own recursion, relative to the largest acceleration."""
+    expected = mechanism.acceleration(q, u)
+    with BulletEngine(mechanism, Forces(()), route=route) as engine:
+        return np.abs(np.subtract(engine.acceleration(0.0, q, u), expected)).max() / np.abs(expected).max()
+
+
+def test_1_damping(mechanism, monkeypatch):
+    assert error(mechanism) < 1e-12
+    monkeypatch.setattr(_Body, "DAMPING", 0.04)
+    assert error(mechanism) > 1e-3
+
+
+def test_2_motors(mechanism, monkeypatch):
+    assert error(mechanism) < 1e-12
+    monkeypatch.setattr(_Body, "_switch_motors_off", lambda self: None)
+    assert error(mechanism) > 1e-3
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_3_inertia_from_the_file(mechanism, monkeypatch, route):
+    assert error(mechanism, route) < 1e-12
+    monkeypatch.setattr(_Body, "FLAGS", 0)
+    assert error(mechanism, route) > 1e-3
+
+
+def test_5_ranges_are_no_limits(walker):
+    """The knee leaves its range in OpenSim, and here."""
+    knee = next(item for item in walker.components(Coordinate) if item.name == "RKnee_rz")
+    trajectory = osimlite.simulate(walker, fixed_step=1e-3)
+    assert trajectory.values[:, trajectory.coordinates.index("RKnee_rz")].min() < knee.range[0] - 0.1
+
+
+def spinning(speed):
+    model = Model(name="wheel", gravity=(0.0, 0.0, 0.0))
+    wheel = model.add(Body(name="wheel", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(
+        osimlite.PinJoint(name="axle", coordinates=[Coordinate(name="turn", default_speed_value=speed)]).between(
+            model.ground, wheel
+        )
+    )
+    return model
+
+
+def test_7_fast_joints_are_not_clipped(monkeypatch):
+    assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01).speeds[-1, 0] == pytest.approx(150.0)
+    monkeypatch.setattr(_Body, "FASTEST", 100.0)
+    with pytest.raises(OsimliteError, match="bursts"):
+        osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01)
+
+
+def impossible_inertia():
+    """A shank as published models have it: one moment is larger than the sum of the others."""
+    model = Model(name="impossible")
+    carrier = model.ground
+    for number in range(2):
+        body = model.add(Body(name=f"b{number}", mass=2.0, inertia=(2.0, 0.5, 0.002, 0.1, 0.0, 0.05)))
+        joint = osimlite.GimbalJoint(name=f"j{number}", coordinates=[Coordinate(name=f"q{number}{x}") for x in "xyz"])
+        model.add(joint.between(carrier, body, child_at=(0.0, 0.3, 0.0)))
+        carrier = body
+    return build_mechanism(model)
+
+
+def test_11_inertia_that_no_body_has(monkeypatch, capfd):
+    mechanism = impossible_inertia()
+    state = {"q": [0.1, 0.2, 0.3, -0.4, 0.5, 0.6], "u": [1.0, -1.0, 0.5, 2.0, 1.0, -0.5]}
+    assert error(mechanism, "auto", **state) < 1e-10
+    # Nor does Bullet complain, since it never sees it.
+    assert capfd.readouterr() == ("", "")
+    with BulletEngine(mechanism, Forces(())) as engine:
+        assert engine.route == "articulated-body"
+    with pytest.raises(UnsupportedError, match=r"'b0'.*articulated-body"):
+        BulletEngine(mechanism, Forces(()), route="mass-matrix")
+    with monkeypatch.context() as without:
+        without.setattr(_Body, "_set_inertias", lambda *_: None)
+        assert error(mechanism, "auto", **state) > 1e-3
+    monkeypatch.setattr(engine_module, "_excess", lambda link: 0.0)
+    assert error(mechanism, "articulated-body", **state) > 1e-3
+    # Bullet's own complaint stays in the buffer of the C library until then.
+    capfd.readouterr()
+
+
+def steps(walker, h=1e-3, to=0.3):
+    """States by Bullet's own steps, and the same method by the engine's accelerations."""
+    mechanism = build_mechanism(walker)
+    with BulletEngine(mechanism, force_elements(walker, mechanism)) as engine:
+        y = engine.state.pack(Q, U)
+        euler = SemiImplicitEuler(engine.derivative, 0.0, y, len(y) // 2, h)
+        expected = [state for _, state in euler.steps(to)]
+        own = engine.stepper(0.0, y, Settings(fixed_step=h), lambda t, state: None)
+        return np.array([state for _, state in own.steps(to)]), np.array(expected)
+
+
+def test_13_to_16_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
+    """A step is exactly semi-implicit Euler with the forces at its start: no stale places, no force twice."""
+    ours, expected = steps(walker)
+    assert ours == pytest.approx(expected, abs=1e-9)
+    plain = _Body.step
+
+    def twice(self, h, forces):
+        both = [2.0 * force for force in forces]
+        plain(self, h, both)
+
+    monkeypatch.setattr(_Body, "step", twice)
+    ours, expected = steps(walker)
+    assert np.abs(ours - expected).max() > 1e-3
+
+
+def test_13_stale_places_would_show(walker, monkeypatch):
+    """With forces one step old, as Bullet's own link positions are, the motion differs."""
+    plain = _Body.step
+    held = []
+
+    def stale(self, h, forces):
+        held.append(list(forces))
+        plain(self, h, held[-2] if len(held) > 1 else held[-1])
+
+    monkeypatch.setattr(_Body, "step", stale)
+    ours, expected = steps(walker)
+    assert np.abs(ours - expected).max() > 1e-3
+
+
+def parameters(client):
+    return bullet.getPhysicsEngineParameters(client)
+
+
+def test_17_no_sub_steps(mechanism):
+    with BulletEngine(mechanism, Forces(())) as engine:
+        assert parameters(engine._body.client)["numSubSteps"] == 0
+
+
+def test_18_slow_motion_does_not_fall_asleep(monkeypatch):
+    def far():
+        return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01).values[-1, 0]
+
+    assert far() == pytest.approx(0.25)
+    monkeypatch.setattr(_Body, "FLAGS", _Body.FLAGS | bullet.URDF_ENABLE_SLEEPING)
+    assert far() < 0.2
+
+
+def test_20_joints_are_matched_by_name(mechanism, monkeypatch):
+    assert error(mechanism, "mass-matrix") < 1e-12
+    assert error(mechanism) < 1e-12
+    monkeypatch.setattr(_Body, "_by_name", staticmethod(lambda robot, infos: list(robot.moving)))
+    assert error(mechanism) > 1e-3
+
+
+def test_21_worlds_do_not_disturb_each_other(mechanism):
+    with BulletEngine(mechanism, Forces(())) as first, BulletEngine(mechanism, Forces(())) as second:
+        assert first._body.client != second._body.client
+        ours = first.acceleration(0.0, Q, U)
+        second.acceleration(0.0, [0.0] * 8, [0.0] * 8)
+        assert first.acceleration(0.0, Q, U) == ours
+
+
+def test_25_nothing_collides(mechanism):
+    with BulletEngine(mechanism, Forces(())) as engine:
+        body = engine._body
+        for link in range(-1, bullet.getNumJoints(body.id, body.client)):
+            assert not bullet.getCollisionShapeData(body.id, link, body.client)
+
+
+def test_worlds_are_left(mechanism):
+    before = bullet.getConnectionInfo(0)["isConnected"]
+    for _ in range(30):
+        with BulletEngine(mechanism, Forces(())):
+            pass
+    assert bullet.getConnectionInfo(0)["isConnected"] == before

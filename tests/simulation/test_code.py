@@ -1,0 +1,186 @@
+"""The code written for a model: sums of products, kinematics, solver, contact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import osimlite
+from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model
+from osimlite.forces.hunt_crossley import contact_forces, half_space_sphere, simbody_pair_order
+from osimlite.multibody import build_mechanism
+from osimlite.simulation.chain import Chain
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.script import Script
+from osimlite.simulation.solver import SingularMassError, tree_solver
+from osimlite.translate.passes.merge_fixed import merge_fixed
+from osimlite.translate.robot import build_robot
+
+NUMBERS = st.floats(-3.0, 3.0)
+SCALARS = st.one_of(st.sampled_from(["a", "b", "c"]), st.sampled_from([0.0, 1.0, -1.0]), NUMBERS)
+
+
+@given(st.lists(st.lists(SCALARS, min_size=1, max_size=3), max_size=5), NUMBERS, NUMBERS, NUMBERS)
+def test_sum_of_products(terms, a, b, c):
+    script = Script("f", ["a", "b", "c"])
+    script.line(f"return {script.sum(*terms)}")
+    known = {"a": a, "b": b, "c": c}
+    expected = sum(math.prod(known.get(x, x) for x in term) for term in terms)
+    assert script.function({})(a, b, c) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_nothing_known_is_computed():
+    script = Script("f", ["a", "b"])
+    assert script.sum((2.0, 3.0), (0.0, "a")) == 6.0
+    assert script.sum(("a",), ("b", 0.0)) == "a"
+    assert script.sum(("a",), (-1.0, "a")) == 0.0
+    assert script.source().count("\n") == 2
+    # What is computed twice is computed once.
+    assert script.sum(("a", "b")) == script.sum(("b", "a"))
+
+
+def test_what_a_branch_computes_is_not_known_after_it():
+    script = Script("f", ["a", "b"])
+    script.line("result = 0.0")
+    with script.block("if a > 0.0:"):
+        inside = script.sum(("a", "b"))
+        script.line(f"result = {inside}")
+    outside = script.sum(("a", "b"))
+    script.line(f"return result + {outside}")
+    assert inside != outside
+    assert script.function({})(-2.0, 3.0) == -6.0
+
+
+def chain_of(model):
+    mechanism = build_mechanism(model)
+    robot = merge_fixed(build_robot(mechanism, body_frames=False))
+    return mechanism, Chain(robot, robot.moving)
+
+
+@given(st.integers(0, 10**6))
+def test_points_and_their_velocities(seed):
+    model = Model(name="m")
+    carrier = model.ground
+    for number, kind in enumerate(("GimbalJoint", "SliderJoint", "WeldJoint", "UniversalJoint")):
+        body = model.add(Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        joint = getattr(osimlite, kind)(name=f"j{number}")
+        for place, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}{place}"
+        model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.3), turned=(1.0, 0.5, -0.2), child_at=(0.0, 0.4, 0.1)))
+        carrier = body
+    mechanism, chain = chain_of(model)
+    rng = np.random.default_rng(seed)
+    count = len(mechanism.coordinates)
+    q, u = rng.uniform(-2, 2, count), rng.uniform(-2, 2, count)
+    station = (0.3, -0.1, 0.2)
+    script = Script("f", ["q", "r"])
+    for letter in "qr":
+        script.line(f"{''.join(f'{letter}{n}, ' for n in range(count))}= {letter}")
+    point = chain.point(script, 3, station)
+    columns = chain.columns(script, 1, 3, point)
+    velocity = chain.velocity(script, columns)
+    turning = chain.velocity(script, columns, turning=True)
+    script.line(f"return {', '.join(map(str, (*point, *velocity, *turning)))}")
+    order = [joint.coordinate for joint in chain.joints]
+    found = script.function({"sin": math.sin, "cos": math.cos})(q[order].tolist(), u[order].tolist())
+    position = mechanism.station_position("b3", station, q)
+    assert found[:3] == pytest.approx(position, abs=1e-12)
+    # As seen from the other body: the difference of the velocities of that point taken as one of either.
+    transform = mechanism.body_transforms(q)["b1"]
+    inner = (np.linalg.inv(transform) @ np.append(position, 1.0))[:3]
+    relative = mechanism.station_velocity("b3", station, q, u) - mechanism.station_velocity("b1", inner, q, u)
+    assert found[3:6] == pytest.approx(relative, abs=1e-12)
+    turns = mechanism.body_velocities(q, u)
+    assert found[6:] == pytest.approx((turns["b3"] - turns["b1"])[:3], abs=1e-12)
+
+
+@given(st.lists(st.integers(-1, 8), min_size=1, max_size=9), st.integers(0, 10**6))
+def test_solver_of_a_tree(wishes, seed):
+    parents = [min(wish, joint - 1) for joint, wish in enumerate(wishes)]
+    size = len(parents)
+    rng = np.random.default_rng(seed)
+    # The matrix of a tree: a joint moves what it carries.
+    moves = np.zeros((size, size))
+    for joint in range(size):
+        moves[joint, joint] = rng.uniform(0.5, 2.0)
+        if parents[joint] >= 0:
+            moves[joint] += np.where(moves[parents[joint]] != 0.0, rng.uniform(-2, 2, size), 0.0)
+    matrix = moves.T @ moves + 0.1 * np.diag(rng.uniform(1, 2, size))
+    bias, force = rng.uniform(-1, 1, size), rng.uniform(-1, 1, size)
+    found = tree_solver(parents)(matrix.tolist(), bias.tolist(), force.tolist())
+    assert found == pytest.approx(np.linalg.solve(matrix, force - bias), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("entry", [0.0, -1.0, math.nan])
+def test_solver_names_the_joint_that_moves_no_mass(entry):
+    with pytest.raises(SingularMassError) as caught:
+        tree_solver([-1, 0])([[2.0, 1.0], [1.0, entry]], [0.0, 0.0], [1.0, 1.0])
+    assert caught.value.joint == 1
+
+
+# -------------------------------------------------------------------------- several surfaces in one force
+def sled(positions, *, early_return):
+    """Two balls on sliders above a floor, all in one force."""
+    model = Model(name="sled")
+    floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -math.pi / 2))
+    balls = []
+    for name, x in zip("AB", positions, strict=True):
+        body = model.add(Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        joint = osimlite.SliderJoint(name=f"slider{name}", coordinates=[Coordinate(name=f"y{name}")])
+        upright = (0.0, 0.0, math.pi / 2)
+        model.add(joint.between(model.ground, body, at=(x, 0.0, 0.0), turned=upright, child_turned=upright))
+        balls.append(ContactSphere(name=f"ball{name}", socket_frame=body, radius=0.05))
+    model.add(floor, *balls)
+    material = HuntCrossleyForce.ContactParameters(geometry=(*balls, floor), stiffness=1e6, dissipation=2.0)
+    force = HuntCrossleyForce(name="f", transition_velocity=0.2)
+    force.contact_parameters.objects.append(material)
+    model.add(force)
+    mechanism = build_mechanism(model)
+    return mechanism, force_elements(model, mechanism, simbody_early_return=early_return)
+
+
+@pytest.mark.parametrize("early_return", [False, True])
+@pytest.mark.parametrize("positions", [(0.0, 1.0), (1.0, 0.0)])
+@pytest.mark.parametrize("speeds", [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return):
+    mechanism, forces = sled(positions, early_return=early_return)
+    with BulletEngine(mechanism, forces) as engine:
+        udot = engine.acceleration(0.0, [0.04, 0.04], speeds)
+        stored = engine.energies(0.0, engine.state.pack([0.04, 0.04], speeds))[2]
+    (element,) = forces.elements
+    k, a, *rest = element.pairs[0].effective
+    d, *_ = half_space_sphere(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.04, 0.0, 0.05, a)
+    contacts = {n: (d, 0.05, k, *rest, 0.0, 1.0, 0.0, 0.0, -speeds[n], 0.0) for n in range(2)}
+    order = [
+        max(pair) if 2 not in pair else min(pair)
+        for pair in simbody_pair_order(
+            [(positions[0], 0.04, 0), (positions[1], 0.04, 0), (0, 0, 0)], [0.05, 0.05, math.inf]
+        )
+    ]
+    found, energy = contact_forces([contacts[n] for n in order], 0.2, simbody_early_return=early_return)
+    expected = dict(zip(order, (force[1] - 9.80665 for force in found), strict=True))
+    assert udot == pytest.approx([expected[0], expected[1]], rel=1e-9)
+    assert stored == pytest.approx(energy, rel=1e-9)
+    lost = early_return and any(speeds) and list(expected.values()).count(-9.80665) == 2
+    assert lost == (early_return and (speeds, positions) in (((1, 0), (0, 1)), ((0, 1), (1, 0))))
+
+
+def test_spheres_of_one_force_push_each_other():
+    """Equal and opposite along the line of their centres, as deep as they overlap."""
+    mechanism, forces = sled((0.0, 0.06), early_return=False)
+    (element,) = forces.elements
+    assert len(element.pairs) == 3
+    with BulletEngine(mechanism, forces) as engine:
+        row = dict(
+            zip(engine.columns, engine.force_records(0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])), strict=True)
+        )
+        assert engine.touching(0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])).bit_count() == 1
+    push = np.array([row[f"f.B.force.{axis}"] for axis in "XYZ"])
+    assert push == pytest.approx(-np.array([row[f"f.A.force.{axis}"] for axis in "XYZ"]))
+    gap = np.array((0.06, 0.01, 0.0))
+    assert push / np.linalg.norm(push) == pytest.approx(gap / np.linalg.norm(gap))

@@ -1,0 +1,261 @@
+"""Initial states, settings, failures and what a simulation leaves."""
+
+from __future__ import annotations
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import Body, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model, PinJoint
+from osimlite.errors import ModelError, OsimliteError, SimulationError, UnsupportedError
+from osimlite.simulation import Simulation, read_sto
+from osimlite.simulation.run import report_times
+
+
+@pytest.fixture
+def pendulum():
+    model = Model(name="pendulum")
+    bob = model.add(Body(name="bob", mass=2.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)))
+    joint = PinJoint(name="hinge", coordinates=[Coordinate(name="swing", default_value=0.4)])
+    model.add(joint.between(model.ground, bob, child_at=(0.0, 1.0, 0.0)))
+    return model
+
+
+# ---------------------------------------------------------------------------------------------- the start
+def test_defaults_and_what_is_set(walker):
+    trajectory = osimlite.simulate(walker, to=0.01, initial={"RHip_rz": 0.1}, initial_speeds={"LKnee_rz": -2.0})
+    start = dict(zip(trajectory.coordinates, trajectory.values[0], strict=True))
+    assert start["RHip_rz"] == 0.1 and start["Pelvis_ty"] == 0.835
+    speeds = dict(zip(trajectory.coordinates, trajectory.speeds[0], strict=True))
+    assert speeds.pop("LKnee_rz") == -2.0 and not any(speeds.values())
+
+
+def test_locked_coordinate_keeps_its_value(walker):
+    trajectory = osimlite.simulate(walker, to=0.2)
+    place = trajectory.coordinates.index("platform_rz")
+    assert set(trajectory.values[:, place]) == {np.radians(-10)} and not trajectory.speeds[:, place].any()
+
+
+@pytest.mark.parametrize("what", ["initial", "initial_speeds"])
+def test_locked_coordinate_cannot_be_set(walker, what):
+    with pytest.raises(SimulationError, match="'platform_rz' is locked"):
+        osimlite.simulate(walker, **{what: {"platform_rz": 0.0}})
+
+
+def test_unknown_coordinate_names_the_nearest(walker):
+    with pytest.raises(ModelError, match="did you mean 'RHip_rz'"):
+        osimlite.simulate(walker, initial={"RHip_z": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"to": 0.0}, "positive time"),
+        ({"to": float("nan")}, "positive time"),
+        ({"report_interval": 0.0}, "positive time"),
+        ({"report_interval": 1e-9}, "ten million rows"),
+        ({"accuracy": 0.0}, "between 0 and 1"),
+        ({"fixed_step": -1e-3}, "positive and finite"),
+        ({"initial": {"swing": float("inf")}}, "give a number"),
+        ({"engine": "bulet"}, "did you mean 'bullet'"),
+        ({"route": "quick"}, "no route"),
+    ],
+)
+def test_settings_without_meaning(pendulum, setting, words):
+    with pytest.raises(OsimliteError, match=words):
+        osimlite.simulate(pendulum, **setting)
+
+
+@pytest.mark.parametrize(
+    ("to", "interval", "times"),
+    [(0.3, 0.1, [0, 0.1, 0.2, 0.3]), (0.25, 0.1, [0, 0.1, 0.2, 0.25]), (0.05, 0.1, [0, 0.05]), (2.0, 2.0, [0, 2])],
+)
+def test_report_times(to, interval, times):
+    assert report_times(to, interval) == pytest.approx(times, abs=1e-15)
+    assert report_times(to, interval)[-1] == to
+
+
+def test_progress_reaches_the_end(pendulum):
+    seen = []
+    osimlite.simulate(pendulum, to=0.5, report_interval=0.1, progress=seen.append)
+    assert seen == pytest.approx([0, 0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+def test_one_simulation_runs_many_times(pendulum):
+    with Simulation(pendulum) as simulation:
+        first = simulation.run(0.5)
+        simulation.run(0.5, initial={"swing": -1.0})
+        assert np.array_equal(simulation.run(0.5).values, first.values)
+
+
+# --------------------------------------------------------------------------------------------- known motion
+def test_energy_of_a_pendulum_is_kept(pendulum):
+    energy = osimlite.simulate(pendulum, to=5.0, accuracy=1e-9).energy
+    assert energy["total"] == pytest.approx(np.full(501, energy["total"][0]), abs=1e-6)
+    assert not energy["stored"].any()
+
+
+def test_free_fall():
+    model = Model(name="stone")
+    stone = model.add(Body(name="stone", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    joint = osimlite.FreeJoint(name="free")
+    for name, coordinate in zip(("rx", "ry", "rz", "x", "y", "z"), joint.coordinates, strict=True):
+        coordinate.name = name
+    model.add(joint.between(model.ground, stone))
+    for setting in ({}, {"fixed_step": 1e-4}):
+        end = osimlite.simulate(model, to=1.0, initial_speeds={"x": 1.0, "y": 2.0, "rx": 0.5}, **setting)
+        expected = (0.5, 0.0, 0.0, 1.0, 2.0 - 9.80665 / 2, 0.0)
+        assert end.values[-1] == pytest.approx(expected, abs=1e-3 if setting else 1e-9)
+
+
+def test_spinning_top_keeps_its_momentum():
+    """Torque-free rotation of a body with three different moments, where the speeds are not rates of angles."""
+    model = Model(name="top", gravity=(0.0, 0.0, 0.0))
+    top = model.add(Body(name="top", mass=1.0, inertia=(1.0, 2.0, 2.5, 0.0, 0.0, 0.0)))
+    joint = osimlite.BallJoint(name="ball")
+    for place, coordinate in enumerate(joint.coordinates):
+        coordinate.name = f"q{place}"
+    model.add(joint.between(model.ground, top))
+    trajectory = osimlite.simulate(model, to=1.0, accuracy=1e-9, initial_speeds={"q0": 1.0, "q1": 0.1, "q2": 0.2})
+    momenta = [
+        trajectory.mechanism.momentum(q, u)[1] for q, u in zip(trajectory.values, trajectory.speeds, strict=True)
+    ]
+    assert np.array(momenta) == pytest.approx(np.tile(momenta[0], (101, 1)), abs=1e-7)
+    assert np.ptp(trajectory.speeds[:, 1]) > 0.1
+
+
+# ------------------------------------------------------------------------------------------------ failures
+def test_unsupported_force_is_named(walker, fixtures):
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    model.add(osimlite.CoordinateActuator(name="motor", coordinate="RHip_rz"))
+    with pytest.raises(UnsupportedError, match=r"'/forceset/motor' \(CoordinateActuator\)"):
+        osimlite.simulate(model)
+    without = osimlite.simulate(model, to=0.1, skip_unsupported=True)
+    assert without.summary["skipped_forces"] == ["'/forceset/motor' (CoordinateActuator)"]
+    assert np.array_equal(without.values, osimlite.simulate(walker, to=0.1).values)
+    model.find("/forceset/motor").appliesForce = False
+    assert osimlite.simulate(model, to=0.1).summary["skipped_forces"] == []
+
+
+def test_force_that_is_switched_off_does_nothing(fixtures):
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    for force in model.components(HuntCrossleyForce):
+        force.appliesForce = False
+    trajectory = osimlite.simulate(model, to=0.1)
+    assert not any(label.startswith("RFoot") for label in trajectory.forces)
+    assert trajectory.summary["contact_events"] == []
+
+
+def test_contact_on_a_mesh_is_refused(fixtures):
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    mesh = model.add(osimlite.ContactMesh(name="foot", socket_frame="/bodyset/RightShank"))
+    parameters = HuntCrossleyForce.ContactParameters(geometry=(mesh, "PlatformContact"), stiffness=1.0)
+    force = HuntCrossleyForce(name="meshy")
+    force.contact_parameters.objects.append(parameters)
+    model.add(force)
+    with pytest.raises(UnsupportedError, match=r"meshy.*ContactMesh '/contactgeometryset/foot'"):
+        osimlite.simulate(model)
+
+
+def test_missing_contact_geometry_is_named(fixtures):
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    force = next(iter(model.components(HuntCrossleyForce)))
+    force.contact_parameters.objects[0].geometry = ("RHipContct", "PlatformContact")
+    with pytest.raises(ModelError, match="RHipContct"):
+        osimlite.simulate(model)
+
+
+def test_a_parameter_that_is_no_number(fixtures):
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    next(iter(model.components(CoordinateLimitForce))).damping = float("nan")
+    with pytest.raises(ModelError, match=r"'/forceset/RHipLimitTorque' has a parameter"):
+        osimlite.simulate(model)
+
+
+def test_constraint_is_refused(pendulum):
+    pendulum.add(osimlite.CoordinateCouplerConstraint(name="coupler"))
+    with pytest.raises(OsimliteError, match="coupler"):
+        osimlite.simulate(pendulum)
+
+
+def test_smallest_step(pendulum):
+    """A limit as hard as steel cannot be met by any step."""
+    pendulum.add(
+        CoordinateLimitForce(
+            name="steel",
+            coordinate="swing",
+            upper_limit=0.0,
+            lower_limit=-180.0,
+            upper_stiffness=1e300,
+            transition=1e-9,
+        )
+    )
+    with pytest.raises(SimulationError, match=r"cannot go on|derivative"):
+        osimlite.simulate(pendulum, to=0.1)
+
+
+def test_a_step_that_is_too_long(walker):
+    with pytest.raises(SimulationError, match="shorter fixed step"):
+        osimlite.simulate(walker, fixed_step=0.1)
+
+
+def test_a_window_needs_a_screen(pendulum, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(SimulationError, match="no screen"):
+        osimlite.simulate(pendulum, show=True, fixed_step=1e-3)
+
+
+# ---------------------------------------------------------------------------------------------------- files
+def test_files(walker, tmp_path):
+    trajectory = osimlite.simulate(walker, to=0.05)
+    written = trajectory.write(tmp_path / "results")
+    assert sorted(path.name for path in written) == ["forces.sto", "states.sto", "summary.json"]
+    states = read_sto(tmp_path / "results" / "states.sto")
+    assert states.columns[:4] == (
+        "/jointset/PlatformToGround/platform_rz/value",
+        "/jointset/PlatformToGround/platform_rz/speed",
+        "/jointset/PelvisToPlatform/Pelvis_rz/value",
+        "/jointset/PelvisToPlatform/Pelvis_rz/speed",
+    )
+    assert np.array_equal(states.times, trajectory.times)
+    assert np.array_equal(states.rows[:, 0::2], trajectory.values)
+    assert np.array_equal(states.rows[:, 1::2], trajectory.speeds)
+    forces = read_sto(tmp_path / "results" / "forces.sto")
+    assert forces.columns[-2:] == ("LKneeLimitTorque", "PotentialEnergy")
+    assert len(forces.columns) == len(trajectory.forces) == 80
+    column = "RFootForce.RightShank.force.Y"
+    assert np.array_equal(forces[column], trajectory.forces[column]) and forces[column][0] > 300.0
+    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+    assert summary == trajectory.summary
+    assert summary["settings"]["accuracy"] == 1e-3 and summary["versions"]["osimlite"] == osimlite.__version__
+
+
+def test_states_alone(walker, tmp_path):
+    trajectory = osimlite.simulate(walker, to=0.02)
+    trajectory.to_sto(tmp_path / "s.sto")
+    assert (tmp_path / "s.sto").read_text() == trajectory.states_text()
+    with pytest.raises(OsimliteError):
+        trajectory.to_sto(tmp_path / "missing" / "s.sto")
+
+
+def test_trajectory_goes_to_another_process(walker):
+    trajectory = osimlite.simulate(walker, to=0.05)
+    again = pickle.loads(pickle.dumps(trajectory))
+    assert again.summary == trajectory.summary and again.forces.keys() == trajectory.forces.keys()
+    assert np.array_equal(again.values, trajectory.values)
+    assert "6 moments" in repr(again)
+
+
+def test_frame_says_what_to_install(walker):
+    trajectory = osimlite.simulate(walker, to=0.02)
+    try:
+        import pandas  # noqa: F401
+    except ModuleNotFoundError:
+        with pytest.raises(OsimliteError, match="pandas"):
+            trajectory.to_frame()
+    else:
+        frame = trajectory.to_frame()
+        assert frame["RHip_rz"].iloc[0] == trajectory.values[0, 4]
