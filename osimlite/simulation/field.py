@@ -161,13 +161,8 @@ class ForceField:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """Labels of the rows that :meth:`records` gives; every label occurs once."""
-        labels: list[str] = []
-        for element in self.elements:
-            for label in element.columns:
-                count = labels.count(label)
-                labels.append(label if not count else f"{label}_{count}")
-        return tuple(labels)
+        """Labels of the rows that :meth:`records` gives; surfaces on one body have the same ones, and values."""
+        return tuple(label for element in self.elements for label in element.columns)
 
     def records(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> list[float]:
         """One row of the forces in effect, at the state of the joints."""

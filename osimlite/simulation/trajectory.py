@@ -64,12 +64,16 @@ class Trajectory:
 
         ``RFootForce.RightShank.force.X`` and its like are forces (N) and, about the body's origin, torques (N·m) on
         bodies in ground; ``RKneeLimitTorque`` is a generalized force, ``RKneeLimitTorque.PotentialEnergy`` its energy
-        (J).
+        (J). Surfaces of one force on the same body share their columns, which are those of the body.
         """
+        labels, table = self._force_table
+        return {label: table[:, place] for place, label in enumerate(labels)}
+
+    @cached_property
+    def _force_table(self) -> tuple[Sequence[str], Array]:
         assert self._report is not None
         labels, rows = self._report.forces()
-        table = np.array(rows, dtype=float).reshape(len(self.times), len(labels))
-        return {label: table[:, place] for place, label in enumerate(labels)}
+        return labels, np.array(rows, dtype=float).reshape(len(self.times), len(labels))
 
     @cached_property
     def energy(self) -> Mapping[str, Array]:
@@ -115,10 +119,10 @@ class Trajectory:
 
     def forces_text(self) -> str:
         """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
+        labels, table = self._force_table
         # There, the energy of every limit force has one and the same label.
-        labels = ["PotentialEnergy" if label.endswith(".PotentialEnergy") else label for label in self.forces]
-        rows = np.array([*self.forces.values()]).reshape(len(labels), len(self.times)).T
-        return sto_text("ModelForces", self.times.tolist(), labels, rows.tolist())
+        labels = ["PotentialEnergy" if label.endswith(".PotentialEnergy") else label for label in labels]
+        return sto_text("ModelForces", self.times.tolist(), labels, table.tolist())
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write ``states.sto``, ``forces.sto`` and ``summary.json`` into a folder, which is made if it is not there.

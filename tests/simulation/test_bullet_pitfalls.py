@@ -19,7 +19,7 @@ from osimlite.simulation.engines.bullet import BulletEngine, _Body
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.integrators import SemiImplicitEuler
 
-bullet = engine_module.bullet
+bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 
 ROUTES = ("mass-matrix", "articulated-body")
 Q = [-0.17453292519943295, 0.1, 0.3, 0.9, 0.4, -0.2, -0.6, -0.3]

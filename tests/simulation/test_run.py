@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -251,11 +252,10 @@ def test_trajectory_goes_to_another_process(walker):
 
 def test_frame_says_what_to_install(walker):
     trajectory = osimlite.simulate(walker, to=0.02)
-    try:
-        import pandas  # noqa: F401
-    except ModuleNotFoundError:
+    if find_spec("pandas") is None:
         with pytest.raises(OsimliteError, match="pandas"):
             trajectory.to_frame()
     else:
         frame = trajectory.to_frame()
         assert frame["RHip_rz"].iloc[0] == trajectory.values[0, 4]
+        assert frame["RFootForce.RightShank.force.Y"].iloc[0] > 300.0
