@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Literal
 
 from osimlite.errors import ModelError
@@ -83,6 +84,7 @@ class Tree:
         self._parts: dict[int, tuple[Component, list[Component]]] = {}
         self._known_parts = previous._parts if previous is not None else {}
         self._internal: set[int] = set()
+        self._below: dict[int, list[Component]] = {}
         self._place(model, "", None)
         self._known_parts = {}
 
@@ -195,6 +197,7 @@ class Tree:
         object.__setattr__(component, "_model", self.model)
         if parent is not None:
             self._parents[id(component)] = parent
+            self._below.setdefault(id(parent), []).append(component)
         taken: dict[str, Component] = {}
         for name, child in (*self._internal_parts(component), *self._children(component, component)):
             unique = self._unique(name, taken)
@@ -267,8 +270,8 @@ class Tree:
         holder = self.by_path.get(path)
 
         def members() -> Iterator[tuple[str, Component]]:
-            for component in self.components:
-                if self._parents.get(id(component)) is holder and is_a(component, target):
+            for component in self._below.get(id(holder), ()):
+                if is_a(component, target):
                     yield _last(self._paths[id(component)]), component
 
         return self._named(f"{path}:{target}", members)
@@ -279,7 +282,12 @@ class Tree:
 
 def is_a(component: Object, target: str) -> bool:
     """Whether the component's class is `target` or derives from it."""
-    return any(base.__name__ == target for base in type(component).__mro__)
+    return _derives(type(component), target)
+
+
+@cache
+def _derives(cls: type[Object], target: str) -> bool:
+    return any(base.__name__ == target for base in cls.__mro__)
 
 
 def normalised(path: str) -> str | None:
