@@ -267,7 +267,10 @@ def _right_words(subject: Subject, use: Use) -> list[str]:
     """Every text that would be right; the same for all references of one kind in one component."""
     known = cast("dict[tuple[str, str, int], list[str]]", subject.kept.setdefault("right words", {}))
     key = (use.reference.rule, use.reference.target, id(use.owner))
-    if key not in known:
+    if key not in known and use.reference.rule == "set-member":
+        tree = subject.tree
+        known[key] = sorted({item.name for item in tree.components if tree.parent_of(item) is use.owner})
+    elif key not in known:
         known[key] = subject.tree.spellings(use)
     return known[key]
 
