@@ -119,3 +119,20 @@ def test_the_suggestion_is_a_real_neighbour(name, suggestion, tmp_path):
     fault = next(fault for fault in faults.FAULTS if fault.name == name)
     report = validate(faulty(fault.change, tmp_path)[0])
     assert suggestion in {finding.suggestion for finding in report if finding.code == fault.code}, str(report)
+
+
+def test_a_prescribed_controller_wants_the_plain_path(tmp_path):
+    def report(path):
+        from osimlite import Constant, CoordinateActuator, FunctionSet, Model, PrescribedController
+
+        actuator = CoordinateActuator(name="motor")
+        controller = PrescribedController(
+            name="drive", socket_actuators=[path], ControlFunctions=FunctionSet(objects=[Constant()])
+        )
+        model = Model(name="m")
+        model.add(actuator, controller)
+        return validate(model, select="OSIM304")
+
+    assert not report("/forceset/motor").findings
+    assert [finding.suggestion for finding in report("//forceset/motor")] == ["/forceset/motor"]
+    assert [finding.suggestion for finding in report("../../forceset/motor")] == ["/forceset/motor"]

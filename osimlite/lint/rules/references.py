@@ -213,7 +213,12 @@ def _find(subject: Subject) -> Iterator[Broken]:
     tree = subject.tree
     for use in _uses(subject):
         resolution = subject.resolution(use) if use.value != "" else tree.resolve(use)
-        if resolution.failure is None or _overwritten(subject, use):
+        if resolution.failure is None:
+            written = tree.path_of(resolution.target) if resolution.target is not None else None
+            if _wants_plain_path(use) and isinstance(use.value, str) and use.value != written:
+                yield Broken(use, use.value, "form", None, written)
+            continue
+        if _overwritten(subject, use):
             continue
         value = use.value
         text = value if isinstance(value, str) else value.name
@@ -311,6 +316,11 @@ def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
         if component.name == text and not is_a(component, use.reference.target):
             return component
     return None
+
+
+def _wants_plain_path(use: Use) -> bool:
+    """Whether OpenSim compares the text itself: a PrescribedController finds its functions by the path as it stands."""
+    return type(use.owner).__name__ == "PrescribedController" and use.spec.tag == "socket_actuators"
 
 
 def _overwritten(subject: Subject, use: Use) -> bool:
