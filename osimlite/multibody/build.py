@@ -10,7 +10,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.body_constraints import RollingConstraint, WeldConstraint
 from osimlite.multibody.constraints import Constraint, Coupler
 from osimlite.multibody.functions import Function
-from osimlite.multibody.joints import Mobilizer, motion_types
+from osimlite.multibody.joints import MOTIONS, Mobilizer, motion_types
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import Motion
 from osimlite.multibody.parts import (
@@ -34,18 +34,18 @@ from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
-from osimlite.text import listed
 
 
 def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling: bool = False) -> Mechanism:
     """The tree of bodies and mobilizers that a model describes, with its constraints.
 
     Bodies come level by level from ground, within a level in the order of the joints that carry them; coordinates
-    come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is
-    reversed. Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is
-    split into halves, one of which the joint carries, and the halves are welded by a constraint. (OpenSim 4.6 does
-    the same, but then counts the child of the WeldJoint twice, and gives the half a wrong inertia.) Forces and
-    geometry play no part.
+    come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is reversed.
+    Bodies that no joint connects to ground get a FreeJoint, named as OpenSim names it.
+
+    Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is split into
+    halves, one of which the joint carries, and the halves are welded by a constraint. (OpenSim 4.6 does the same, but
+    then counts the child of the WeldJoint twice, and gives the half a wrong inertia.) Forces and geometry play no part.
 
     Args:
         model: the model.
@@ -58,7 +58,7 @@ def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling:
         rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves them off until a program turns them on.
 
     Raises:
-        ModelError: something names what does not exist, bodies are not connected to ground, a joint connects
+        ModelError: something names what does not exist, a joint connects
             a body with itself or has the wrong number of coordinates, a mass, an inertia, a function is impossible.
         UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop closed by a FreeJoint or
             by a joint whose child is ground.
@@ -68,9 +68,9 @@ def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Edge:
-    """A joint, with the bodies (or ground) and frames it connects and the places of its coordinates."""
+    """A joint of some kind, with the bodies (or ground) and frames it connects and the places of its coordinates."""
 
-    joint: Joint
+    kind: str
     path: str
     parent: str
     child: str
@@ -82,7 +82,7 @@ class _Edge:
     def mobilizer(self, *, reversed: bool) -> Mobilizer:
         return Mobilizer(
             joint=self.path,
-            joint_type=type(self.joint).__name__,
+            joint_type=self.kind,
             motions=self.motions,
             coordinates=self.coordinates,
             parent_frame=self.parent_frame,
@@ -169,7 +169,7 @@ class _Builder:
                 )
             )
         own = tuple(range(first, first + count))
-        return _Edge(joint, path, parent, child, parent_frame, child_frame, motions, own)
+        return _Edge(type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own)
 
     def _prescribed(self, coordinate: Coordinate, path: str) -> Function | None:
         # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one is locked too.
@@ -186,13 +186,15 @@ class _Builder:
         """The bodies, each with the mobilizer that carries it; welds for the joints that close loops."""
         ground = self.placements.path(self.model.ground)
         masses = {path: body.mass for path, body in self.bodies.items()}
-        branches, loops = spanning_tree(edges, ground, masses)
-        index = {ground: GROUND} | {branch.outer: place for place, branch in enumerate(branches)}
-        loose = [path for path in self.bodies if path not in index]
-        if loose:
-            raise ModelError(
-                f"no joint connects {listed(loose)} to ground; add a joint for each, for instance a FreeJoint"
-            )
+        joined = {path for edge in edges for path in (edge.parent, edge.child)}
+        edges = [*edges, *(self._free(path, ground) for path in self.bodies if path not in joined)]
+        while True:
+            branches, loops = spanning_tree(edges, ground, masses)
+            index = {ground: GROUND} | {branch.outer: place for place, branch in enumerate(branches)}
+            loose = [path for path in self.bodies if path not in index]
+            if not loose:
+                break
+            edges.append(self._free(_base(loose, edges), ground))
         bodies = []
         for edge, outer, backward in branches:
             carrier, mobilizer = edge.child if backward else edge.parent, edge.mobilizer(reversed=backward)
@@ -203,7 +205,7 @@ class _Builder:
                 first = FramePlacement(index[edge.parent], edge.parent_frame)
                 second = FramePlacement(index[edge.child], edge.child_frame)
                 self.constraints.append(WeldConstraint(first, second, edge.path))
-            elif edge.child == ground or type(edge.joint).__name__ == "FreeJoint":
+            elif edge.child == ground or edge.kind == "FreeJoint":
                 raise UnsupportedError(
                     f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
                     "which osimlite cannot compute; remove one joint of the loop"
@@ -211,6 +213,16 @@ class _Builder:
             else:
                 self._split(edge, index, bodies)
         return bodies
+
+    def _free(self, body: str, ground: str) -> _Edge:
+        """The joint that OpenSim makes for a body that nothing connects to ground."""
+        name, motions = f"free_{_last(body)}", MOTIONS["FreeJoint"]
+        path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
+        for place, motion_type in enumerate(motion_types(motions, 6)):
+            own = f"{name}_coord_{place}"
+            self.coordinates.append(CoordinateInfo(own, f"{path}/{own}", path, motion_type))
+        own_places, still = tuple(range(first, first + 6)), np.eye(4)
+        return _Edge("FreeJoint", path, ground, body, still, still, motions, own_places)
 
     def _split(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
         """Let the joint carry a part of its child, and weld that to the rest."""
@@ -250,6 +262,13 @@ class _Builder:
             raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
         # OpenSim lets a body without mass have no inertia either.
         return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
+
+
+def _base(loose: list[str], edges: list[_Edge]) -> str:
+    """The body of a group without ground that OpenSim connects to it: rather no child, then parent of the most."""
+    children = {edge.child for edge in edges}
+    parents = [edge.parent for edge in edges]
+    return max(loose, key=lambda path: (path not in children, parents.count(path)))
 
 
 def _last(path: str) -> str:
