@@ -9,6 +9,7 @@ import re
 
 from lxml import etree
 
+from osimlite.document.comments import is_generated
 from osimlite.document.escape import escape, quoted
 from osimlite.errors import ModelError
 
@@ -59,8 +60,9 @@ def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> l
     """The lines of an element in OpenSim's layout; where text and elements mix, white space stays as it was."""
     indent = "\t" * depth
     if not is_element(element):
-        kept = comments or not isinstance(element, etree._Comment)
-        return [indent + etree.tostring(element, encoding="unicode", with_tail=False)] if kept else []
+        if isinstance(element, etree._Comment) and (not comments or is_generated(element.text or "")):
+            return []
+        return [indent + etree.tostring(element, encoding="unicode", with_tail=False)]
     tag = element.tag.replace(STAND_IN, "::")
     head = f"{indent}<{tag}" + "".join(f" {key}={quoted(text)}" for key, text in _attributes(element))
     texts = [element.text, *(child.tail for child in element)]
@@ -72,10 +74,8 @@ def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> l
         for child in element:
             inner += "\n".join(lines_of(child, 0, comments=comments)) + escape(child.tail or "")
         return [f"{head}>{inner}</{tag}>"]
-    lines = [head + ">"]
-    for child in element:
-        lines += lines_of(child, depth + 1, comments=comments)
-    return [*lines, f"{indent}</{tag}>"]
+    lines = [line for child in element for line in lines_of(child, depth + 1, comments=comments)]
+    return [f"{head}>", *lines, f"{indent}</{tag}>"] if lines else [f"{head} />"]
 
 
 def _attributes(element: etree._Element) -> list[tuple[str, str]]:

@@ -79,6 +79,17 @@ def test_an_unknown_object_called_like_a_property_keeps_its_wrapper() -> None:
     assert osimlite.to_text(osimlite.read_text(printed)) == printed
 
 
+def test_comments_of_opensim_in_unknown_content_are_dropped_like_all_others() -> None:
+    generated = "<!--Maximum isometric force that the fibers can generate-->"
+    force = f"<PlugIn name='p'> {generated} <a>{generated}</a> <!--by hand--> <b>1</b> </PlugIn>"
+    inside = f"<ForceSet> <objects> {force} </objects> </ForceSet>"
+    printed = osimlite.to_text(
+        osimlite.read_text(f'<OpenSimDocument Version="40600"><Model> {inside} </Model></OpenSimDocument>')
+    )
+    assert "by hand" in printed and "fibers" not in printed
+    assert osimlite.to_text(osimlite.read_text(printed)) == printed
+
+
 def test_what_was_never_set_is_not_printed() -> None:
     model = Model(name="m")
     model.add(Body(name="b"))
