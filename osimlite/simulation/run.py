@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import platform
+import sys
 import time
 from collections.abc import Callable, Mapping
 from math import floor, isfinite
@@ -116,7 +116,12 @@ class Simulation:
         self.forces = force_elements(
             model, self.mechanism, skip_unsupported=skip_unsupported, simbody_early_return=simbody_early_return
         )
-        self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show))
+        visuals = None
+        if show:
+            from osimlite.translate.visuals import collect_visuals
+
+            visuals = collect_visuals(model, self.mechanism)
+        self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
         self.state = FreeState(self.mechanism, self.engine.order)
         self._settings = {"skip_unsupported": skip_unsupported, "simbody_early_return": simbody_early_return}
         self._show = show
@@ -264,4 +269,4 @@ def report_times(to: float, interval: float) -> list[float]:
 def _versions(engine: Engine) -> dict[str, str]:
     from osimlite import __version__
 
-    return {"osimlite": __version__, "engine": engine.version, "python": platform.python_version()}
+    return {"osimlite": __version__, "engine": engine.version, "python": sys.version.split()[0]}

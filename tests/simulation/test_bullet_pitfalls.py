@@ -199,3 +199,13 @@ def test_worlds_are_left(mechanism):
         with BulletEngine(mechanism, Forces(())):
             pass
     assert bullet.getConnectionInfo(0)["isConnected"] == before
+
+
+def test_bodies_can_be_seen(walker, mechanism):
+    from osimlite.translate.visuals import collect_visuals
+
+    with BulletEngine(mechanism, Forces(()), visuals=collect_visuals(walker, mechanism)) as engine:
+        shapes = bullet.getVisualShapeData(engine._body.id, physicsClientId=engine._body.client)
+        # Platform, pelvis, two thighs and two shanks.
+        assert len(shapes) == 6
+        assert np.abs(np.subtract(engine.acceleration(0.0, Q, U), mechanism.acceleration(Q, U))).max() < 1e-9

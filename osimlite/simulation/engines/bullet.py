@@ -15,11 +15,11 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,9 @@ from osimlite.translate.passes.names import legal_names
 from osimlite.translate.passes.principal_axes import principal_axes
 from osimlite.translate.robot import Link, Robot, RobotJoint, build_robot
 from osimlite.translate.urdf import urdf_text
+
+if TYPE_CHECKING:
+    from osimlite.translate.visuals import Visuals
 
 
 @contextmanager
@@ -74,7 +77,7 @@ NO_LIMIT = 1e9
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
     """Make the engine."""
-    return BulletEngine(mechanism, forces, route=settings.route, show=settings.show)
+    return BulletEngine(mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals)
 
 
 class BulletEngine:
@@ -85,6 +88,7 @@ class BulletEngine:
         forces: what pushes it, besides gravity.
         route: "mass-matrix", "articulated-body", or "auto" for the better one.
         show: open Bullet's window.
+        visuals: what the bodies look like.
 
     Raises:
         UnsupportedError: the mechanism has a constraint other than locked coordinates, or a joint that cannot be
@@ -95,7 +99,15 @@ class BulletEngine:
     name = "bullet"
     version = f"pybullet API {bullet.getAPIVersion()}"
 
-    def __init__(self, mechanism: Mechanism, forces: Forces, *, route: str = "auto", show: bool = False) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        forces: Forces,
+        *,
+        route: str = "auto",
+        show: bool = False,
+        visuals: Visuals | None = None,
+    ) -> None:
         if route not in ROUTES:
             raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
         for constraint in mechanism.constraints:
@@ -104,9 +116,11 @@ class BulletEngine:
                     f"the constraint '{constraint.name}' cannot be simulated with PyBullet yet; "
                     "switch it off or remove it"
                 )
-        robot = legal_names(merge_fixed(build_robot(mechanism, body_frames=False)))
+        shapes = {} if visuals is None else visuals.by_body
+        robot = legal_names(merge_fixed(build_robot(mechanism, body_frames=False, visuals=shapes)))
         _require_masses(robot)
-        self._body = _Body(robot, mechanism.gravity.tolist(), show=show)
+        files = {} if visuals is None else visuals.files
+        self._body = _Body(robot, mechanism.gravity.tolist(), show=show, files=files)
         try:
             self._prepare(mechanism, forces, robot, route)
         except BaseException:
@@ -345,21 +359,23 @@ class _Body:
     FASTEST = NO_LIMIT
     """Bullet clips joint speeds at 100 by default."""
 
-    def __init__(self, robot: Robot, gravity: Sequence[float], *, show: bool) -> None:
+    def __init__(
+        self, robot: Robot, gravity: Sequence[float], *, show: bool = False, files: Mapping[str, bytes] | None = None
+    ) -> None:
         self.client = _connect(show)
         self._step = 0.0
         try:
-            self._load(robot, gravity)
+            self._load(robot, gravity, files or {})
         except BaseException:
             self.close()
             raise
 
-    def _load(self, robot: Robot, gravity: Sequence[float]) -> None:
+    def _load(self, robot: Robot, gravity: Sequence[float], files: Mapping[str, bytes]) -> None:
         client = self.client
         bullet.setGravity(*gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
         self.impossible = [link.name for link in robot.links if _excess(link) > 0.0]
-        with _temporary_file(self._text(robot)) as path:
+        with _temporary_file(self._text(robot), files) as path:
             self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)
         infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
         self.joints = self._by_name(robot, infos)
@@ -502,11 +518,11 @@ def _require_masses(robot: Robot) -> None:
 
 
 @contextmanager
-def _temporary_file(text: str) -> Iterator[str]:
-    handle, name = tempfile.mkstemp(suffix=".urdf", prefix="osimlite-")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        yield name
-    finally:
-        Path(name).unlink(missing_ok=True)
+def _temporary_file(text: str, files: Mapping[str, bytes]) -> Iterator[str]:
+    """A URDF file with the mesh files that it names beside it."""
+    with tempfile.TemporaryDirectory(prefix="osimlite-") as folder:
+        for name, content in {"robot.urdf": text.encode(), **files}.items():
+            path = Path(folder, name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        yield str(Path(folder, "robot.urdf"))

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, Observer, Stepper
+
+if TYPE_CHECKING:
+    from osimlite.translate.visuals import Visuals
 
 
 @dataclass(frozen=True)
@@ -24,12 +27,14 @@ class Settings:
         fixed_step: s; the engine's own steps of this length instead of error control.
         route: the way to the accelerations, in the engine's words; "auto" lets it choose.
         show: whether to show the motion in a window while it is computed.
+        visuals: what bodies look like there.
     """
 
     accuracy: float = DEFAULT_ACCURACY
     fixed_step: float | None = None
     route: str = "auto"
     show: bool = False
+    visuals: Visuals | None = None
 
 
 class Engine(Protocol):
@@ -81,7 +86,7 @@ class Engine(Protocol):
 
 
 EngineFactory = Callable[[Mechanism, Forces, Settings], Engine]
-"""Makes an engine for a mechanism; only `route` and `show` of the settings count."""
+"""Makes an engine for a mechanism; of the settings, `route`, `show` and `visuals` count."""
 
 
 class FreeState:
