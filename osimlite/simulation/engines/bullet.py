@@ -13,12 +13,8 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,16 +24,17 @@ from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines.bullet_file import excess, require_masses, robot_text, temporary_file
+from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.field import ForceField
-from osimlite.simulation.integrators import Observer, RungeKuttaMerson, Stepper, straight_line
+from osimlite.simulation.integrators import Observer, RungeKuttaMerson, Stepper
 from osimlite.simulation.solver import SingularMassError, tree_solver
 from osimlite.simulation.speeds import Speeds
 from osimlite.translate.passes.merge_fixed import merge_fixed
 from osimlite.translate.passes.names import legal_names
 from osimlite.translate.passes.principal_axes import principal_axes
-from osimlite.translate.robot import Link, Robot, RobotJoint, build_robot
-from osimlite.translate.urdf import urdf_text
+from osimlite.translate.robot import Robot, RobotJoint, build_robot
 
 if TYPE_CHECKING:
     from osimlite.translate.visuals import Visuals
@@ -118,7 +115,7 @@ class BulletEngine:
                 )
         shapes = {} if visuals is None else visuals.by_body
         robot = legal_names(merge_fixed(build_robot(mechanism, body_frames=False, visuals=shapes)))
-        _require_masses(robot)
+        require_masses(robot)
         files = {} if visuals is None else visuals.files
         self._body = _Body(robot, mechanism.gravity.tolist(), show=show, files=files)
         try:
@@ -264,81 +261,6 @@ class BulletEngine:
         self.close()
 
 
-class BulletStepper(Stepper):
-    """Bullet's own fixed steps: speeds by the accelerations at the start of the step, then values by the new speeds.
-
-    That is what a PyBullet user expects of ``stepSimulation``: first order, one force evaluation a step.
-
-    Args:
-        engine: whose mechanism.
-        t: initial time, s.
-        y: initial state.
-        h: step, s; a last one may be shorter.
-        observe: called with (time, state) after each step; the loads are those at that state.
-        paced: wait so that the motion takes its real time.
-    """
-
-    def __init__(
-        self, engine: BulletEngine, t: float, y: list[float], h: float, observe: Observer, *, paced: bool = False
-    ) -> None:
-        if not 0.0 < h < np.inf:
-            raise SimulationError(f"The fixed step must be positive and finite; {h} s is not.")
-        self._engine, self._body = engine, engine._body
-        self._h = h
-        self._observe = observe
-        self._paced = paced
-        self._start = (t, time.perf_counter())
-        self._origin, self._since = t, 0
-        self.time, self.state = t, list(y)
-        self.evaluations = self.taken = 0
-        self._previous = t, self.state, []
-        count = engine._count
-        self._body.set_state(y[:count], engine._speeds.rates(y[:count], y[count:]))
-        self._torques = self._evaluate_forces(y)
-
-    def step(self, limit: float = np.inf) -> None:
-        """Take one step of the fixed size, or up to the limit if that comes first."""
-        self._require_room(limit)
-        self._since += 1
-        t, h = self._origin + self._h * self._since, self._h
-        if t > limit - 1e-9 * h:
-            if t > limit + 1e-9 * h:
-                h = limit - self.time
-            t = limit
-            self._origin, self._since = limit, 0
-        self._body.step(h, self._torques)
-        q, rates = self._body.get_state()
-        y = q + self._engine._speeds.from_rates(q, rates)
-        # Bullet clips what would be faster, so that a motion that has burst may look finite.
-        if not max(map(abs, y), default=0.0) < 0.5 * self._body.FASTEST:
-            raise SimulationError(
-                f"the motion bursts at t = {self.time:.9g} s; take a shorter fixed step than {self._h:g} s, "
-                "or control the error (--accuracy)"
-            )
-        self._previous = self.time, self.state, []
-        self.time, self.state = t, y
-        self.taken += 1
-        self._torques = self._evaluate_forces(y)
-        if self._observe is not None:
-            self._observe(t, y)
-        if self._paced:
-            ahead = (t - self._start[0]) - (time.perf_counter() - self._start[1])
-            if ahead > 0.0:
-                time.sleep(ahead)
-
-    def interpolant(self) -> Any:
-        """The straight line between the ends of the last step."""
-        t0, y0, _ = self._previous
-        t1, y1 = self.time, self.state
-        return lambda t: straight_line(t0, y0, t1, y1, t)
-
-    def _evaluate_forces(self, y: list[float]) -> Sequence[float]:
-        self.evaluations += 1
-        engine = self._engine
-        q, u = y[: engine._count], y[engine._count :]
-        return engine._joint_forces(q, engine._speeds.rates(q, u), u)
-
-
 class _Body:
     """One robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
 
@@ -374,8 +296,8 @@ class _Body:
         client = self.client
         bullet.setGravity(*gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
-        self.impossible = [link.name for link in robot.links if _excess(link) > 0.0]
-        with _temporary_file(self._text(robot), files) as path:
+        self.impossible = [link.name for link in robot.links if excess(link) > 0.0]
+        with temporary_file(robot_text(robot), files) as path:
             self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)
         infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
         self.joints = self._by_name(robot, infos)
@@ -384,15 +306,6 @@ class _Body:
         self._release(infos)
         if self.impossible:
             self._set_inertias(robot, infos)
-
-    @staticmethod
-    def _text(robot: Robot) -> str:
-        """The robot as URDF, with inertias that Bullet does not set to zero."""
-        links = [
-            replace(link, inertia=link.inertia + _excess(link) * np.eye(3)) if _excess(link) > 0.0 else link
-            for link in robot.links
-        ]
-        return urdf_text(replace(robot, links=tuple(links)), visuals=True)
 
     @staticmethod
     def _by_name(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
@@ -495,34 +408,3 @@ def _connect(show: bool) -> int:
     if client < 0:
         raise SimulationError("Bullet opens no more worlds; close the engines that are not needed any more")
     return client
-
-
-def _excess(link: Link) -> float:
-    """What to add to each principal moment of inertia so that Bullet does not set them to zero; 0 if they are fine."""
-    moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
-    low, middle, high = sorted(moments)
-    return high if high > low + middle or low < 0.0 else 0.0
-
-
-def _require_masses(robot: Robot) -> None:
-    """SimulationError if the last link of a chain has no mass: nothing decides how its joint moves."""
-    carriers = {joint.parent for joint in robot.joints}
-    links = {link.name: link for link in robot.links}
-    for joint in robot.joints:
-        if joint.child not in carriers and links[joint.child].mass == 0.0:
-            body = next(iter(links[joint.child].bodies), joint.child)
-            raise SimulationError(
-                f"the body '{body}' has no mass and carries none, so that nothing decides how the joint "
-                f"'{joint.source}' moves; give it mass and inertia, or lock the coordinates of the joint"
-            )
-
-
-@contextmanager
-def _temporary_file(text: str, files: Mapping[str, bytes]) -> Iterator[str]:
-    """A URDF file with the mesh files that it names beside it."""
-    with tempfile.TemporaryDirectory(prefix="osimlite-") as folder:
-        for name, content in {"robot.urdf": text.encode(), **files}.items():
-            path = Path(folder, name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        yield str(Path(folder, "robot.urdf"))
