@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
 
 _STEPS = 100
+_EASE = 100.0
+"""How much more readily coordinates move that do not count."""
 _FURTHEST = 0.5
 """The longest step of a coordinate (m or rad)."""
 _TOLERANCE = 1e-10
@@ -89,6 +91,8 @@ class _Search:
         self.mechanism, self.wanted, self.time = mechanism, wanted, time
         self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
         self.free = [place for place in range(len(wanted)) if place not in held]
+        # What does not count gives way first.
+        self.ease = np.where(self.counted[self.free] > 0.0, 1.0, _EASE)
         self.start = wanted.copy()
         self.start[list(held)] = list(held.values())
 
@@ -100,7 +104,7 @@ class _Search:
         """Newton's step (n,) along the surface, with the curvature of the constraints."""
         rows = self._rows(self._state(q))
         gradient, weights = (self.counted * (q - self.wanted))[self.free], self.counted[self.free]
-        multipliers, _ = solutions(rows.T, -gradient)
+        multipliers = np.asarray(np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64)
         _, along = solutions(rows, np.zeros(len(rows)))
         curvature = along.T @ (weights[:, None] * along)
         if np.abs(multipliers).max(initial=0.0) > 1e-12:
@@ -122,7 +126,8 @@ class _Search:
         state = self._state(q)
         errors = _errors(state)
         for _ in range(_STEPS):
-            step, _ = solutions(self._rows(state), -errors)
+            step, _ = solutions(self._rows(state) * self.ease, -errors)
+            step *= self.ease
             # Far away the equations say little about where to go; small steps, even to worse places, find out.
             size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
             trial = q + size * self._spread(step)

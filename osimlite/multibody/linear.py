@@ -27,7 +27,8 @@ def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     if not count:
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths == 0.0] = 1.0
+    # Rounding errors are no equation.
+    lengths[lengths <= 1e-13 * lengths.max()] = max(1.0, lengths.max())
     rows, values = rows / lengths[:, None], values / lengths
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")
