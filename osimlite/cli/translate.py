@@ -21,6 +21,20 @@ def translate(
     merge: Annotated[
         bool, typer.Option("--merge", help="Make bodies that do not move relative to each other one link.")
     ] = False,
+    collision: Annotated[
+        bool,
+        typer.Option("--collision", help="Write contact geometry as collision shapes (a half space as a large box)."),
+    ] = False,
+    effort: Annotated[
+        float | None,
+        typer.Option(
+            help="Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
+            show_default="no limit",
+        ),
+    ] = None,
+    velocity: Annotated[
+        float | None, typer.Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit")
+    ] = None,
     geometry: Annotated[
         list[Path] | None,
         typer.Option(
@@ -31,11 +45,13 @@ def translate(
         ),
     ] = None,
 ) -> None:
-    """Translate a model: writes <model>.urdf, its meshes, and fidelity.json.
+    """Translate a model: writes <model>.urdf, its meshes, <model>.coordinates.json and fidelity.json.
 
-    fidelity.json says what became of every component, and what the format cannot say; the table shows the latter.
+    Meshes in VTK's format (.vtp) are written as .obj, text .stl as binary. coordinates.json says how coordinates drive
+    joints, where the format cannot, and which link and joint belong to which body and coordinate. fidelity.json says
+    what became of every component, and what the format cannot say; the table shows the latter.
 
-    Example: osimlite translate walker.osim --to urdf -o robot
+    Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry --collision -o robot
     """
     from typing import cast
 
@@ -54,7 +70,16 @@ def translate(
     for place in geometry or ():
         if not place.is_dir():
             raise MissingFileError("--geometry names a folder that is not there", file=str(place))
-    urdf = to_urdf(read(file), limits=cast("Limits", limits), merge=merge, folder=file.parent, geometry=geometry or ())
+    urdf = to_urdf(
+        read(file),
+        limits=cast("Limits", limits),
+        merge=merge,
+        collision=collision,
+        effort=effort,
+        velocity=velocity,
+        folder=file.parent,
+        geometry=geometry or (),
+    )
     written = urdf.write(output)
 
     console = Console()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,12 +12,15 @@ from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.multibody import build_mechanism
 from osimlite.schema.model import Model
+from osimlite.translate.collisions import collect_collisions
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.mesh_files import MeshFiles, geometry_folders
 from osimlite.translate.passes.merge_fixed import merge_fixed
 from osimlite.translate.passes.names import legal, legal_names
 from osimlite.translate.passes.range_limits import range_limits
+from osimlite.translate.passes.strength import strength
 from osimlite.translate.robot import Robot, build_robot
+from osimlite.translate.sidecar import coordinates_json
 from osimlite.translate.survey import survey
 from osimlite.translate.urdf import urdf_text
 from osimlite.translate.visuals import Visuals, collect_visuals
@@ -34,6 +38,7 @@ class Urdf:
         text: the URDF.
         fidelity: what became of every component, and what URDF cannot say.
         robot: the neutral robot that was written, which maps links and joints to bodies and coordinates.
+        coordinates: JSON text that tells how coordinates drive joints, and which link carries which body.
         files: mesh files that the text names, by name relative to it.
     """
 
@@ -41,10 +46,13 @@ class Urdf:
     text: str
     fidelity: Fidelity
     robot: Robot
+    coordinates: str
     files: dict[str, bytes] = field(default_factory=dict)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``<name>.urdf``, its meshes and ``fidelity.json`` into a folder, which is made if it is not there.
+        """Write ``<name>.urdf``, its meshes, ``<name>.coordinates.json`` and ``fidelity.json`` into a folder.
+
+        The folder is made if it is not there.
 
         Returns:
             The files written, the URDF first. It is written last, when all it needs is in place.
@@ -62,9 +70,11 @@ class Urdf:
                 raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(parent)) from None
         for path, content in meshes:
             write_atomically(path, content)
+        coordinates = base / f"{self.name}.coordinates.json"
+        write_atomically(coordinates, self.coordinates)
         write_atomically(account, self.fidelity.to_json())
         write_atomically(urdf, self.text)
-        return [urdf, *(path for path, _ in meshes), account]
+        return [urdf, *(path for path, _ in meshes), coordinates, account]
 
 
 def to_urdf(
@@ -74,6 +84,9 @@ def to_urdf(
     limits: Limits = "none",
     locked: Locked = "fixed",
     merge: bool = False,
+    collision: bool = False,
+    effort: float | None = None,
+    velocity: float | None = None,
     folder: str | Path | None = None,
     geometry: Sequence[str | Path] = (),
 ) -> Urdf:
@@ -85,24 +98,35 @@ def to_urdf(
         limits: ``"range"`` writes coordinate ranges as hard limits; OpenSim itself lets coordinates leave them.
         locked: whether a locked coordinate becomes a fixed joint at its default value, or a joint that moves.
         merge: make bodies that do not move relative to each other one link.
+        collision: whether contact geometry becomes collision shapes; a half space becomes a box whose face is its
+            surface.
+        effort: limit (N, N·m) for joints whose coordinate has no actuators with a greatest force.
+        velocity: limit (m/s, rad/s) for all joints.
         folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
         geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
             separated as in PATH, follow them.
 
     Raises:
+        OsimliteError: a limit is not a positive number.
         ModelError: the model is not a mechanism: something it names is not there, or a body is not connected.
         UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
     """
+    for what, limit in (("effort", effort), ("velocity", velocity)):
+        if limit is not None and not 0.0 < limit < math.inf:
+            raise OsimliteError(f"a limit of {what} is a positive number, not {limit:g}; leave it out for no limit")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
     places = geometry_folders(None if folder is None else Path(folder), [Path(place) for place in geometry])
     mesh_files = MeshFiles(places)
     shapes = collect_visuals(model, mechanism, fidelity, mesh_files=mesh_files) if visuals else Visuals()
-    robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body)
+    touching = collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}
+    robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body, collisions=touching)
     if merge:
         robot = merge_fixed(robot)
     if limits == "range":
         robot = range_limits(robot)
-    robot = legal_names(robot)
+    robot = strength(legal_names(robot), model, fidelity, effort=effort, velocity=velocity)
     survey(model, robot, fidelity)
-    return Urdf(legal(model.name or "model"), urdf_text(robot), fidelity, robot, mesh_files.files)
+    name = legal(model.name or "model")
+    coordinates = coordinates_json(robot, f"{name}.urdf")
+    return Urdf(name, urdf_text(robot), fidelity, robot, coordinates, mesh_files.files)

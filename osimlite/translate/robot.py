@@ -47,6 +47,7 @@ class Link:
         center: mass centre (3,) in the link frame, m.
         inertia: (3, 3) about the mass centre along the axes of the link frame, kg·m².
         visuals: what it looks like.
+        collisions: what it touches others with; their colours mean nothing.
         bodies: frame (4, 4) in the link frame of each body it carries, by the body's absolute path.
     """
 
@@ -55,6 +56,7 @@ class Link:
     center: Array = field(default_factory=lambda: np.zeros(3))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     visuals: tuple[Visual, ...] = ()
+    collisions: tuple[Visual, ...] = ()
     bodies: Mapping[str, Array] = field(default_factory=dict)
 
 
@@ -75,6 +77,8 @@ class RobotJoint:
         coordinates: places in the mechanism of the coordinates that decide the value; empty for a fixed joint.
         function: the joint's value (rad, m) as a function of these coordinates.
         limits: hard limits of the value, or None.
+        effort: greatest force (N, N·m) that a program may put on it, or None.
+        velocity: greatest rate (m/s, rad/s) that a program may ask of it, or None.
         source: absolute path of the model's joint that it is a part of.
     """
 
@@ -87,6 +91,8 @@ class RobotJoint:
     coordinates: tuple[int, ...] = ()
     function: Function = IDENTITY
     limits: tuple[float, float] | None = None
+    effort: float | None = None
+    velocity: float | None = None
     source: str = ""
 
     @property
@@ -161,6 +167,7 @@ def build_robot(
     body_frames: bool = True,
     at: Values | None = None,
     visuals: Mapping[str, Sequence[Visual]] | None = None,
+    collisions: Mapping[str, Sequence[Visual]] | None = None,
 ) -> Robot:
     """Spread a mechanism out into one-axis joints.
 
@@ -172,10 +179,10 @@ def build_robot(
             frame at the joint, which saves a link, and `Link.bodies` tells where the body is.
         at: coordinate values at which locked coordinates are fixed; their defaults if left out.
         visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame.
+        collisions: what bodies touch others with, likewise.
     """
-    return _Builder(mechanism, locked == "fixed", body_frames, mechanism.values({} if at is None else at)).robot(
-        visuals or {}
-    )
+    values = mechanism.values({} if at is None else at)
+    return _Builder(mechanism, locked == "fixed", body_frames, values).robot(visuals or {}, collisions or {})
 
 
 class _Builder:
@@ -193,15 +200,30 @@ class _Builder:
         self.links: list[Link] = []
         self.joints: list[RobotJoint] = []
 
-    def robot(self, visuals: Mapping[str, Sequence[Visual]]) -> Robot:
-        self.links.append(Link(WORLD, visuals=tuple(visuals.get("/ground", ())), bodies={"/ground": np.eye(4)}))
+    def robot(self, visuals: Mapping[str, Sequence[Visual]], collisions: Mapping[str, Sequence[Visual]]) -> Robot:
+        ground = "/ground"
+        self.links.append(
+            Link(
+                WORLD,
+                visuals=tuple(visuals.get(ground, ())),
+                collisions=tuple(collisions.get(ground, ())),
+                bodies={ground: np.eye(4)},
+            )
+        )
         # Link and frame in it, of ground (-1) and every body so far.
         placed: dict[int, tuple[str, Array]] = {-1: (WORLD, np.eye(4))}
         for index, body in enumerate(self.mechanism.bodies):
-            placed[index] = self._body(index, *placed[body.parent], tuple(visuals.get(body.path, ())))
+            name, frame = self._body(index, *placed[body.parent])
+            placed[index] = name, frame
+            self.links[-1] = replace(
+                self.links[-1],
+                visuals=_placed(visuals.get(body.path, ()), frame),
+                collisions=_placed(collisions.get(body.path, ()), frame),
+            )
         return Robot(self.mechanism.name, tuple(self.links), tuple(self.joints), self.mechanism)
 
-    def _body(self, index: int, parent: str, start: Array, visuals: tuple[Visual, ...]) -> tuple[str, Array]:
+    def _body(self, index: int, parent: str, start: Array) -> tuple[str, Array]:
+        """Add the joints and links up to a body, its own link last; returns its name and the body's frame in it."""
         body = self.mechanism.bodies[index]
         mobilizer = body.mobilizer
         motions, frames = self._split(mobilizer, start)
@@ -229,8 +251,7 @@ class _Builder:
                 properties.mass,
                 last[:3, :3] @ properties.center + last[:3, 3],
                 last[:3, :3] @ properties.inertia @ last[:3, :3].T,
-                tuple(replace(visual, origin=last @ visual.origin) for visual in visuals),
-                {body.path: last},
+                bodies={body.path: last},
             )
         )
         return name, last
@@ -311,6 +332,10 @@ def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
     if motion.kind == "translate" or along:
         motions[-1] = replace(motion, axis=turn.T @ motion.axis)
         frames[-2:] = [frames[-2] @ last, np.eye(4)]
+
+
+def _placed(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
+    return tuple(replace(shape, origin=frame @ shape.origin) for shape in shapes)
 
 
 def _is_constant(function: Function) -> bool:

@@ -20,8 +20,12 @@ from osimlite.schema.probes import Probe
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
 from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.laws import Mimic, couplers, mimics
 from osimlite.translate.passes.principal_axes import breaks_triangle_rule, principal_axes
 from osimlite.translate.robot import Robot
+
+COMPUTE = "compute its value by the file of coordinates"
+"""What to do about a joint that the robot's file leaves free."""
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
 """Components that say nothing of their own: sets, and the axes that a viewer may draw at a frame."""
@@ -66,8 +70,10 @@ class _Survey:
             assert isinstance(found, Coordinate)
             self._coordinate(index, found, info.path)
         for link in self.robot.links:
-            for visual in link.visuals:
-                self.fidelity.translated[visual.source] = f"visual of link {link.name}"
+            for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
+                for shape in shapes:
+                    self.fidelity.translated[shape.source] = f"{kind} of link {link.name}"
+        self._couplers()
         self._frames()
         self._rest()
 
@@ -192,14 +198,31 @@ class _Survey:
         for part in driven:
             if part.function == IDENTITY:
                 continue
-            mimic = joint is not None and part.function.slope is not None and len(part.coordinates) == 1
+            mimic = self._mimics.get(part.name)
             self.note(
                 "coordinate-function",
                 path,
                 "a joint that moves by a function of a coordinate",
-                "a joint that mimics that of the coordinate" if mimic else "a free joint: compute its value",
-                f"joint {part.name}",
+                f"a free joint: {COMPUTE}" if mimic is None else "a joint that mimics another",
+                f"joint {part.name}" + ("" if mimic is None else f" follows {mimic.leader}"),
             )
+
+    def _couplers(self) -> None:
+        for coupler in couplers(self.robot):
+            joint = self.robot.joint_of.get(coupler.dependent)
+            mimic = self._mimics.get(joint.name) if joint is not None else None
+            name = self.robot.mechanism.coordinates[coupler.dependent].name
+            self.note(
+                "coupler",
+                coupler.name,
+                "a coordinate that is a function of others",
+                f"a free joint: {COMPUTE}" if mimic is None else "a joint that mimics another",
+                f"coordinate {name}" + ("" if mimic is None else f" follows joint {mimic.leader}"),
+            )
+
+    @cached_property
+    def _mimics(self) -> dict[str, Mimic]:
+        return mimics(self.robot)
 
     def _frames(self) -> None:
         mechanism = self.robot.mechanism

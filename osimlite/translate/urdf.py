@@ -27,6 +27,8 @@ from itertools import pairwise
 
 from osimlite.document.escape import quoted
 from osimlite.multibody.spatial import Array
+from osimlite.translate.laws import Mimic, mimics
+from osimlite.translate.passes.names import UniqueNames
 from osimlite.translate.passes.principal_axes import principal_axes
 from osimlite.translate.robot import Link, Robot, RobotJoint
 from osimlite.translate.shapes import Ball, Box, MeshFile, Tube, Visual
@@ -50,7 +52,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
         robot: with legal names (see `osimlite.translate.passes.names`).
         visuals: whether to say what links look like.
     """
-    out = _Writer()
+    out, unique = _Writer(), UniqueNames()
     with_visuals = [visual for link in robot.links for visual in link.visuals] if visuals else []
     materials = {color: _material_name(color) for color in sorted({visual.color for visual in with_visuals})}
     out.line('<?xml version="1.0" encoding="utf-8"?>')
@@ -65,9 +67,15 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
             with out.element("link", {"name": link.name}):
                 _write_inertial(out, link)
                 for visual in link.visuals if visuals else ():
-                    _write_visual(out, visual, materials[visual.color])
+                    with out.element("visual"):
+                        _write_shape(out, visual)
+                        out.empty("material", {"name": materials[visual.color]})
+                for collision in link.collisions:
+                    with out.element("collision", {"name": unique(collision.source.rsplit("/", 1)[-1])}):
+                        _write_shape(out, collision)
+        following = mimics(robot)
         for joint in robot.joints:
-            _write_joint(out, joint, robot)
+            _write_joint(out, joint, following.get(joint.name))
     return out.text()
 
 
@@ -107,23 +115,21 @@ def _write_inertial(out: _Writer, link: Link) -> None:
         out.empty("inertia", {"ixx": ixx, "ixy": "0", "ixz": "0", "iyy": iyy, "iyz": "0", "izz": izz})
 
 
-def _write_visual(out: _Writer, visual: Visual, material: str) -> None:
-    with out.element("visual"):
-        _write_origin(out, visual.origin)
-        with out.element("geometry"):
-            match visual.shape:
-                case Box(size):
-                    out.empty("box", {"size": numbers(size)})
-                case Ball(radius):
-                    out.empty("sphere", {"radius": number(radius)})
-                case Tube(radius, length):
-                    out.empty("cylinder", {"radius": number(radius), "length": number(length)})
-                case MeshFile(file, scale):
-                    out.empty("mesh", {"filename": file, "scale": numbers(scale)})
-        out.empty("material", {"name": material})
+def _write_shape(out: _Writer, shape: Visual) -> None:
+    _write_origin(out, shape.origin)
+    with out.element("geometry"):
+        match shape.shape:
+            case Box(size):
+                out.empty("box", {"size": numbers(size)})
+            case Ball(radius):
+                out.empty("sphere", {"radius": number(radius)})
+            case Tube(radius, length):
+                out.empty("cylinder", {"radius": number(radius), "length": number(length)})
+            case MeshFile(file, scale):
+                out.empty("mesh", {"filename": file, "scale": numbers(scale)})
 
 
-def _write_joint(out: _Writer, joint: RobotJoint, robot: Robot) -> None:
+def _write_joint(out: _Writer, joint: RobotJoint, mimic: Mimic | None) -> None:
     kind = "continuous" if joint.kind == "revolute" and joint.limits is None else joint.kind
     with out.element("joint", {"name": joint.name, "type": kind}):
         out.empty("parent", {"link": joint.parent})
@@ -132,16 +138,18 @@ def _write_joint(out: _Writer, joint: RobotJoint, robot: Robot) -> None:
         if joint.kind == "fixed":
             return
         out.empty("axis", {"xyz": numbers(joint.axis)})
-        strength = {"effort": number(UNLIMITED), "velocity": number(UNLIMITED)}
+        strength = {
+            "effort": number(UNLIMITED if joint.effort is None else joint.effort),
+            "velocity": number(UNLIMITED if joint.velocity is None else joint.velocity),
+        }
         if kind == "continuous":
             out.empty("limit", strength)
         else:
             lower, upper = (-UNLIMITED, UNLIMITED) if joint.limits is None else joint.limits
             out.empty("limit", {"lower": number(lower), "upper": number(upper), **strength})
-        leader = robot.joint_of.get(joint.coordinates[0]) if len(joint.coordinates) == 1 else None
-        slope = joint.function.slope
-        if leader is not None and leader is not joint and slope is not None:
-            out.empty("mimic", {"joint": leader.name, "multiplier": number(slope)})
+        if mimic is not None:
+            offset = {"offset": number(mimic.line.start)} if mimic.line.start else {}
+            out.empty("mimic", {"joint": mimic.leader, "multiplier": number(mimic.line.slope), **offset})
 
 
 def _write_origin(out: _Writer, matrix: Array) -> None:

@@ -33,6 +33,12 @@ def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+def urdf_records(folder: Path) -> str:
+    """What was done about what the URDF cannot say, in one string."""
+    records = json.loads((folder / "fidelity.json").read_text())["records"]
+    return "\n".join(record["done"] for record in records)
+
+
 @pytest.fixture
 def walker(tmp_path: Path) -> Path:
     osimlite.write(dynamic_walker(), tmp_path / "walker.osim")
@@ -47,6 +53,8 @@ def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
     records = json.loads((walker / "robot/fidelity.json").read_text())["records"]
     assert {"force", "gravity", "locked"} <= {record["kind"] for record in records}
     assert "a contact surface" in out and "13 links, 12 joints of which 7 move" in out
+    coordinates = json.loads((walker / "robot/DynamicWalkerModel.coordinates.json").read_text())["coordinates"]
+    assert [item["joint"] for item in coordinates if item["name"] == "RHip_rz"] == ["RHip_rz"]
     table = [line for line in out.splitlines() if line.startswith(("│", "┃", "├"))]
     assert len(table) > 10 and max(map(len, table)) <= 80
 
@@ -55,6 +63,13 @@ def test_translate_takes_options(walker: Path) -> None:
     code, out, _ = run("walker.osim", "--limits", "range", "--merge", folder=walker)
     assert code == 0 and "8 links, 7 joints of which 7 move" in out
     assert '<joint name="RKnee_rz" type="revolute">' in (walker / "DynamicWalkerModel.urdf").read_text()
+
+
+def test_translate_writes_collision_shapes_and_limits(walker: Path) -> None:
+    code, _, _ = run("walker.osim", "--collision", "--effort", "50", "--velocity", "7", folder=walker)
+    text = (walker / "DynamicWalkerModel.urdf").read_text()
+    assert code == 0 and "collision box of 1 x 200 x 200 m" in urdf_records(walker)
+    assert "<collision " in text and 'effort="50" velocity="7"' in text
 
 
 def test_folders_of_meshes_are_named_by_options_and_the_environment(
@@ -83,6 +98,7 @@ def test_folders_of_meshes_are_named_by_options_and_the_environment(
     [
         (("walker.osim", "--to", "mjcf"), "--to is 'urdf', not 'mjcf'"),
         (("walker.osim", "--limits", "all"), "--limits is 'none' or 'range'"),
+        (("walker.osim", "--effort", "0"), "a limit of effort is a positive number, not 0"),
         (("gone.osim",), "gone.osim"),
         (("walker.osim", "--geometry", "gone"), "gone: --geometry names a folder that is not there"),
         (("walker.osim", "-o", "walker.osim"), "cannot make this folder"),

@@ -35,6 +35,7 @@ from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
 from osimlite.translate.survey import CONTAINERS
+from tests.translate.evaluator import Reader
 from tests.translate.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 
 
@@ -258,7 +259,13 @@ def test_mesh_files_come_along(tmp_path):
 def test_all_files_are_written_and_bullet_reads_them(tmp_path):
     urdf = osimlite.to_urdf(dynamic_walker())
     written = urdf.write(tmp_path / "out")
-    assert [path.name for path in written] == ["DynamicWalkerModel.urdf", "ellipsoid.obj", "fidelity.json"]
+    assert [path.name for path in written] == [
+        "DynamicWalkerModel.urdf",
+        "ellipsoid.obj",
+        "DynamicWalkerModel.coordinates.json",
+        "fidelity.json",
+    ]
+    assert json.loads(written[-2].read_text())["file"] == written[0].name
     assert written[0].read_text() == urdf.text
     account = json.loads(written[-1].read_text())
     assert [set(record) >= {"kind", "component", "cannot_say", "done"} for record in account["records"]]
@@ -288,6 +295,12 @@ def test_real_models_are_accounted_for_and_load(corpus_model, capfd):
     robot = urdf.robot
     q = np.random.default_rng(3).uniform(-1.0, 1.0, len(robot.mechanism.coordinates))
     q = np.where([info.locked for info in robot.mechanism.coordinates], robot.mechanism.default_state()[0], q)
+    # What the URDF lets follow another joint must fit, for its readers make it so.
+    reader = Reader(urdf.text, urdf.coordinates)
+    paths = [info.path for info in robot.mechanism.coordinates]
+    values_by_path = reader.coupled(dict(zip(paths, q.tolist(), strict=True)))
+    locked = [info.locked for info in robot.mechanism.coordinates]
+    q = np.where(locked, q, [values_by_path[path] for path in paths])
     placed, values = robot.link_transforms(q), robot.joint_values(q)
     assert worst_body(robot, placed, q) < 1e-12
     assert worst_body(robot, yourdfpy_poses(urdf.text, values), q) < 1e-9

@@ -43,9 +43,17 @@ def merge_fixed(robot: Robot) -> Robot:
 def _with(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
     """`link` with `other` welded to it, whose frame is `placed` (4, 4) in its own."""
     turn, shift = placed[:3, :3], placed[:3, 3]
-    visuals = tuple(replace(visual, origin=placed @ visual.origin) for visual in other.visuals)
+    visuals, collisions = (
+        tuple(replace(shape, origin=placed @ shape.origin) for shape in shapes)
+        for shapes in (other.visuals, other.collisions)
+    )
     bodies = {path: placed @ frame for path, frame in other.bodies.items()}
-    merged = replace(link, visuals=link.visuals + visuals, bodies={**link.bodies, **bodies})
+    merged = replace(
+        link,
+        visuals=link.visuals + visuals,
+        collisions=link.collisions + collisions,
+        bodies={**link.bodies, **bodies},
+    )
     if massless:
         return merged
     mass = link.mass + other.mass

@@ -17,21 +17,28 @@ def legal(name: str) -> str:
     return word if word[0].isalpha() or word[0] == "_" else f"_{word}"
 
 
+class UniqueNames:
+    """Gives out legal names, none of them twice."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set()
+
+    def __call__(self, name: str) -> str:
+        """The name made legal, with a number behind it if it was given out before."""
+        word, count = legal(name), 1
+        base = word
+        while word in self._taken:
+            word, count = f"{base}_{count}", count + 1
+        self._taken.add(word)
+        return word
+
+
 def legal_names(robot: Robot) -> Robot:
     """The same robot with legal names.
 
     Links and joints share one set of names, because some readers put both into one namespace.
     """
-    taken: set[str] = set()
-
-    def unique(name: str) -> str:
-        word, count = legal(name), 1
-        base = word
-        while word in taken:
-            word, count = f"{base}_{count}", count + 1
-        taken.add(word)
-        return word
-
+    unique = UniqueNames()
     # Names that are legal already keep their spelling, whatever others turn into.
     names = [link.name for link in robot.links] + [joint.name for joint in robot.joints]
     renamed = {name: unique(name) for name in names if legal(name) == name}

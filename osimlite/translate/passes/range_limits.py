@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from osimlite.translate.laws import as_line
 from osimlite.translate.robot import Robot, RobotJoint
 
 
 def range_limits(robot: Robot) -> Robot:
-    """The same robot, with every joint that is a multiple of one coordinate limited to the coordinate's range."""
+    """The same robot, with every joint that is a straight line of one coordinate limited to the coordinate's range."""
 
     def limited(joint: RobotJoint) -> RobotJoint:
-        slope = joint.function.slope
-        if joint.kind == "fixed" or len(joint.coordinates) != 1 or slope is None:
+        line = as_line(joint.function)
+        if joint.kind == "fixed" or len(joint.coordinates) != 1 or line is None:
             return joint
-        low, high = (slope * end for end in robot.mechanism.coordinates[joint.coordinates[0]].range)
+        low, high = (line.slope * end + line.start for end in robot.mechanism.coordinates[joint.coordinates[0]].range)
         return replace(joint, limits=(min(low, high), max(low, high)))
 
     return replace(robot, joints=tuple(limited(joint) for joint in robot.joints))

@@ -1,0 +1,92 @@
+"""Collision shapes, made of the contact geometry of a model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.errors import ModelError
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array, offset
+from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactMesh, ContactSphere
+from osimlite.schema.model import Model
+from osimlite.translate import meshes
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.mesh_files import MeshFiles
+from osimlite.translate.shapes import Ball, Box, MeshFile, Shape, Visual
+from osimlite.translate.visuals import mesh_shape
+
+SLAB = (1.0, 200.0, 200.0)
+"""Size (m) of the box that stands for a half space: its thickness, and its edges along the surface."""
+
+
+def collect_collisions(
+    model: Model, mechanism: Mechanism, fidelity: Fidelity, mesh_files: MeshFiles
+) -> dict[str, list[Visual]]:
+    """The contact surfaces of a model by absolute path of the body (or ``"/ground"``), each placed in its frame.
+
+    Args:
+        model: where the contact geometry is.
+        mechanism: of the same model; knows where frames are.
+        fidelity: is told what a collision shape does not say, and which surfaces have none.
+        mesh_files: finds mesh files, and takes them up.
+    """
+    tree, found = model.tree(), dict[str, list[Visual]]()
+    for geometry in tree.components:
+        if not isinstance(geometry, ContactGeometry):
+            continue
+        path = tree.path_of(geometry) or geometry.name
+        try:
+            frame = tree.path_of(tree.target(geometry, "socket_frame", geometry.socket_frame))
+        except ModelError:
+            frame = None
+        if frame is None or frame not in mechanism.frames:
+            fidelity.add(
+                "contact-geometry", path, "a contact surface in a frame that is not fixed to a body", "left out"
+            )
+            continue
+        made = _shape(geometry, path, fidelity, mesh_files)
+        if made is None:
+            continue
+        shape, own = made
+        body, placed = mechanism.frames[frame]
+        owner = "/ground" if body < 0 else mechanism.bodies[body].path
+        origin = placed @ offset(geometry.location, geometry.orientation) @ own
+        found.setdefault(owner, []).append(Visual(shape, origin, source=path))
+    return found
+
+
+def _shape(
+    geometry: ContactGeometry, path: str, fidelity: Fidelity, mesh_files: MeshFiles
+) -> tuple[Shape, Array] | None:
+    """The shape, and its frame in the frame of the geometry."""
+    here = np.eye(4)
+
+    def told(what: str, done: str, detail: str = "") -> None:
+        fidelity.add("contact-geometry", path, what, done, detail)
+
+    match geometry:
+        case ContactSphere() if geometry.radius > 0.0:
+            told(
+                "the material of a contact surface", "a collision shape without it", f"sphere of {geometry.radius:g} m"
+            )
+            return Ball(geometry.radius), here
+        case ContactHalfSpace():
+            here[0, 3] = SLAB[0] / 2.0
+            size = " x ".join(f"{edge:g}" for edge in SLAB)
+            told("a half space, and its material", f"a collision box of {size} m whose face is its surface")
+            return Box(SLAB), here
+        case ContactEllipsoid() if min(geometry.radii) > 0.0:
+            file = mesh_files.add(
+                ("ellipsoid", *geometry.radii), "ellipsoid", ".obj", meshes.ellipsoid(geometry.radii).encode()
+            )
+            told("an ellipsoid, and its material", "a collision shape in a mesh file", file)
+            return MeshFile(file), here
+        case ContactMesh():
+            shape = mesh_shape(geometry.filename, path, mesh_files, fidelity)
+            if shape is not None:
+                done = "a collision shape of the file; many programs take its convex hull"
+                told("the material of a contact mesh", done, shape.file)
+                return shape, here
+            return None
+    told(f"a contact surface of class {type(geometry).__name__}", "left out")
+    return None

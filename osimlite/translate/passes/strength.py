@@ -1,0 +1,63 @@
+"""How strong and how fast joints are: effort limits from coordinate actuators, and numbers that the user gives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from osimlite.errors import ModelError
+from osimlite.schema.actuators import CoordinateActuator
+from osimlite.schema.model import Model
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.robot import Robot, RobotJoint
+
+
+def strength(
+    robot: Robot, model: Model, fidelity: Fidelity, *, effort: float | None = None, velocity: float | None = None
+) -> Robot:
+    """The same robot with limits of effort and velocity.
+
+    A joint that is a coordinate gets as its effort the sum of the greatest forces of the coordinate's actuators
+    (``optimal_force`` times the greatest control), if all are finite.
+
+    Args:
+        robot: made of the model.
+        model: has the actuators.
+        fidelity: gets a record for each actuator that became a limit.
+        effort: limit (N, N·m) for all other joints; None for no limit.
+        velocity: limit (m/s, rad/s) for all joints; OpenSim knows none.
+    """
+    tree = model.tree()
+    places = {info.path: place for place, info in enumerate(robot.mechanism.coordinates)}
+    found: dict[int, list[tuple[str, float]]] = {}
+    for actuator in tree.components:
+        if not isinstance(actuator, CoordinateActuator) or not actuator.coordinate or not actuator.appliesForce:
+            continue
+        try:
+            place = places.get(tree.path_of(tree.target(actuator, "coordinate", actuator.coordinate)) or "")
+        except ModelError:
+            continue
+        greatest = max(abs(actuator.min_control), abs(actuator.max_control))
+        force = abs(actuator.optimal_force) * greatest if actuator.optimal_force else 0.0
+        if place is not None:
+            found.setdefault(place, []).append((tree.path_of(actuator) or "", force))
+    limits: dict[str, float] = {}
+    for place, actuators in found.items():
+        total = sum(force for _, force in actuators)
+        joint = robot.joint_of.get(place)
+        if joint is None or not math.isfinite(total):
+            continue
+        limits[joint.name] = total
+        unit = "N" if joint.kind == "prismatic" else "N m"
+        for path, force in actuators:
+            done = "left out, but for its greatest force, which is the joint's effort limit"
+            fidelity.add(
+                "actuator", path, "an actuator of a coordinate", done, f"{force:g} {unit} of joint {joint.name}"
+            )
+
+    def limited(joint: RobotJoint) -> RobotJoint:
+        if joint.kind == "fixed":
+            return joint
+        return replace(joint, effort=limits.get(joint.name, effort), velocity=velocity)
+
+    return replace(robot, joints=tuple(limited(joint) for joint in robot.joints))

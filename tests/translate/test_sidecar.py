@@ -1,0 +1,278 @@
+"""The file of coordinates: it and the URDF are enough to know where every body is."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.document.reader import read_text
+from osimlite.errors import UnsupportedError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.multibody import build_mechanism
+from osimlite.multibody import functions as f
+from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.functions import Function, Linear, Scaled
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.motions import EllipsoidPoint
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.schema.constraint_types import CoordinateCouplerConstraint
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import Body
+from osimlite.schema.functions import Function as SchemaFunction
+from osimlite.schema.functions import LinearFunction, MultiplierFunction, PolynomialFunction
+from osimlite.schema.joints import PinJoint
+from osimlite.schema.model import Model
+from osimlite.translate import to_urdf
+from osimlite.translate.laws import Line, as_data, as_line, mimics
+from osimlite.translate.passes.merge_fixed import merge_fixed
+from osimlite.translate.passes.names import legal_names
+from osimlite.translate.robot import build_robot
+from osimlite.translate.sidecar import coordinates_json
+from osimlite.translate.urdf import urdf_text
+from tests.multibody.strategies import Case, cases
+from tests.translate.evaluator import Reader, evaluate
+from tests.translate.readers import mujoco_poses, worst_body, yourdfpy_poses
+
+
+def worst(reader: Reader, mechanism: Mechanism, q) -> float:
+    """Largest difference between the bodies' poses of the mechanism and those of the reader."""
+    values = dict(zip((info.path for info in mechanism.coordinates), q.tolist(), strict=True))
+    poses, state = reader.body_poses(values), mechanism.at(q)
+    assert poses.keys() == {"/ground", *(body.path for body in mechanism.bodies)}
+    differences = (np.abs(poses[body.path] - state.transform(k)).max() for k, body in enumerate(mechanism.bodies))
+    return max(differences, default=0.0)
+
+
+def sidecar(robot) -> Reader:
+    return Reader(urdf_text(robot), coordinates_json(robot, "robot.urdf"))
+
+
+# --------------------------------------------------------------------------------------------------- whole models
+@given(cases(), st.booleans())
+def test_urdf_and_coordinates_say_where_bodies_are(case: Case, merge: bool):
+    robot = build_robot(case.mechanism)
+    robot = legal_names(merge_fixed(robot) if merge else robot)
+    assert worst(sidecar(robot), case.mechanism, case.q) < 1e-9
+
+
+def test_urdf_and_coordinates_of_real_models_say_where_bodies_are(corpus_model):
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
+    try:
+        urdf = to_urdf(model)
+    except UnsupportedError as error:
+        pytest.skip(str(error))
+    reader, mechanism = Reader(urdf.text, urdf.coordinates), urdf.robot.mechanism
+    coordinates = reader.data["coordinates"]
+    generator = np.random.default_rng(5)
+    for _ in range(5):
+        random = generator.uniform(-1.5, 1.5, len(coordinates))
+        free = {
+            item["path"]: item["default_value"] if item["locked"] else value
+            for item, value in zip(coordinates, random.tolist(), strict=True)
+        }
+        values = reader.coupled(free)
+        locked = {item["path"]: item["default_value"] for item in coordinates if item["locked"]}
+        values |= locked
+        q = np.array([values[item["path"]] for item in coordinates])
+        assert worst(reader, mechanism, q) < 1e-9
+        # Joints that mimic others get the value that they have by their own function.
+        joints = reader.joint_values(values)
+        for name, value in reader.mimicked(joints).items():
+            assert value == pytest.approx(joints[name], abs=1e-12)
+        state = mechanism.at(q)
+        for constraint in mechanism.constraints:
+            if isinstance(constraint, Coupler) and mechanism.coordinates[constraint.dependent].path not in locked:
+                assert np.abs(constraint.bond(state).errors).max() < 1e-9
+
+
+def test_the_file_tells_what_the_model_says_of_coordinates():
+    model = dynamic_walker()
+    urdf = to_urdf(model, limits="range", collision=True)
+    data = json.loads(urdf.coordinates)
+    assert (data["format"], data["version"], data["file"]) == ("osimlite-coordinates", 1, "DynamicWalkerModel.urdf")
+    by_name = {item["name"]: item for item in data["coordinates"]}
+    knee = by_name["RKnee_rz"]
+    assert knee["path"] == "/jointset/RightShankToThigh/RKnee_rz" and knee["joint"] == "RKnee_rz"
+    assert knee["range"] == [math.radians(-100.0), 0.0] and knee["unit"] == "rad" and not knee["locked"]
+    assert by_name["Pelvis_ty"]["unit"] == "m" and by_name["Pelvis_ty"]["default_value"] == 0.835
+    lock = by_name["platform_rz"]
+    assert lock["locked"] and lock["joint"] is None and lock["drives"] == []
+    assert {item["path"]: item["link"] for item in data["bodies"]}["/bodyset/RightShank"] == "RightShank"
+    kinds = [item["as"] for item in data["shapes"]]
+    surfaces = [component for component in model.components() if isinstance(component, ContactGeometry)]
+    assert kinds.count("visual") == 6 and kinds.count("collision") == len(surfaces)
+
+
+def test_what_is_endless_is_null():
+    model = dynamic_walker()
+    model.find("/jointset/RightShankToThigh/RKnee_rz").range = (-math.inf, math.inf)
+    item = next(c for c in json.loads(to_urdf(model).coordinates)["coordinates"] if c["name"] == "RKnee_rz")
+    assert item["range"] == [None, None]
+
+
+# ------------------------------------------------------------------------------------------------------- functions
+X = (-1.0, -0.2, 0.0, 0.3, 1.1, 1.4, 2.0)
+Y = (0.3, -0.1, 0.2, 0.25, 1.0, 0.8, -0.7)
+FUNCTIONS: list[tuple[Function, int]] = [
+    (f.Constant(0.7), 1),
+    (Linear(2.0, -0.3), 1),
+    (f.WeightedSum((1.0, -2.0), 0.5), 2),
+    (f.Polynomial((0.5, -1.0, 0.25, 3.0)), 1),
+    (f.Sine(0.5, 2.0, 0.1, -0.2), 1),
+    (f.Step(-0.5, 0.5, 1.0, 3.0), 1),
+    (f.MultivariatePolynomial.complete((1.0, 2.0, 3.0, -4.0, 0.5, 0.1), 2, 2), 2),
+    (Scaled(-0.5, f.SimmSpline(X, Y)), 1),
+    (f.PiecewiseLinear(X, Y), 1),
+    (f.PiecewiseConstant(X, Y), 1),
+    (f.SimmSpline(X, Y), 1),
+    (f.SimmSpline(X[:3], Y[:3]), 1),
+    (f.SimmSpline(X[:2], Y[:2]), 1),
+    (f.SimmSpline((0.0, 0.0, 0.5, 1.0, 1.0), (0.0, 0.1, 0.2, 0.4, 0.3)), 1),
+    (smoothing_spline(X, Y, 2, 0.0), 1),
+    (smoothing_spline(X, Y, 3, 0.01), 1),
+    *((EllipsoidPoint(k, 0.2), 3) for k in range(3)),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments"), FUNCTIONS, ids=lambda item: type(item).__name__)
+def test_every_function_is_written_exactly(function, arguments):
+    data = json.loads(json.dumps(as_data(function)))
+    for x in np.random.default_rng(2).uniform(-2.0, 3.0, (200, arguments)):
+        assert evaluate(data, x.tolist()) == pytest.approx(function.evaluate(x)[0], abs=1e-12, rel=1e-12)
+
+
+def test_no_function_is_forgotten():
+    def below(cls) -> set[type]:
+        found = {cls} if not getattr(cls, "__abstractmethods__", None) else set()
+        return found.union(*(below(item) for item in cls.__subclasses__()))
+
+    ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.multibody")}
+    assert ours == {type(function) for function, _ in FUNCTIONS}
+
+    class Other(Function):
+        def evaluate(self, arguments):
+            return 0.0, arguments, np.zeros((1, 1))
+
+    with pytest.raises(UnsupportedError, match="class Other"):
+        as_data(Other())
+
+
+def test_the_guide_describes_the_file(repo):
+    guide = (repo / "docs" / "urdf.md").read_text()
+    types = {as_data(function)["type"] for function, _ in FUNCTIONS}
+    assert set(re.findall(r"^\| `([a-z-]+)` \| .*", guide.split("| `type` |")[1], re.MULTILINE)) == types
+    (example,) = re.findall(r"```json\n(.*?)```", guide, re.DOTALL)
+    said, made = json.loads(example), json.loads(to_urdf(dynamic_walker()).coordinates)
+    assert said.keys() == made.keys()
+    for section in ("coordinates", "bodies", "shapes"):
+        assert said[section][0].keys() == made[section][0].keys()
+    assert said["joints"][0].keys() | {"identity"} == made["joints"][0].keys()
+    piece = said["joints"][0]["function"]
+    assert len(piece["pieces"]) == len(piece["x"]) + 1
+
+
+def test_straight_lines_are_known_in_any_form():
+    lines = [
+        Linear(2.0, 1.0),
+        f.WeightedSum((2.0,), 1.0),
+        f.Polynomial((0.0, 2.0, 1.0)),
+        Scaled(-2.0, Linear(-1.0, -0.5)),
+    ]
+    assert [as_line(function) for function in lines] == [Line(2.0, 1.0)] * 4
+    curves = [
+        f.Polynomial((1.0, 2.0, 1.0)),
+        f.WeightedSum((1.0, 2.0)),
+        f.Sine(1.0, 1.0, 0.0, 0.0),
+        Scaled(2.0, f.SimmSpline(X, Y)),
+    ]
+    assert [as_line(function) for function in curves] == [None] * 4
+
+
+# -------------------------------------------------------------------------------------------------------- couplers
+def chain(*laws: tuple[int, int, SchemaFunction], count: int = 4) -> Model:
+    """Pins a, b, c, d one on the other; each law makes the first coordinate that function of the second."""
+    model, carrier = Model(name="chain"), None
+    for name in "abcd"[:count]:
+        body = model.add(Body(name=f"body_{name}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        joint = PinJoint(name=f"pin_{name}", coordinates=[Coordinate(name=name)])
+        model.add(joint.between(carrier or model.ground, body, at=(0.1, 0.2, 0.0)))
+        carrier = body
+    for k, (dependent, independent, function) in enumerate(laws):
+        model.add(
+            CoordinateCouplerConstraint(
+                name=f"law_{k}",
+                dependent_coordinate_name="abcd"[dependent],
+                independent_coordinate_names=("abcd"[independent],),
+                coupled_coordinates_function=function,
+            )
+        )
+    return model
+
+
+def mimic_lines(text: str) -> list[str]:
+    return re.findall(r"<mimic .*/>", text)
+
+
+def test_coupled_coordinates_mimic_the_first_of_their_chain():
+    straight = LinearFunction(coefficients=(2.0, 0.1))
+    half = MultiplierFunction(scale=-0.5, function=LinearFunction(coefficients=(1.0, 0.0)))
+    urdf = to_urdf(chain((1, 0, straight), (2, 1, half)))
+    assert mimic_lines(urdf.text) == [
+        '<mimic joint="a" multiplier="2" offset="0.1"/>',
+        '<mimic joint="a" multiplier="-1" offset="-0.05"/>',
+    ]
+    records = [(r.component, r.done, r.detail) for r in urdf.fidelity if r.kind == "coupler"]
+    assert records == [
+        ("/constraintset/law_0", "a joint that mimics another", "coordinate b follows joint a"),
+        ("/constraintset/law_1", "a joint that mimics another", "coordinate c follows joint a"),
+    ]
+    q = np.array([0.3, 0.7, -0.35, -0.2])
+    values = urdf.robot.joint_values(q)
+    assert worst_body(urdf.robot, yourdfpy_poses(urdf.text, values), q) < 1e-12
+    assert worst_body(urdf.robot, mujoco_poses(urdf.text, values)[0], q) < 1e-9
+    reader = Reader(urdf.text, urdf.coordinates)
+    assert list(
+        reader.coupled(
+            dict(zip((i.path for i in urdf.robot.mechanism.coordinates), (0.3, 0, 0, -0.2), strict=True))
+        ).values()
+    ) == pytest.approx(q.tolist())
+
+
+def test_curved_couplers_circles_and_locks_are_left_to_the_file():
+    curve = PolynomialFunction(coefficients=(1.0, 0.0, 0.0))
+    urdf = to_urdf(chain((1, 0, curve), (3, 1, LinearFunction(coefficients=(3.0, 0.0)))))
+    assert mimic_lines(urdf.text) == ['<mimic joint="b" multiplier="3"/>']
+    done = [r.done for r in urdf.fidelity if r.kind == "coupler"]
+    assert "file of coordinates" in done[0] and "mimics" in done[1]
+    line = LinearFunction(coefficients=(1.0, 0.0))
+    circle = to_urdf(chain((0, 1, line), (1, 0, line), count=2))
+    assert len(mimic_lines(circle.text)) == 1
+    held = chain((1, 0, line))
+    held.find("/jointset/pin_a/a").locked = True
+    urdf = to_urdf(held)
+    assert mimic_lines(urdf.text) == []
+    assert json.loads(urdf.coordinates)["couplers"][0]["dependent"] == "/jointset/pin_b/b"
+
+
+def test_leaders_follow_nobody():
+    mechanism = build_mechanism(chain())
+    generator = np.random.default_rng(1)
+    for _ in range(60):
+        laws = tuple(
+            Coupler(int(a), (int(b),), Linear(*generator.uniform(-2.0, 2.0, 2)))
+            for a, b in generator.integers(0, 4, (int(generator.integers(1, 5)), 2))
+        )
+        robot = build_robot(replace(mechanism, constraints=laws))
+        following = mimics(robot)
+        assert not {mimic.leader for mimic in following.values()} & following.keys()
