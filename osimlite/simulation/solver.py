@@ -10,7 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from osimlite.simulation.script import Script
+
+Solver = Callable[[Sequence[Sequence[float]], Sequence[float], Sequence[float]], list[float]]
+
+LARGEST_CODE = 20
+"""Joints up to which code is written; its length grows with their cube, where no branch shortens it."""
 
 
 class SingularMassError(ArithmeticError):
@@ -21,9 +28,7 @@ class SingularMassError(ArithmeticError):
         self.joint = joint
 
 
-def tree_solver(
-    parents: Sequence[int],
-) -> Callable[[Sequence[Sequence[float]], Sequence[float], Sequence[float]], list[float]]:
+def tree_solver(parents: Sequence[int]) -> Solver:
     """The function of M (n, n), bias h (n) and forces t (n, or more) that returns M⁻¹ (t - h).
 
     Args:
@@ -33,6 +38,8 @@ def tree_solver(
         SingularMassError: (the function) M is not positive definite, or not a number.
     """
     size = len(parents)
+    if size > LARGEST_CODE:
+        return _solve_dense
     above = [list(_ancestors(parents, joint)) for joint in range(size)]
     script = Script("solve", ["M", "h", "t"])
     for row in range(size):
@@ -54,6 +61,17 @@ def tree_solver(
             script.line(f"x{k} -= {' + '.join(f'm{k}_{i}*x{i}' for i in above[k])}")
     script.line(f"return [{', '.join(f'x{joint}' for joint in range(size))}]")
     return script.function({"SingularMassError": SingularMassError})
+
+
+def _solve_dense(M: Sequence[Sequence[float]], h: Sequence[float], t: Sequence[float]) -> list[float]:
+    matrix, size = np.array(M), len(h)
+    right = np.array(t[:size]) - np.array(h)
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        raise SingularMassError(int(np.argmin(np.diag(matrix)))) from None
+    solution: list[float] = np.linalg.solve(matrix, right).tolist()
+    return solution
 
 
 def _ancestors(parents: Sequence[int], joint: int) -> Sequence[int]:

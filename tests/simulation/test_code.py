@@ -116,6 +116,19 @@ def test_solver_of_a_tree(wishes, seed):
     assert found == pytest.approx(np.linalg.solve(matrix, force - bias), rel=1e-9, abs=1e-9)
 
 
+def test_solver_of_a_long_chain():
+    size = 40
+    rng = np.random.default_rng(0)
+    moves = np.tril(rng.uniform(-1, 1, (size, size))) + 5.0 * np.eye(size)
+    matrix, bias, force = moves.T @ moves, rng.uniform(-1, 1, size), rng.uniform(-1, 1, size)
+    solve = tree_solver(range(-1, size - 1))
+    found = solve(matrix.tolist(), bias.tolist(), force.tolist())
+    assert found == pytest.approx(np.linalg.solve(matrix, force - bias), rel=1e-9)
+    matrix[3, 3] = -1.0
+    with pytest.raises(SingularMassError):
+        solve(matrix.tolist(), bias.tolist(), force.tolist())
+
+
 @pytest.mark.parametrize("entry", [0.0, -1.0, math.nan])
 def test_solver_names_the_joint_that_moves_no_mass(entry):
     with pytest.raises(SingularMassError) as caught:

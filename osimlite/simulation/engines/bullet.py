@@ -66,7 +66,7 @@ with _muted():
 MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
 
-FEW_JOINTS = 15
+FEW_JOINTS = 12
 """Up to here the mass matrix is quicker, on the machine it was measured on."""
 
 NO_LIMIT = 1e9
@@ -145,8 +145,8 @@ class BulletEngine:
                 "(one principal moment exceeds the sum of the others); take the route articulated-body"
             )
         self.route = route
-        parents = [self.field.chain.parent(joint) for joint in range(self._count)]
-        self._solve = tree_solver(parents)
+        if route == MASS_MATRIX:
+            self._solve = tree_solver([self.field.chain.parent(joint) for joint in range(self._count)])
         if not self._count:
             self.derivative = self._nothing_moves  # type: ignore[method-assign]
         elif self.field.separate:
