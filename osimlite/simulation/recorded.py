@@ -62,7 +62,9 @@ class RecordedMotion:
         for column, label in enumerate(table.columns):
             place = names.get(label.removesuffix("/value"), -1)
             if place < 0:
-                ignored.append(label)
+                # Speeds in a file of states follow from the values.
+                if label.removesuffix("/speed") not in names:
+                    ignored.append(label)
             elif place not in found:
                 found.add(place)
                 turned = table.in_degrees and mechanism.coordinates[place].motion_type == "rotational"
