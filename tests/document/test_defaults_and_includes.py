@@ -114,7 +114,9 @@ def test_an_object_that_moves_to_another_model_takes_its_values_along() -> None:
 
 def test_numbers_of_elements_are_those_of_the_text() -> None:
     document = read_document(Source(BODIES.encode()))
-    for body in (*bodies(document.model), document.model.layout.defaults[0]):
+    layout = document.model.layout
+    assert layout is not None
+    for body in (*bodies(document.model), layout.defaults[0]):
         assert document.source.spans[body._index].tag == "Body"
     wrong = read_document(Source(BODIES.replace("<mass>7<", "<mass>x<", 1).encode()))
     assert [(note.kind, wrong.source.spans[note.number].tag) for note in wrong.notes] == [("unreadable", "mass")]

@@ -198,8 +198,8 @@ def test_an_optional_number_may_be_empty_and_an_optional_text_is_then_empty() ->
     )
     document = read_document(Source(text.encode()))
     bushing, actuator = document.model.force_set.objects
-    assert (bushing.moment_visual_scale, bushing.force_visual_scale) == (None, 1.0)  # type: ignore[attr-defined]
-    assert actuator.coordinate == ""  # type: ignore[attr-defined]
+    assert (bushing.moment_visual_scale, bushing.force_visual_scale) == (None, 1.0)
+    assert actuator.coordinate == ""
     assert document.notes == []
     assert "<moment_visual_scale></moment_visual_scale>" in osimlite.to_text(document.model)
 

@@ -11,7 +11,7 @@ import re
 
 import pytest
 
-from osimlite.simulate.integrators import RungeKuttaMerson
+from osimlite.simulation.integrators import RungeKuttaMerson
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

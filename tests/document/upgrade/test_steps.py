@@ -45,7 +45,7 @@ def unresolved(model: Model) -> list[str]:
 
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.name)
-def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:  # type: ignore[no-untyped-def]
+def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:
     old = read_document(Source.of_file(fixtures / "versions" / f"{step.name}.osim"))
     assert old.version < step.below
     assert step.name in {change.step for change in old.changes}
@@ -54,7 +54,7 @@ def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:  # ty
 
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.name)
-def test_what_is_upgraded_needs_no_upgrade(step, fixtures: Path) -> None:  # type: ignore[no-untyped-def]
+def test_what_is_upgraded_needs_no_upgrade(step, fixtures: Path) -> None:
     path = fixtures / "versions" / "upgraded" / f"{step.name}.osim"
     new = read_document(Source.of_file(path))
     assert (new.version, new.changes, new.notes) == (CURRENT_VERSION, [], [])
