@@ -9,18 +9,8 @@ from osimlite.multibody import functions as f
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.motions import EllipsoidPoint
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
-from osimlite.translate.robot import Robot
-
-
-class Line(NamedTuple):
-    """``slope * x + start``."""
-
-    slope: float
-    start: float
-
-    def after(self, inner: Line) -> Line:
-        """This line of the inner one."""
-        return Line(self.slope * inner.slope, self.slope * inner.start + self.start)
+from osimlite.translate.lines import Line, as_line
+from osimlite.translate.robot import Robot, RobotJoint
 
 
 class Mimic(NamedTuple):
@@ -28,21 +18,6 @@ class Mimic(NamedTuple):
 
     leader: str
     line: Line
-
-
-def as_line(function: f.Function) -> Line | None:
-    """The straight line that a function of one argument is, or None."""
-    match function:
-        case f.Linear(rate, start):
-            return Line(rate, start)
-        case f.WeightedSum((weight,), start):
-            return Line(weight, start)
-        case f.Polynomial((*high, slope, start)) if not any(high):
-            return Line(slope, start)
-        case f.Scaled(scale, inner):
-            line = as_line(inner)
-            return None if line is None else Line(scale, 0.0).after(line)
-    return None
 
 
 def couplers(robot: Robot) -> list[Coupler]:
@@ -56,6 +31,7 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
     That is so where several motions of a joint are driven by one coordinate, and where a coupler makes a coordinate a
     straight line of another. A leader never follows another joint itself: most readers do not look further.
     """
+    leaders = _leaders(robot)
     follows: dict[int, tuple[int, Line]] = {}
     for coupler in couplers(robot):
         line = as_line(coupler.function)
@@ -63,7 +39,7 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
             follows.setdefault(coupler.dependent, (coupler.independent[0], line))
 
     def origin(place: int) -> tuple[int, Line]:
-        """The coordinate farthest up that has a joint, and the line from it to this one."""
+        """The coordinate farthest up that has a leader, and the line from it to this one."""
         found = place, Line(1.0, 0.0)
         line, seen = found[1], {place}
         while place in follows:
@@ -73,7 +49,7 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
                 return min(seen), Line(1.0, 0.0)
             seen.add(place)
             line = line.after(step)
-            if place in robot.joint_of:
+            if place in leaders:
                 found = place, line
         return found
 
@@ -83,10 +59,21 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
         if len(joint.coordinates) != 1 or line is None:
             continue
         place, way = origin(joint.coordinates[0])
-        leader = robot.joint_of.get(place)
-        if leader is not None and leader is not joint:
-            result[joint.name] = Mimic(leader.name, line.after(way))
+        if place not in leaders or leaders[place][0] is joint:
+            continue
+        leader, own = leaders[place]
+        result[joint.name] = Mimic(leader.name, line.after(way).after(own.inverse()))
     return result
+
+
+def _leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
+    """For coordinates the joint that others follow: the one that is the coordinate, else one that is a line of it."""
+    found: dict[int, tuple[RobotJoint, Line]] = {}
+    for joint in robot.moving:
+        line = as_line(joint.function)
+        if len(joint.coordinates) == 1 and line is not None and line.slope:
+            found.setdefault(joint.coordinates[0], (joint, line))
+    return found | {place: (joint, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
 
 
 def as_data(function: f.Function) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.motions import AxisMotion, Fixed
 from osimlite.multibody.spatial import Array, rotation_about, transform
+from osimlite.translate.lines import as_line
 from osimlite.translate.shapes import Visual
 
 WORLD = "world"
@@ -299,11 +300,11 @@ class _Builder:
         elif _is_constant(part.function) or all(own[place] in self.still for place in part.coordinates):
             values = self.values[own]
             yield Fixed(part.relative(values, np.zeros(len(own))).matrix)
-        elif part.function.slope is None or part.function == IDENTITY:
+        elif part.function == IDENTITY or (line := as_line(part.function)) is None:
             yield part
         else:
-            slope = part.function.slope
-            first = AxisMotion(part.kind, part.axis, (0,), Constant(part.function.evaluate(np.zeros(1))[0]))
+            slope = line.slope
+            first = AxisMotion(part.kind, part.axis, (0,), Constant(line.start))
             yield Fixed(first.relative(np.zeros(1), np.zeros(1)).matrix)
             unit = abs(slope) == 1.0
             yield AxisMotion(
@@ -341,7 +342,8 @@ def _placed(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
 def _is_constant(function: Function) -> bool:
     if isinstance(function, Scaled):
         return function.scale == 0.0 or _is_constant(function.function)
-    return isinstance(function, Constant) or function.slope == 0.0
+    line = as_line(function)
+    return isinstance(function, Constant) or (line is not None and line.slope == 0.0)
 
 
 def _letter(motion: AxisMotion) -> str:

@@ -36,7 +36,7 @@ def coordinates_json(robot: Robot, file: str) -> str:
             {
                 "path": info.path,
                 "name": info.name,
-                "unit": "m" if info.motion_type == "translational" else "rad",
+                "unit": {"rotational": "rad", "translational": "m"}.get(info.motion_type),
                 "joint": robot.joint_of[place].name if place in robot.joint_of else None,
                 "drives": drives.get(place, []),
                 "default_value": info.default_value,

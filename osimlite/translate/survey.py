@@ -209,15 +209,16 @@ class _Survey:
 
     def _couplers(self) -> None:
         for coupler in couplers(self.robot):
-            joint = self.robot.joint_of.get(coupler.dependent)
-            mimic = self._mimics.get(joint.name) if joint is not None else None
+            driven = [part.name for part in self.robot.moving if coupler.dependent in part.coordinates]
+            leaders = {self._mimics[name].leader if name in self._mimics else None for name in driven}
+            leader = leaders.pop() if len(leaders) == 1 else None
             name = self.robot.mechanism.coordinates[coupler.dependent].name
             self.note(
                 "coupler",
                 coupler.name,
                 "a coordinate that is a function of others",
-                f"a free joint: {COMPUTE}" if mimic is None else "a joint that mimics another",
-                f"coordinate {name}" + ("" if mimic is None else f" follows joint {mimic.leader}"),
+                f"a free joint: {COMPUTE}" if leader is None else "a joint that mimics another",
+                f"coordinate {name}" + ("" if leader is None else f" follows joint {leader}"),
             )
 
     @cached_property

@@ -20,19 +20,23 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody import functions as f
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.functions import Function, Linear, Scaled
+from osimlite.multibody.joints import TransformAxis, custom
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import EllipsoidPoint
 from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.custom_joint import CustomJoint, SpatialTransform
+from osimlite.schema.custom_joint import TransformAxis as SchemaAxis
 from osimlite.schema.frames import Body
 from osimlite.schema.functions import Function as SchemaFunction
-from osimlite.schema.functions import LinearFunction, MultiplierFunction, PolynomialFunction
+from osimlite.schema.functions import LinearFunction, MultiplierFunction, PolynomialFunction, SimmSpline
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
-from osimlite.translate.laws import Line, as_data, as_line, mimics
+from osimlite.translate.laws import as_data, mimics
+from osimlite.translate.lines import Line, as_line
 from osimlite.translate.passes.merge_fixed import merge_fixed
 from osimlite.translate.passes.names import legal_names
 from osimlite.translate.robot import build_robot
@@ -41,6 +45,7 @@ from osimlite.translate.urdf import urdf_text
 from tests.multibody.strategies import Case, cases
 from tests.translate.evaluator import Reader, evaluate
 from tests.translate.readers import mujoco_poses, worst_body, yourdfpy_poses
+from tests.translate.test_robot import one_body
 
 
 def worst(reader: Reader, mechanism: Mechanism, q) -> float:
@@ -187,16 +192,42 @@ def test_straight_lines_are_known_in_any_form():
         Linear(2.0, 1.0),
         f.WeightedSum((2.0,), 1.0),
         f.Polynomial((0.0, 2.0, 1.0)),
+        f.MultivariatePolynomial.complete((1.0, 2.0, 0.0), 1, 2),
         Scaled(-2.0, Linear(-1.0, -0.5)),
+        f.SimmSpline((-1.0, 3.0), (-1.0, 7.0)),
+        Scaled(0.5, f.SimmSpline((-1.0, 3.0), (-2.0, 14.0))),
+        f.PiecewiseLinear((-1.0, 3.0), (-1.0, 7.0)),
     ]
-    assert [as_line(function) for function in lines] == [Line(2.0, 1.0)] * 4
+    assert [as_line(function) for function in lines] == [Line(2.0, 1.0)] * len(lines)
+    assert as_line(f.SimmSpline(X, [0.3] * len(X))) == Line(0.0, 0.3)
     curves = [
         f.Polynomial((1.0, 2.0, 1.0)),
         f.WeightedSum((1.0, 2.0)),
+        f.MultivariatePolynomial.complete((1.0, 2.0, 3.0), 1, 2),
+        f.MultivariatePolynomial.complete((1.0, 2.0, 3.0), 2, 1),
         f.Sine(1.0, 1.0, 0.0, 0.0),
         Scaled(2.0, f.SimmSpline(X, Y)),
+        f.SimmSpline((0.0, 0.0), (0.0, 1.0)),
+        f.PiecewiseLinear(X, Y),
     ]
-    assert [as_line(function) for function in curves] == [None] * 4
+    assert [as_line(function) for function in curves] == [None] * len(curves)
+
+
+def test_axes_along_straight_splines_are_joints_of_one_coordinate():
+    """As in spine models, whose coordinates turn the first vertebra by splines through two points."""
+    z, x = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    axes = [
+        TransformAxis((0,), z, f.SimmSpline((-1.5, 1.5), (-1.5, 1.5))),
+        TransformAxis((0,), x, f.SimmSpline((-1.0, 3.0), (-0.5, 2.5))),
+    ]
+    flat = [TransformAxis((0,), x, f.SimmSpline((0.0, 1.0, 2.0), (0.2, 0.2, 0.2)))]
+    mechanism = one_body(custom(axes, flat), 1)
+    robot = build_robot(mechanism)
+    assert [joint.name for joint in robot.moving] == ["q0", "q0_rx"]
+    assert robot.joint_of.keys() == {0} and mimics(robot)["q0_rx"].leader == "q0"
+    for q in ((0.4,), (-3.0,)):
+        assert worst(sidecar(robot), mechanism, np.array(q)) < 1e-12
+    assert worst_body(robot, yourdfpy_poses(urdf_text(robot), robot.joint_values((0.4,))), np.array((0.4,))) < 1e-12
 
 
 # -------------------------------------------------------------------------------------------------------- couplers
@@ -263,6 +294,41 @@ def test_curved_couplers_circles_and_locks_are_left_to_the_file():
     urdf = to_urdf(held)
     assert mimic_lines(urdf.text) == []
     assert json.loads(urdf.coordinates)["couplers"][0]["dependent"] == "/jointset/pin_b/b"
+
+
+def test_a_joint_that_is_a_multiple_of_its_coordinate_may_lead():
+    """As in spine models, in which the first vertebra turns by a share of the coordinate, and so do the others."""
+    model = Model(name="spine")
+    shares, carrier = (0.2, 0.3), None
+    for k, share in enumerate(shares):
+        body = model.add(Body(name=f"v{k}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        turn = SchemaAxis(
+            name="rotation1",
+            coordinates=(f"q{k}",),
+            function=SimmSpline(x=(-1.0, 1.0), y=(-share, share)),
+        )
+        joint = CustomJoint(
+            name=f"j{k}",
+            coordinates=[Coordinate(name=f"q{k}")],
+            spatial_transform=SpatialTransform(rotation1=turn),
+        )
+        model.add(joint.between(carrier or model.ground, body, at=(0.0, 0.1, 0.0)))
+        carrier = body
+    model.add(
+        CoordinateCouplerConstraint(
+            name="law",
+            dependent_coordinate_name="q1",
+            independent_coordinate_names=("q0",),
+            coupled_coordinates_function=SimmSpline(x=(-1.0, 1.0), y=(-0.5, 0.5)),
+        )
+    )
+    urdf = to_urdf(model)
+    (mimic,) = mimics(urdf.robot).values()
+    assert mimic.leader == urdf.robot.moving[0].name
+    assert mimic.line == pytest.approx((0.3 * 0.5 / 0.2, 0.0))
+    assert [r.done for r in urdf.fidelity if r.kind == "coupler"] == ["a joint that mimics another"]
+    q = np.array([0.8, 0.4])
+    assert worst_body(urdf.robot, yourdfpy_poses(urdf.text, urdf.robot.joint_values(q)), q) < 1e-12
 
 
 def test_leaders_follow_nobody():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from osimlite.translate.laws import as_line
+from osimlite.translate.lines import as_line
 from osimlite.translate.robot import Robot, RobotJoint
 
 
