@@ -47,9 +47,9 @@ def translate(
 ) -> None:
     """Translate a model: writes <model>.urdf, its meshes, <model>.coordinates.json and fidelity.json.
 
-    Meshes in VTK's format (.vtp) are written as .obj, text .stl as binary. coordinates.json says how coordinates drive
-    joints, where the format cannot, and which link and joint belong to which body and coordinate. fidelity.json says
-    what became of every component, and what the format cannot say; the table shows the latter.
+    Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
+    coordinates.json says how coordinates drive joints, where URDF cannot.
+    fidelity.json says what became of every component, and the table what is lost.
 
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry --collision -o robot
     """
