@@ -92,7 +92,7 @@ def document_of(source: Source, root: etree._Element, version: int) -> Document:
     Raises:
         DocumentError: there is no model in it, or something that no rule carries over from an older version.
     """
-    with _collector_paused():
+    with collector_paused():
         upgraded = _upgraded(source, root, version) if version < CURRENT_VERSION else None
         document = _document(source, root, version, upgraded)
         if upgraded is None and any(note.kind in _NOT_KNOWN for note in document.notes):
@@ -197,6 +197,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         ) from None
     if root is None:
         raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
+    source.well_formed = not recover
     return root
 
 
@@ -312,7 +313,7 @@ def _included_by(source: Source, around: tuple[str, ...] = ()) -> Included:
 
 
 @contextmanager
-def _collector_paused() -> Iterator[None]:
+def collector_paused() -> Iterator[None]:
     """Thousands of objects are made and none dropped: the garbage collector would look at them in vain."""
     enabled = gc.isenabled()
     gc.disable()

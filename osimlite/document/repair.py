@@ -14,7 +14,8 @@ from typing import NamedTuple
 from lxml import etree
 
 from osimlite.document.notes import Note, NoteKind
-from osimlite.document.source import Source, markup
+from osimlite.document.source import Source
+from osimlite.document.spans import markup
 from osimlite.errors import NotWellFormedError
 
 _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)

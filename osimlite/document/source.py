@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import codecs
 import re
-from bisect import bisect_right
-from collections.abc import Iterator
-from dataclasses import dataclass
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
 from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
+from osimlite.document.spans import PlainSpans, Span, spans_of
 from osimlite.errors import MissingFileError
 
 
@@ -22,67 +23,6 @@ class Position(NamedTuple):
     length: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Where one element stands, as character offsets into the text.
-
-    `start` is at ``<``, `tag_end` behind the ``>`` of the start tag, `inner_end` at ``</``, `end` behind the element;
-    for an empty element all of the last three are equal. `parent` is the number of the element around it, -1 for none.
-    """
-
-    tag: str
-    start: int
-    tag_end: int
-    inner_end: int
-    end: int
-    parent: int
-
-
-class Markup(NamedTuple):
-    """One piece of markup in a text: characters `start` to `end`.
-
-    `kind` is ``open``, ``empty`` or ``close`` for tags, else ``comment``, ``cdata``, ``instruction`` or ``doctype``.
-    """
-
-    kind: str
-    start: int
-    end: int
-    tag: str = ""
-
-
-# No part of a tag may be given back once matched, and none goes past the next "<": the time is linear in the length
-# of any text, also of one that is no XML.
-_MARKUP = re.compile(
-    r"<(?:(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)|/(?P<close>[^\s<>]++)\s*+>|"
-    r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*+(?P<empty>/?)>)"
-)
-_SPECIAL = {
-    "!--": ("comment", "-->"),
-    "![CDATA[": ("cdata", "]]>"),
-    "?": ("instruction", "?>"),
-    "!DOCTYPE": ("doctype", ">"),
-}
-
-
-def markup(text: str) -> Iterator[Markup]:
-    """Yield the markup of a text in order; it ends where a comment or its like has no end."""
-    place = 0
-    while (match := _MARKUP.search(text, place)) is not None:
-        special = match["special"]
-        place = match.end()
-        if special is not None:
-            kind, ending = _SPECIAL[special]
-            found = text.find(ending, place)
-            if found < 0:
-                return
-            place = found + len(ending)
-            yield Markup(kind, match.start(), place)
-        elif match["close"] is not None:
-            yield Markup("close", match.start(), place, match["close"])
-        else:
-            yield Markup("empty" if match["empty"] else "open", match.start(), place, match["open"])
-
-
 class Source:
     """The text of one document. Elements are numbered in document order from 0, the root."""
 
@@ -91,6 +31,8 @@ class Source:
         self.data = data
         self.encoding = _encoding(data)
         self.text = _decoded(data, self.encoding)
+        self.well_formed = False
+        """Whether the text is known to be well-formed, as it is once the parser has found it so."""
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 
@@ -108,40 +50,36 @@ class Source:
             raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
 
     @cached_property
-    def spans(self) -> list[Span]:
+    def spans(self) -> Sequence[Span]:
         """Every element in document order; of a text that is not well-formed, as far as its tags go."""
-        spans: list[Span] = []
-        open_numbers: list[int] = []
-        for kind, start, end, tag in markup(self.text):
-            if kind in ("open", "empty"):
-                parent = open_numbers[-1] if open_numbers else -1
-                spans.append(Span(tag, start, end, end, end, parent))
-                if kind == "open":
-                    open_numbers.append(len(spans) - 1)
-            elif kind == "close" and open_numbers:
-                number = open_numbers.pop()
-                old = spans[number]
-                spans[number] = Span(old.tag, old.start, old.tag_end, start, end, old.parent)
-        return spans
+        return PlainSpans(self.text) if self.well_formed and PlainSpans.suit(self.text) else spans_of(self.text)
 
     @cached_property
-    def _children(self) -> dict[int, list[int]]:
-        children: dict[int, list[int]] = {}
-        for number, span in enumerate(self.spans):
-            children.setdefault(span.parent, []).append(number)
-        return children
+    def _starts(self) -> list[int]:
+        spans = self.spans
+        return spans.starts if isinstance(spans, PlainSpans) else [span.start for span in spans]
 
     def children(self, number: int) -> list[int]:
         """The numbers of the elements directly inside element `number`."""
-        return self._children.get(number, [])
+        return list(self._inside(number))
+
+    def _inside(self, number: int) -> Iterator[int]:
+        inner, end = number + 1, self.spans[number].end
+        while inner < len(self._starts) and self._starts[inner] < end:
+            yield inner
+            # Elements are numbered as they begin: the next beside this one is the first that begins behind its end.
+            inner = bisect_left(self._starts, self.spans[inner].end, inner + 1)
 
     def child(self, number: int, tag: str) -> int | None:
         """The number of the first element `tag` directly inside element `number`, or of what it was made from."""
-        found = next((child for child in self.children(number) if self.spans[child].tag == tag), None)
+        found = next((child for child in self._inside(number) if self.spans[child].tag == tag), None)
         return self.moved.get((number, tag)) if found is None else found
 
     @cached_property
     def _line_starts(self) -> list[int]:
+        if "\r" not in self.text:
+            # Of the last line no other begins behind it.
+            return [0, *accumulate(len(line) + 1 for line in self.text.split("\n")[:-1])]
         return [0, *(match.end() for match in re.finditer(r"\n|\r\n?", self.text))]
 
     def line_start(self, line: int) -> int:

@@ -12,6 +12,7 @@ from importlib import import_module
 from inspect import cleandoc
 from typing import Protocol
 
+from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
 from osimlite.document.survey import survey
 from osimlite.lint.config import Config
@@ -131,12 +132,14 @@ def all_rules() -> tuple[Rule, ...]:
 
 def check_source(source: Source, config: Config | None = None) -> Report:
     """Check a text."""
-    return run(Subject(survey(source), config))
+    with collector_paused():
+        return run(Subject(survey(source), config))
 
 
 def check_model(model: Model, config: Config | None = None) -> Report:
     """Check a model made in Python."""
-    return run(Subject(model, config))
+    with collector_paused():
+        return run(Subject(model, config))
 
 
 def run(subject: Subject) -> Report:

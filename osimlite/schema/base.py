@@ -157,8 +157,15 @@ class Object(BaseModel):
 
     def objects_held(self) -> Iterator[tuple[FieldSpec, Object]]:
         """Yield every object this one owns, with the property that holds it, in printing order."""
-        for spec in object_specs(type(self)):
-            value = getattr(self, spec.name)
+        state = self.__dict__
+        for spec, name, is_list in _holding(type(self)):
+            if name in state:
+                value = state[name]
+            elif is_list:
+                # A list that no one has asked for is empty.
+                continue
+            else:
+                value = getattr(self, name)
             if isinstance(value, list):
                 for item in value:
                     yield spec, item
@@ -167,9 +174,12 @@ class Object(BaseModel):
 
     def walk(self) -> Iterator[Object]:
         """Yield this object and everything below it, parents first."""
-        yield self
-        for _, held in self.objects_held():
-            yield from held.walk()
+        pending: list[Object] = [self]
+        while pending:
+            item = pending.pop()
+            yield item
+            if _holding(type(item)):
+                pending += [held for _, held in item.objects_held()][::-1]
 
     def copy_deep(self) -> Self:
         """A copy that shares nothing with the original."""
@@ -333,6 +343,12 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
 def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that hold objects."""
     return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Held))
+
+
+@cache
+def _holding(cls: type[Object]) -> tuple[tuple[FieldSpec, str, bool], ...]:
+    """The properties of `cls` that hold objects: each with its name, and whether it is a list, empty by default."""
+    return tuple((spec, spec.name, spec.factory is ObjectList) for spec in object_specs(cls))
 
 
 @cache

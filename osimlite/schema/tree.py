@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import Component, FieldSpec, Object, field_specs, name_spec
+from osimlite.schema.base import Component, FieldSpec, Object, field_specs, name_spec, object_specs, reference_specs
 from osimlite.schema.fields import Held, Reference, epoch
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.text import did_you_mean
@@ -26,8 +26,7 @@ ILLEGAL_CHARACTERS = "\\*+ \t\n/"
 """Characters OpenSim refuses in the name of a component."""
 
 
-@dataclass(frozen=True, slots=True)
-class Resolution:
+class Resolution(NamedTuple):
     """What a reference leads to.
 
     `target` is the component, or None with the `failure`: nothing there, a component of another class (`found`), no
@@ -48,8 +47,7 @@ class Renamed:
     first: Component
 
 
-@dataclass(frozen=True, slots=True)
-class Use:
+class Use(NamedTuple):
     """One reference in a model: `holder` has the property, `owner` is the component that holds `holder`.
 
     `position` is the index of the word in a list, else None.
@@ -119,9 +117,7 @@ class Tree:
             for holder in self._objects_of(owner):
                 if holder.name_reference is not None and holder.name:
                     yield Use(holder, owner, name_spec(type(holder)), holder.name)
-                for spec in field_specs(type(holder)).values():
-                    if not isinstance(spec.kind, Reference):
-                        continue
+                for spec in reference_specs(type(holder)):
                     value = getattr(holder, spec.name)
                     if isinstance(value, tuple):
                         for position, word in enumerate(value):
@@ -198,10 +194,13 @@ class Tree:
         if parent is not None:
             self._parents[id(component)] = parent
             self._below.setdefault(id(parent), []).append(component)
+        children = list(self._internal_parts(component)) if component.internal else []
+        self._children(component, component, children)
         taken: dict[str, Component] = {}
-        for name, child in (*self._internal_parts(component), *self._children(component, component)):
-            unique = self._unique(name, taken)
-            if unique != name:
+        for name, child in children:
+            unique = name
+            if name in taken:
+                unique = self._unique(name, taken)
                 self.renamed.append(Renamed(child, unique, taken[name]))
             taken[unique] = child
             self._place(child, f"{path}/{unique}", component)
@@ -213,19 +212,18 @@ class Tree:
             unique, count = f"{name}_{count}", count + 1
         return unique
 
-    def _children(self, holder: Object, owner: Component) -> Iterator[tuple[str, Component]]:
-        """Yield name and component of the children; objects without a path add no level."""
+    def _children(self, holder: Object, owner: Component, found: list[tuple[str, Component]]) -> None:
+        """Add name and component of the children to `found`; objects without a path add no level."""
         for spec, item in holder.objects_held():
             if isinstance(item, Component):
-                yield _name_in_tree(spec, item), item
+                found.append((_name_in_tree(spec, item), item))
             else:
                 self._owners[id(item)] = owner
-                yield from self._children(item, owner)
+                if object_specs(type(item)):
+                    self._children(item, owner, found)
 
     def _internal_parts(self, owner: Component) -> Iterator[tuple[str, Component]]:
         """Yield the parts that OpenSim makes for itself; the same ones for the same owner, as long as it lives."""
-        if not owner.internal:
-            return
         known = self._known_parts.get(id(owner))
         if known is None or known[0] is not owner:
             known = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
@@ -237,10 +235,9 @@ class Tree:
     def _objects_of(self, owner: Component) -> Iterator[Object]:
         """Yield a component and the objects without a path that belong to it."""
         pending: list[Object] = [owner]
-        while pending:
-            holder = pending.pop(0)
+        for holder in pending:
             yield holder
-            pending.extend(item for _, item in holder.objects_held() if not isinstance(item, Component))
+            pending += [item for _, item in holder.objects_held() if not isinstance(item, Component)]
 
     def _typed(self, found: Component | None, target: str) -> Resolution:
         if found is None:
@@ -250,7 +247,11 @@ class Tree:
         return Resolution(found)
 
     def _walk(self, text: str, base: str, target: str) -> Resolution:
-        path = normalised(text if text.startswith("/") else f"{base}/{text}")
+        path: str | None = text if text.startswith("/") else f"{base}/{text}"
+        plain = self.by_path.get(path or "")
+        if plain is not None:
+            return self._typed(plain, target)
+        path = normalised(path or "")
         if path is None:
             return Resolution(None, "illegal")
         return self._typed(self.by_path.get(path), target)

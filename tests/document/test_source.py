@@ -21,7 +21,8 @@ TEXT = """<?xml version="1.0"?>
 def test_elements_are_numbered_in_document_order() -> None:
     source = Source(TEXT.encode())
     assert [span.tag for span in source.spans] == ["Root", "One", "Two", "Three"]
-    assert [span.parent for span in source.spans] == [-1, 0, 0, 0]
+    assert source.children(0) == [1, 2, 3]
+    assert [source.children(number) for number in (1, 2, 3)] == [[], [], []]
     assert source.child(0, "Three") == 3
 
 

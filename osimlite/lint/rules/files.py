@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from pathlib import Path
 
@@ -43,7 +44,8 @@ def missing_mesh(subject: Subject, found: Found) -> None:
         return
     items: list[tuple[Object, str, str]] = [(mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)]
     items += [(mesh, "filename", mesh.filename) for mesh in subject.each(ContactMesh)]
-    places = [folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths)]
+    beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
+    places = [str(path) for path in beside]
     for item, tag, name in items:
         if not name:
             found(f"{called(item)} names no file", item, tag=tag)
@@ -51,7 +53,7 @@ def missing_mesh(subject: Subject, found: Found) -> None:
         if any(_is_file(place, name) for place in places):
             continue
         twin = next((twin for place in places if (twin := _in_other_case(place, name)) is not None), None)
-        tried = listed(dict.fromkeys(str(place) for place in places))
+        tried = listed(dict.fromkeys(places))
         message = f"the file '{name}' of {called(item)} is not there; looked in {tried}"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
@@ -98,14 +100,11 @@ def included_file(subject: Subject, found: Found) -> None:
         )
 
 
-def _is_file(place: Path, name: str) -> bool:
-    try:
-        return (place / name).is_file()
-    except (OSError, ValueError):
-        return False
+def _is_file(place: str, name: str) -> bool:
+    return os.path.isfile(os.path.join(place, name))
 
 
-def _in_other_case(place: Path, name: str) -> str | None:
+def _in_other_case(place: str, name: str) -> str | None:
     path = Path(name)
     return _lowered(place / path.parent).get(path.name.lower())
 

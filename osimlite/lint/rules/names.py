@@ -14,6 +14,8 @@ from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
 from osimlite.text import listed
 
+_ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
+
 
 @rule("OSIM311", "duplicate-name", severity=ERROR)
 def duplicate_name(subject: Subject, found: Found) -> None:
@@ -80,8 +82,10 @@ def illegal_name(subject: Subject, found: Found) -> None:
     ```
     """
     for component in subject.tree.components:
+        if _ILLEGAL.isdisjoint(component.name):
+            continue
         bad = [character for character in dict.fromkeys(component.name) if character in ILLEGAL_CHARACTERS]
-        if bad and not isinstance(component, ModelComponentSet):
+        if not isinstance(component, ModelComponentSet):
             shown = listed(["white space" if character.isspace() else f"'{character}'" for character in bad])
             better = "".join("_" if character in bad else character for character in component.name)
             found(

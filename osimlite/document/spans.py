@@ -1,0 +1,214 @@
+"""Where the elements of a text stand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, overload
+
+
+class Span(NamedTuple):
+    """Where one element stands, as character offsets into the text.
+
+    `start` is at ``<``, `tag_end` behind the ``>`` of the start tag, `inner_end` at ``</``, `end` behind the element;
+    for an empty element all of the last three are equal.
+    """
+
+    tag: str
+    start: int
+    tag_end: int
+    inner_end: int
+    end: int
+
+
+class Markup(NamedTuple):
+    """One piece of markup in a text: characters `start` to `end`.
+
+    `kind` is ``open``, ``empty`` or ``close`` for tags, else ``comment``, ``cdata``, ``instruction`` or ``doctype``.
+    """
+
+    kind: str
+    start: int
+    end: int
+    tag: str = ""
+
+
+# No part of a tag may be given back once matched, and none goes past the next "<": the time is linear in the length
+# of any text, also of one that is no XML.
+_MARKUP = re.compile(
+    r"<(?:(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)|/(?P<close>[^\s<>]++)\s*+>|"
+    r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*+(?P<empty>/?)>)"
+)
+_NAME = re.compile(r"[^\s/<>!?\"'&]++")
+_SPECIAL = {
+    "!--": ("comment", "-->"),
+    "![CDATA[": ("cdata", "]]>"),
+    "?": ("instruction", "?>"),
+    "!DOCTYPE": ("doctype", ">"),
+}
+
+
+def markup(text: str) -> Iterator[Markup]:
+    """Yield the markup of a text in order; it ends where a comment or its like has no end."""
+    place = 0
+    while (match := _MARKUP.search(text, place)) is not None:
+        special = match["special"]
+        place = match.end()
+        if special is not None:
+            kind, ending = _SPECIAL[special]
+            found = text.find(ending, place)
+            if found < 0:
+                return
+            place = found + len(ending)
+            yield Markup(kind, match.start(), place)
+        elif match["close"] is not None:
+            yield Markup("close", match.start(), place, match["close"])
+        else:
+            yield Markup("empty" if match["empty"] else "open", match.start(), place, match["open"])
+
+
+def spans_of(text: str) -> list[Span]:
+    """Every element of a text in document order, found by the rules of :func:`markup`.
+
+    Almost every ``<`` begins a plain tag, and splitting the text at them is several times faster than matching each;
+    what is not plain is left to :func:`markup`.
+    """
+    tags: list[str] = []
+    starts: list[int] = []
+    tag_ends: list[int] = []
+    inner_ends: list[int] = []
+    ends: list[int] = []
+    open_numbers: list[int] = []
+    parent = -1
+    passed = 0
+    pieces = text.split("<")
+    next_place = len(pieces[0])
+    for piece in pieces[1:]:
+        here = next_place
+        next_place = here + 1 + len(piece)
+        if here < passed:
+            continue
+        width = piece.find(">")
+        if width > 0:
+            first = piece[0]
+            if first == "/":
+                # Of a closing tag all that counts is where it stands.
+                plain = piece[1:width]
+                if plain.isalnum() or _NAME.fullmatch(plain):
+                    if parent >= 0:
+                        inner_ends[parent] = here
+                        ends[parent] = here + width + 2
+                        open_numbers.pop()
+                        parent = open_numbers[-1] if open_numbers else -1
+                    continue
+            elif first == "!":
+                if piece.startswith("!--") and piece.find("-->", 3) > 0:
+                    continue
+            else:
+                tag, blank, rest = piece[:width].partition(" ")
+                empty = piece[width - 1] == "/"
+                if empty and not blank:
+                    tag = tag[:-1]
+                # With its quotes in pairs, the first ">" ends the tag.
+                paired = not blank or (rest.count('"') % 2 == 0 and "'" not in rest)
+                if paired and (tag.isalnum() or _NAME.fullmatch(tag)):
+                    end = here + width + 2
+                    tags.append(tag)
+                    starts.append(here)
+                    tag_ends.append(end)
+                    inner_ends.append(end)
+                    ends.append(end)
+                    if not empty:
+                        parent = len(tags) - 1
+                        open_numbers.append(parent)
+                    continue
+        match = _MARKUP.match(text, here)
+        if match is None:
+            continue
+        passed = match.end()
+        if match["special"] is not None:
+            ending = _SPECIAL[match["special"]][1]
+            found = text.find(ending, passed)
+            if found < 0:
+                break
+            passed = found + len(ending)
+        elif match["close"] is not None:
+            if parent >= 0:
+                inner_ends[parent] = here
+                ends[parent] = passed
+                open_numbers.pop()
+                parent = open_numbers[-1] if open_numbers else -1
+        else:
+            tags.append(match["open"])
+            starts.append(here)
+            tag_ends.append(passed)
+            inner_ends.append(passed)
+            ends.append(passed)
+            if not match["empty"]:
+                parent = len(tags) - 1
+                open_numbers.append(parent)
+    return [*map(Span._make, zip(tags, starts, tag_ends, inner_ends, ends, strict=True))]
+
+
+_BEGIN = re.compile(r"<[^/!?]")
+_COMMENT = re.compile(r"<!--[^<]*-->")
+
+
+class PlainSpans(Sequence[Span]):
+    """The spans of a well-formed text in which no ``<`` means anything else than a tag; made as they are asked for.
+
+    Whoever wants to know of one place in a long text need not wait for all the others.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.starts = [match.start() for match in _BEGIN.finditer(text)]
+        self._known: dict[int, Span] = {}
+
+    @staticmethod
+    def suit(text: str) -> bool:
+        """Whether no ``<`` of a well-formed text stands in a comment or the like."""
+        declarations = text.count("<?")
+        return len(_COMMENT.findall(text)) == text.count("<!") and (
+            declarations == 0 or (declarations == 1 and text.lstrip("\ufeff \t\r\n").startswith("<?xml "))
+        )
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    @overload
+    def __getitem__(self, number: int) -> Span: ...
+    @overload
+    def __getitem__(self, number: slice) -> Sequence[Span]: ...
+    def __getitem__(self, number: int | slice) -> Span | Sequence[Span]:
+        if isinstance(number, slice):
+            return [self[index] for index in range(*number.indices(len(self)))]
+        known = self._known.get(number)
+        if known is None:
+            known = self._known[number] = self._span(self.starts[number])
+        return known
+
+    def _span(self, start: int) -> Span:
+        match = _MARKUP.match(self.text, start)
+        assert match is not None and match["open"] is not None
+        tag, tag_end = match["open"], match.end()
+        if match["empty"]:
+            return Span(tag, start, tag_end, tag_end, tag_end)
+        close = self._close(tag, tag_end)
+        return Span(tag, start, tag_end, close, self.text.index(">", close) + 1)
+
+    def _close(self, tag: str, place: int) -> int:
+        """Where the closing tag is of the element `tag` whose content begins at `place`."""
+        close = self.text.find("<", place)
+        if self.text[close + 1] == "/":
+            return close
+        depth = 1
+        same = re.compile(rf"<(?:/{re.escape(tag)}\s*>|{re.escape(tag)}(?![^\s/>])(?:[^<>\"']|\"[^\"]*\"|'[^']*')*>)")
+        for match in same.finditer(self.text, close):
+            if match[0][1] == "/":
+                depth -= 1
+                if not depth:
+                    return match.start()
+            elif match[0][-2] != "/":
+                depth += 1
+        raise AssertionError(f"the text is not well-formed: <{tag}> has no end")

@@ -1,0 +1,66 @@
+"""Where elements stand: the quick ways agree with reading the text tag by tag."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.document.reader import parse
+from osimlite.document.source import Source
+from osimlite.document.spans import PlainSpans, Span, markup, spans_of
+
+PIECES = ["<a>", "</a>", "<a b='>'>", "<a/>", '<b c=">"/>', "<b>", "</b >", "<!-- <a> -->", "<!-- x -->", "<", ">", "/"]
+PIECES += ["<![CDATA[<a>]]>", "<?x <a>?>", '"', "'", "text", " ", "\n", "<a\tb='1'\n>", "<:: >", "<a&b>"]
+TAG = st.sampled_from(["a", "ab", "a.b", "a-c"])
+ATTRIBUTES = st.sampled_from(["", " x='>'", ' x="/>"', "\n x = '1'", ' x="a" y="/"'])
+TEXT = st.sampled_from(["", " ", "1 2", "a > b", "<!-- remark -->", "<!-- </a> -->"])
+TREE: st.SearchStrategy[str] = st.recursive(
+    st.one_of(st.builds("<{}{}/>".format, TAG, ATTRIBUTES), TEXT),
+    lambda inner: st.builds(
+        lambda tag, attributes, content: f"<{tag}{attributes}>{''.join(content)}</{tag} >",
+        TAG, ATTRIBUTES, st.lists(inner, max_size=4),
+    ),
+    max_leaves=20,
+)  # fmt: skip
+
+
+def one_by_one(text: str) -> list[Span]:
+    spans: list[Span] = []
+    above: list[int] = []
+    for kind, start, end, tag in markup(text):
+        if kind in ("open", "empty"):
+            spans.append(Span(tag, start, end, end, end))
+            if kind == "open":
+                above.append(len(spans) - 1)
+        elif kind == "close" and above:
+            number = above.pop()
+            spans[number] = spans[number]._replace(inner_end=start, end=end)
+    return spans
+
+
+@given(st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
+def test_splitting_finds_what_matching_finds(text: str) -> None:
+    assert spans_of(text) == one_by_one(text)
+
+
+@given(st.builds("<?xml version='1.0'?>\n<root>{}</root>".format, TREE))
+def test_a_well_formed_text_is_read_in_parts(text: str) -> None:
+    source = Source(text.encode())
+    parse(source)
+    assert list(source.spans) == one_by_one(text)
+    hidden = re.search(r"<!--[^>]*<", text) is not None
+    assert isinstance(source.spans, PlainSpans) is not hidden
+    inside = [number for number, span in enumerate(source.spans) if span.start > 0]
+    children = [child for number in range(len(source.spans)) for child in source.children(number)]
+    assert sorted(children) == inside[1:]
+
+
+def test_the_walker_is_read_in_parts(fixtures: Path) -> None:
+    source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
+    parse(source)
+    assert isinstance(source.spans, PlainSpans)
+    assert source.spans[:2] == one_by_one(source.text)[:2]
+    assert list(source.spans) == spans_of(source.text)
