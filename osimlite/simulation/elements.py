@@ -18,7 +18,9 @@ import numpy as np
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.coordinate_limit import limit_constants
 from osimlite.forces.hunt_crossley import combine_materials
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.functions import Function
+from osimlite.multibody.mechanism import FramePlacement, Mechanism
+from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import rotation_xyz
 from osimlite.schema.base import Unknown
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
@@ -217,7 +219,7 @@ def force_elements(
         UnsupportedError: some forces cannot be computed; the message names them.
         ModelError: a force names what does not exist, or a parameter has no meaning.
     """
-    builder = _Builder(model, mechanism, simbody_early_return)
+    builder = ElementBuilder(model, mechanism, simbody_early_return)
     elements: list[ForceElement] = []
     skipped: list[str] = []
     for component in builder.forces():
@@ -233,7 +235,14 @@ def force_elements(
     return Forces(tuple(elements), tuple(skipped))
 
 
-class _Builder:
+class ElementBuilder:
+    """Makes the elements of one model.
+
+    Attributes:
+        tree: of the model.
+        mechanism: of the model.
+    """
+
     def __init__(self, model: Model, mechanism: Mechanism, early_return: bool) -> None:
         self.model = model
         self.tree = model.tree()
@@ -253,7 +262,50 @@ class _Builder:
             return self._hunt_crossley(force)
         if isinstance(force, CoordinateLimitForce):
             return self._coordinate_limit(force)
-        raise self._unsupported(force)
+        from osimlite.simulation.more_elements import MAKERS
+
+        maker = MAKERS.get(type(force))
+        if maker is None:
+            raise self.unsupported(force)
+        return maker(self, force)
+
+    # ---------------------------------------------------------------------------------- what makers ask for
+    def coordinate(self, force: Any) -> int:
+        """Place of the coordinate that a force names."""
+        if not force.coordinate:
+            raise ModelError(f"the force '{self.path(force)}' names no coordinate; give it one")
+        return self.mechanism.coordinate_index(self.path(self.target(force, "coordinate", force.coordinate)))
+
+    def target(self, holder: Any, field: str, value: Any) -> Any:
+        """The component that a property refers to.
+
+        Raises:
+            ModelError: there is none.
+        """
+        if not value:
+            raise ModelError(f"the '{field}' of '{self.path(holder)}' is empty; give it a name")
+        found = self.tree.target(holder, field, value)
+        if found is None:
+            raise ModelError(
+                f"the '{field}' of '{self.path(holder)}' names '{value}', which the model does not have; "
+                "run 'osimlite validate'"
+            )
+        return found
+
+    def placement(self, frame: Any) -> FramePlacement:
+        """Body and place in it of a frame."""
+        return self.mechanism.placement(self.path(frame))
+
+    def function(self, force: Any, function: Any, what: str) -> Function:
+        """A function of one number that belongs to a force.
+
+        Raises:
+            UnsupportedError: it is none that osimlite knows.
+        """
+        try:
+            return numeric(function, 1, f"'{what}' of '{self.path(force)}'")
+        except UnsupportedError:
+            raise self.unsupported(force, f" with the {kind_of(function)} '{what}'") from None
 
     def _hunt_crossley(self, force: HuntCrossleyForce) -> HuntCrossley:
         surfaces = []
@@ -270,11 +322,11 @@ class _Builder:
                 if found.target is None:
                     text = use.value if isinstance(use.value, str) else use.value.name
                     raise ModelError(
-                        f"the force '{self._path(force)}' names the contact geometry '{text}', which the model "
+                        f"the force '{self.path(force)}' names the contact geometry '{text}', which the model "
                         "does not have; run 'osimlite validate'"
                     )
                 surfaces.append(self._surface(force, found.target, material))
-        self._check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
+        self.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):
             a, b = surfaces[first], surfaces[second]
@@ -285,9 +337,9 @@ class _Builder:
             try:
                 pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
             except ValueError as error:
-                raise ModelError(f"the force '{self._path(force)}': {error}") from None
+                raise ModelError(f"the force '{self.path(force)}': {error}") from None
         return HuntCrossley(
-            self._path(force),
+            self.path(force),
             force.name,
             tuple(surfaces),
             tuple(pairs),
@@ -306,27 +358,27 @@ class _Builder:
         self, force: HuntCrossleyForce, geometry: Any, material: tuple[float, float, float, float, float]
     ) -> ContactSurface:
         if not isinstance(geometry, ContactHalfSpace | ContactSphere):
-            raise self._unsupported(force, f" on the {_kind(geometry)} '{self._path(geometry)}'")
+            raise self.unsupported(force, f" on the {kind_of(geometry)} '{self.path(geometry)}'")
         frame = self._frame(geometry)
-        body, placed = self.mechanism.placement(self._path(frame))
+        body, placed = self.mechanism.placement(self.path(frame))
         center = placed[:3, :3] @ np.array(geometry.location) + placed[:3, 3]
         # The half space is x > 0 of the geometry's own frame.
         normal = -(placed[:3, :3] @ rotation_xyz(np.array(geometry.orientation)))[:, 0]
         radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
-        self._check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
-        return ContactSurface(geometry.name, body, frame.name, _triple(center), radius, _triple(normal), material)
+        self.check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
+        return ContactSurface(geometry.name, body, frame.name, triple(center), radius, triple(normal), material)
 
     def _frame(self, geometry: ContactGeometry) -> PhysicalFrame:
         frame = self.tree.target(geometry, "socket_frame", geometry.socket_frame)
         if not isinstance(frame, PhysicalFrame):
             raise UnsupportedError(
-                f"the contact geometry '{self._path(geometry)}' on the {_kind(frame)} '{self._path(frame)}'"
+                f"the contact geometry '{self.path(geometry)}' on the {kind_of(frame)} '{self.path(frame)}'"
             )
         return frame
 
     def _coordinate_limit(self, force: CoordinateLimitForce) -> CoordinateLimit:
         coordinate = self.tree.target(force, "coordinate", force.coordinate)
-        place = self.mechanism.coordinate_index(self._path(coordinate))
+        place = self.mechanism.coordinate_index(self.path(coordinate))
         constants = limit_constants(
             force.upper_stiffness,
             force.upper_limit,
@@ -336,26 +388,31 @@ class _Builder:
             force.transition,
             self.mechanism.coordinates[place].motion_type == "rotational",
         )
-        self._check(force, constants)
-        return CoordinateLimit(self._path(force), force.name, place, constants)
+        self.check(force, constants)
+        return CoordinateLimit(self.path(force), force.name, place, constants)
 
-    def _check(self, component: Any, numbers: Sequence[float]) -> None:
+    def check(self, component: Any, numbers: Sequence[float]) -> None:
+        """Raise a ModelError if a number is not finite."""
         if not all(isfinite(number) for number in numbers):
-            raise ModelError(f"'{self._path(component)}' has a parameter that is not a finite number; give one")
+            raise ModelError(f"'{self.path(component)}' has a parameter that is not a finite number; give one")
 
-    def _unsupported(self, force: Any, why: str = "") -> UnsupportedError:
-        return UnsupportedError(f"'{self._path(force)}' ({_kind(force)}{why})")
+    def unsupported(self, force: Any, why: str = "") -> UnsupportedError:
+        """The error that names a force that cannot be computed."""
+        return UnsupportedError(f"'{self.path(force)}' ({kind_of(force)}{why})")
 
-    def _path(self, component: Any) -> str:
+    def path(self, component: Any) -> str:
+        """Absolute path of a component."""
         path = self.tree.path_of(component)
         assert path is not None
         return path
 
 
-def _kind(component: Any) -> str:
+def kind_of(component: Any) -> str:
+    """Name of a component's class."""
     return getattr(component, "class_name", "") or type(component).__name__
 
 
-def _triple(values: Any) -> Triple:
+def triple(values: Any) -> Triple:
+    """Three numbers."""
     x, y, z = (float(value) for value in values)
     return x, y, z

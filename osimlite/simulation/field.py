@@ -10,11 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
+from types import FunctionType
 from typing import Any
 
+import numpy as np
+
 from osimlite.errors import UnsupportedError
-from osimlite.forces.coordinate_limit import limit_energy, limit_force
-from osimlite.forces.hunt_crossley import contact_energy, contact_force, half_space_sphere, sphere_sphere
+from osimlite.forces import bushing, coordinate_limit, formulas, hunt_crossley, smooth_contact, springs
+from osimlite.multibody.functions import Constant, Function
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.chain import Chain, Column
 from osimlite.simulation.elements import ForceElement, HuntCrossley, Triple
@@ -22,10 +25,15 @@ from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vec
 from osimlite.translate.robot import Robot, RobotJoint
 
 LAWS: dict[str, Callable[..., Any]] = {
-    law.__name__: law
-    for law in (contact_energy, contact_force, half_space_sphere, limit_energy, limit_force, sphere_sphere)
+    name: law
+    for module in (bushing, coordinate_limit, formulas, hunt_crossley, smooth_contact, springs)
+    for name, law in vars(module).items()
+    if isinstance(law, FunctionType) and law.__module__ == module.__name__
 }
 """What the code of force elements may call, by name."""
+
+TIME = "time"
+"""What the code calls the time (s)."""
 
 
 class Writer:
@@ -42,7 +50,15 @@ class Writer:
         self.script = script
         self.chain = field.chain
         self.reporting = reporting
-        self.names: dict[str, Any] = {**LAWS, "sin": math.sin, "cos": math.cos}
+        self.names: dict[str, Any] = {
+            **LAWS,
+            "value_of": value_of,
+            "inf": math.inf,
+            "nan": math.nan,
+            "sin": math.sin,
+            "cos": math.cos,
+            "sqrt": math.sqrt,
+        }
         self._slot = self._contact = 0
 
     def write(self, elements: Sequence[ForceElement]) -> None:
@@ -74,14 +90,32 @@ class Writer:
         self.names[name] = value
         return name
 
+    def evaluate(self, function: Function, argument: Scalar) -> Scalar:
+        """The value of a function of one number."""
+        if isinstance(function, Constant):
+            return function.value
+        if not isinstance(argument, str):
+            return value_of(function, argument)
+        return str(self.script.assign(f"value_of({self.constant(function)}, {argument})"))
+
     def push(self, columns: Sequence[Column], force: Vector) -> None:
         """Apply a force at the point of some columns, and its opposite at the same point of their base."""
         for column in columns if not self.reporting else ():
             self._add(f"t{column.joint}", self.script.dot(column.moving, force))
 
-    def push_coordinate(self, place: int, force: Scalar) -> None:
-        """Apply a generalized force, conjugate to the generalized speed, on a coordinate that is not locked."""
+    def turn(self, columns: Sequence[Column], torque: Vector) -> None:
+        """Apply a torque on the body of some columns, and its opposite on their base."""
+        for column in columns if not self.reporting else ():
+            self._add(f"t{column.joint}", self.script.dot(column.turning, torque))
+
+    def push_joint(self, joint: int, force: Scalar) -> None:
+        """Apply a force on the one axis of a joint."""
         if not self.reporting:
+            self._add(f"t{joint}", force)
+
+    def push_coordinate(self, place: int, force: Scalar) -> None:
+        """Apply a generalized force, conjugate to the generalized speed, on a coordinate; none if it is locked."""
+        if not self.reporting and place in self.field.joint_of:
             self._add(f"{'s' if self.field.separate else 't'}{self.field.joint_of[place]}", force)
 
     def keep(self, place: int, *values: Scalar) -> None:
@@ -140,7 +174,7 @@ class ForceField:
 
     @cached_property
     def generalized(self) -> Callable[..., tuple[float, ...]]:
-        """The function of q, rates, loads (q, rates, u, loads if `separate`) that gives the forces on the n joints.
+        """The function of time, q, rates, loads (with u before loads if `separate`) that gives the forces on n joints.
 
         If `separate`, n more follow, which are conjugate to the generalized speeds. `loads` is a list: its last entry
         becomes a number whose bits tell which contacts touch, an entry before it becomes the force (N, in ground) on
@@ -164,36 +198,38 @@ class ForceField:
         """Labels of the rows that :meth:`records` gives; surfaces on one body have the same ones, and values."""
         return tuple(label for element in self.elements for label in element.columns)
 
-    def records(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> list[float]:
+    def records(self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> list[float]:
         """One row of the forces in effect, at the state of the joints."""
         row: list[float] = []
-        for element, values, origins in self._reported(q, rates, u):
+        for element, values, origins in self._reported(t, q, rates, u):
             row += element.record(values, origins)
         return row
 
-    def stored_energy(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> float:
+    def stored_energy(self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> float:
         """Potential energy of all force elements, J."""
         return sum(
-            float(value[-1]) for _, values, _ in self._reported(q, rates, u) for value in values if value is not None
+            float(value[-1]) for _, values, _ in self._reported(t, q, rates, u) for value in values if value is not None
         )
 
-    def energies(self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> tuple[float, float, float]:
+    def energies(
+        self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]
+    ) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, and energy stored in the force elements, J."""
-        kinetic, gravity = self._mechanical(q, rates, u) if self.separate else self._mechanical(q, rates)
-        return kinetic, gravity, self.stored_energy(q, rates, u)
+        kinetic, gravity = self._mechanical(t, q, rates, u) if self.separate else self._mechanical(t, q, rates)
+        return kinetic, gravity, self.stored_energy(t, q, rates, u)
 
     # --------------------------------------------------------------------------------------------- helpers
     def _script(self, name: str, *more: str) -> Script:
-        script = Script(name, ["q", "r", *(["u"] if self.separate else []), *more])
+        script = Script(name, [TIME, "q", "r", *(["u"] if self.separate else []), *more])
         for letter in "qru" if self.separate else "qr":
             if self.order:
                 script.line(f"{''.join(f'{letter}{joint}, ' for joint in range(len(self.order)))}= {letter}")
         return script
 
     def _reported(
-        self, q: Sequence[float], rates: Sequence[float], u: Sequence[float]
+        self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]
     ) -> Iterator[tuple[ForceElement, list[Any], list[Triple]]]:
-        kept, origins = self._report(q, rates, u) if self.separate else self._report(q, rates)
+        kept, origins = self._report(t, q, rates, u) if self.separate else self._report(t, q, rates)
         slot = 0
         for element in self.elements:
             yield element, kept[slot : slot + slots(element)], origins
@@ -231,6 +267,12 @@ class ForceField:
             script.line(f"kinetic += {script.sum((0.5 * mass, moving), (0.5, spinning))}")
         script.line("return kinetic, potential")
         return script.function({"sin": math.sin, "cos": math.cos})
+
+
+def value_of(function: Function, argument: float) -> float:
+    """The value of a function of one number."""
+    value, _, _ = function.evaluate(np.array((argument,)))
+    return float(value)
 
 
 def slots(element: ForceElement) -> int:

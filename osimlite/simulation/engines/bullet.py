@@ -163,20 +163,20 @@ class BulletEngine:
             return u + self._solve(
                 bullet.calculateMassMatrix(body.id, q, 0, body.client),
                 bullet.calculateInverseDynamics(body.id, q, u, body.zeros, 0, body.client),
-                self._forces(q, u, self.loads),
+                self._forces(t, q, u, self.loads),
             )
         except SingularMassError as error:
             raise self._singular(error, y) from None
 
     def _derivative_by_step(self, t: float, y: list[float]) -> list[float]:
         q, u = y[: self._count], y[self._count :]
-        return u + self._body.accelerations_by_step(q, u, self._forces(q, u, self.loads))
+        return u + self._body.accelerations_by_step(q, u, self._forces(t, q, u, self.loads))
 
     def _derivative_with_speeds(self, t: float, y: list[float]) -> list[float]:
         count, body = self._count, self._body
         q, u = y[:count], y[count:]
         rates = self._speeds.rates(q, u)
-        forces = self._joint_forces(q, rates, u)
+        forces = self._joint_forces(t, q, rates, u)
         if self.route == MASS_MATRIX:
             try:
                 qddot = self._solve(body.mass_matrix(q), body.bias(q, rates), forces)
@@ -190,11 +190,11 @@ class BulletEngine:
     def _nothing_moves(t: float, y: list[float]) -> list[float]:
         return []
 
-    def _joint_forces(self, q: list[float], rates: list[float], u: list[float]) -> Sequence[float]:
+    def _joint_forces(self, t: float, q: list[float], rates: list[float], u: list[float]) -> Sequence[float]:
         """Forces on the one-axis joints; `rates` are theirs, `u` the generalized speeds."""
         if not self.field.separate:
-            return self._forces(q, rates, self.loads)
-        both, count = self._forces(q, rates, u, self.loads), self._count
+            return self._forces(t, q, rates, self.loads)
+        both, count = self._forces(t, q, rates, u, self.loads), self._count
         converted = self._speeds.joint_forces(q, both[count:])
         return [a + b for a, b in zip(both[:count], converted, strict=True)]
 
@@ -217,18 +217,18 @@ class BulletEngine:
     def touching(self, t: float, y: list[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
         q, u = y[: self._count], y[self._count :]
-        self._joint_forces(q, self._speeds.rates(q, u), u)
+        self._joint_forces(t, q, self._speeds.rates(q, u), u)
         return int(self.loads[-1])
 
     def force_records(self, t: float, y: list[float]) -> list[float]:
         """One number for each of the columns."""
         q, u = y[: self._count], y[self._count :]
-        return self.field.records(q, self._speeds.rates(q, u), u)
+        return self.field.records(t, q, self._speeds.rates(q, u), u)
 
     def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
         q, u = y[: self._count], y[self._count :]
-        return self.field.energies(q, self._speeds.rates(q, u), u)
+        return self.field.energies(t, q, self._speeds.rates(q, u), u)
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:

@@ -86,4 +86,4 @@ class BulletStepper(Stepper):
         self.evaluations += 1
         engine = self._engine
         q, u = y[: engine._count], y[engine._count :]
-        return engine._joint_forces(q, engine._speeds.rates(q, u), u)
+        return engine._joint_forces(self.time, q, engine._speeds.rates(q, u), u)

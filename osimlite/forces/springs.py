@@ -1,0 +1,108 @@
+"""Springs on a coordinate, between two points and along a path.
+
+q is a coordinate and u its speed; l is a length and v its rate of change. Tensions are positive where they pull.
+Sources: Hooke's law; for a path, R. Hunt and F. Crossley's form of dissipation (proportional to the elastic force)
+as OpenSim's PathSpring has it; for ligaments L. Blankevoort and R. Huiskes, "Ligament-bone interaction in a
+three-dimensional model of the knee", Journal of Biomechanical Engineering 113 (1991) 263-269.
+"""
+
+from __future__ import annotations
+
+
+def coordinate_spring_force(q: float, u: float, k: float, q0: float, c: float) -> float:
+    """Generalized force -k (q - q0) - c u, in N.m (N for a translation).
+
+    Args:
+        q: coordinate, rad (m).
+        u: its speed, rad/s (m/s).
+        k: stiffness, N.m/rad (N/m).
+        q0: where the spring is at rest, rad (m).
+        c: viscosity, N.m/(rad/s) (N/(m/s)).
+    """
+    return -k * (q - q0) - c * u
+
+
+def spring_energy(x: float, k: float) -> float:
+    """Energy k x^2 / 2 of a linear spring, in J.
+
+    Args:
+        x: deviation from rest, rad (m).
+        k: stiffness, N.m/rad (N/m).
+    """
+    return 0.5 * k * x * x
+
+
+def point_spring_tension(length: float, k: float, l0: float) -> float:
+    """Tension k (l - l0) of a spring that pulls and pushes, in N.
+
+    Args:
+        length: l, m.
+        k: stiffness, N/m.
+        l0: length at rest, m.
+    """
+    return k * (length - l0)
+
+
+def path_spring_tension(length: float, rate: float, l0: float, k: float, d: float) -> float:
+    """Tension k (l - l0) (1 + d v) of a spring along a path where l > l0, else none, in N.
+
+    It pushes where the path shortens faster than 1/d, as OpenSim has it.
+
+    Args:
+        length: l, m.
+        rate: v, m/s.
+        l0: length at rest, m.
+        k: stiffness, N/m.
+        d: dissipation, s/m.
+    """
+    return k * (length - l0) * (1.0 + d * rate) if length > l0 else 0.0
+
+
+def path_spring_energy(length: float, l0: float, k: float) -> float:
+    """Energy k (l - l0)^2 / 2 where l > l0, else none, in J; arguments as in `path_spring_tension`."""
+    return 0.5 * k * (length - l0) * (length - l0) if length > l0 else 0.0
+
+
+def stretch(length: float, l0: float, clamped: bool) -> float:
+    """l - l0, where `clamped` not less than 0, in m.
+
+    Args:
+        length: l, m.
+        l0: length at rest, m.
+        clamped: whether a slack path has no stretch.
+    """
+    return 0.0 if clamped and length < l0 else length - l0
+
+
+def blankevoort_tension(length: float, rate: float, l0: float, k: float, e1: float, c: float) -> float:
+    """Tension of a ligament, in N, at the strain e = l / l0 - 1.
+
+    k e^2 / (2 e1) for 0 < e < e1, k (e - e1 / 2) beyond; while the ligament is taut and lengthens, c v / l0 more.
+
+    Args:
+        length: l, m.
+        rate: v, m/s.
+        l0: length at which the ligament goes slack, m.
+        k: stiffness of the linear region, N (per strain).
+        e1: strain at which the linear region begins, 1.
+        c: damping, N.s (per strain rate).
+    """
+    e = length / l0 - 1.0
+    if e <= 0.0:
+        return 0.0
+    tension = 0.5 * k / e1 * e * e if e < e1 else k * (e - 0.5 * e1)
+    return tension + c * rate / l0 if rate > 0.0 else tension
+
+
+def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:
+    """Energy of a ligament, in J; arguments as in `blankevoort_tension`.
+
+    The integral of the elastic tension over the length: k l0 e^3 / (6 e1) for 0 < e < e1, and
+    k l0 (e (e - e1) / 2 + e1^2 / 6) beyond.
+    """
+    e = length / l0 - 1.0
+    if e <= 0.0:
+        return 0.0
+    if e < e1:
+        return k * l0 * e * e * e / (6.0 * e1)
+    return k * l0 * (0.5 * e * (e - e1) + e1 * e1 / 6.0)

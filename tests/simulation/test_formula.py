@@ -1,0 +1,101 @@
+"""Formulas of expression-based forces: grammar, code and what is said of wrong ones."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.errors import ModelError
+from osimlite.simulation.field import LAWS
+from osimlite.simulation.formula import FUNCTIONS, Formula
+from osimlite.simulation.script import Script
+
+
+class Writer:
+    """As much of the true one as a formula needs."""
+
+    def __init__(self) -> None:
+        self.script = Script("f", ["q", "u"])
+
+    def call(self, law, *arguments):
+        return self.script.assign(f"{law}({', '.join(map(str, arguments))})")
+
+
+def value(text, q=0.7, u=-1.3):
+    writer = Writer()
+    found = Formula.parse(text, ("q", "u"), "the expression").write(writer, {"q": "q", "u": "u"})
+    writer.script.line(f"return {found}")
+    return writer.script.function({**LAWS, "inf": math.inf})(q, u)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1+2*3", 7.0),
+        ("2-3-4", -5.0),
+        ("8/4/2", 1.0),
+        ("-2^2", -4.0),
+        ("2^-1", 0.5),
+        ("2^3^2", 512.0),
+        ("-3*2", -6.0),
+        ("6/-2*3", -9.0),
+        ("--3", 3.0),
+        (" ( 1 + q ) * u ", 1.7 * -1.3),
+        ("1.5e-1 + 2.E+1 + .5", 20.65),
+        ("min(q, max(u, 2))", 0.7),
+        ("a+b; b=2*c; c=q*q", None),
+    ],
+)
+def test_values(text, expected):
+    if expected is None:
+        with pytest.raises(ModelError, match="there is no 'a'"):
+            value(text)
+        text, expected = "b + c; b = 2*c; c = q*q", 3 * 0.49
+    assert value(text) == pytest.approx(expected, rel=1e-15)
+
+
+def test_definitions_that_double_are_written_once():
+    names = [f"x{number}" for number in range(60)]
+    text = names[0] + "".join(f"; {a} = {b}*0.5 + {b}*0.5" for a, b in zip(names, [*names[1:], "q"], strict=True))
+    assert value(text) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "ends too early"),
+        ("q +", "ends too early"),
+        ("(q", "parentheses"),
+        ("q)", r"unexpected '\)'"),
+        ("qq", "there is no 'qq'"),
+        ("sine(q)", "there is no function 'sine'"),
+        ("min(q)", "takes 2 arguments, not 1"),
+        ("sin(q, u)", "takes 1 argument, not 2"),
+        ("+q", r"unexpected '\+'"),
+        ("q;3", "has no name"),
+        ("2q", "unexpected 'q'"),
+        ("(" * 300 + "q", "nested more than"),
+        ("__import__('os')", "there is no function"),
+        ("q.real", "there is no 'q.real'"),
+    ],
+)
+def test_what_is_wrong_is_said(text, message):
+    with pytest.raises(ModelError, match=message) as caught:
+        value(text)
+    assert str(caught.value).startswith("the expression is '")
+
+
+@given(st.text(alphabet="qu0123.e+-*/^(),; =sincoatl", max_size=30))
+def test_no_text_does_worse_than_a_model_error(text):
+    try:
+        found = value(text)
+    except ModelError:
+        return
+    assert isinstance(found, float)
+
+
+def test_every_function_is_a_law():
+    assert set(FUNCTIONS.values()) <= set(LAWS)
