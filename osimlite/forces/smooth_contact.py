@@ -1,0 +1,82 @@
+"""Hunt-Crossley contact of a half space and a sphere, made smooth.
+
+As in :mod:`osimlite.forces.hunt_crossley` the half space is surface 1 and the sphere surface 2, n is the unit normal
+of the half space, d the depth and v the velocity of surface 1 relative to surface 2. Source: G. Serrancolí et al.,
+"Subject-exoskeleton contact model calibration leads to accurate interaction force predictions", IEEE Transactions on
+Neural Systems and Rehabilitation Engineering 27 (2019) 1597-1605, as Simbody's SmoothSphereHalfSpaceForce has it.
+"""
+
+from __future__ import annotations
+
+from math import sqrt, tanh
+
+
+def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
+    """Elastic force (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2, k = E^(2/3) / 2, in N.
+
+    Args:
+        d: depth, m, negative for a gap.
+        R: radius of the sphere, m.
+        E: stiffness property, Pa.
+        cf: what keeps the force from vanishing, m^2.
+        bd: how sharply the force sets in, 1/m.
+    """
+    k: float = 0.5 * E ** (2.0 / 3.0)
+    s = sqrt(d * d + cf)
+    return (4.0 / 3.0) * k * sqrt(R * k) * s * sqrt(s) * (0.5 + 0.5 * tanh(bd * d))
+
+
+def smooth_contact_force(
+    hertz: float,
+    c: float,
+    us: float,
+    ud: float,
+    uv: float,
+    vt: float,
+    cf: float,
+    bv: float,
+    nx: float,
+    ny: float,
+    nz: float,
+    vx: float,
+    vy: float,
+    vz: float,
+) -> tuple[float, float, float]:
+    """Force on the sphere, in N, at the point midway between the two surfaces.
+
+    f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT
+    f (min(w / vt, 1) (ud + 2 (us - ud) / (1 + (w / vt)^2)) + uv w) / w with w = sqrt(|vT|^2 + cf).
+
+    Args:
+        hertz: fh from `smooth_hertz`, N.
+        c: dissipation, s/m. With 0, f = fh.
+        us: coefficient of static friction, 1.
+        ud: coefficient of dynamic friction, 1.
+        uv: coefficient of viscous friction, s/m.
+        vt: transition velocity, m/s.
+        cf: what keeps w from vanishing, m^2/s^2 (the same number as in `smooth_hertz`).
+        bv: how sharply the force goes when the surfaces separate, s/m.
+        nx: unit normal (nx, ny, nz) out of the half space, 1.
+        vx: velocity (vx, vy, vz) of the half space relative to the sphere at the point, m/s.
+    """
+    vn = vx * nx + vy * ny + vz * nz
+    f = hertz * (1.0 + 1.5 * c * vn)
+    if c != 0.0:
+        f *= 0.5 + 0.5 * tanh(bv * (vn + 2.0 / (3.0 * c)))
+    tx = vx - vn * nx
+    ty = vy - vn * ny
+    tz = vz - vn * nz
+    w = sqrt(tx * tx + ty * ty + tz * tz + cf)
+    r = w / vt
+    g = f * ((r if r < 1.0 else 1.0) * (ud + 2.0 * (us - ud) / (1.0 + r * r)) + uv * w) / w
+    return f * nx + g * tx, f * ny + g * ty, f * nz + g * tz
+
+
+def smooth_contact_energy(hertz: float, d: float) -> float:
+    """(2/5) fh d, in J, as Simbody approximates the energy; negative (and tiny) where the surfaces are apart.
+
+    Args:
+        hertz: fh from `smooth_hertz`, N.
+        d: depth, m.
+    """
+    return 0.4 * hertz * d
