@@ -74,6 +74,14 @@ class Stepper(ABC):
             raise ValueError(f"f gives {len(self.derivative)} derivatives of {len(self.state)} states")
         self._previous = t, self.state, self.derivative
 
+    @property
+    def name(self) -> str:
+        """Of the method."""
+        return type(self).__name__
+
+    def catch_up(self) -> None:  # noqa: B027
+        """Make the calls of `observe` that were put off, as a stepper may that computes many steps at once."""
+
     @abstractmethod
     def step(self, limit: float = inf) -> None:
         """Take one step, which ends at `limit` (s) at the latest.

@@ -70,6 +70,7 @@ class Recorder:
 
     def largest_forces(self) -> dict[str, tuple[float, float]]:
         """By contact that ever touched, its largest force (N) and when that was (s)."""
+        self._catch_up()
         return {
             name: largest
             for name, largest in zip(self._engine.contacts, self._largest, strict=True)
@@ -78,6 +79,7 @@ class Recorder:
 
     def events(self) -> list[ContactEvent]:
         """All beginnings and ends in the order of their times; those at the start are the contacts there were."""
+        self._catch_up()
         found = [ContactEvent(self._start, name, True) for name in self._named(self.initially)]
         for change in self._changes:
             found += sorted(self._times(change))
@@ -95,6 +97,10 @@ class Recorder:
                 else:
                     high = middle
             yield ContactEvent(0.5 * (low + high), self._engine.contacts[number], bool(change.after & bit))
+
+    def _catch_up(self) -> None:
+        if self._stepper is not None:
+            self._stepper.catch_up()
 
     def _note_forces(self, t: float) -> None:
         for number in self._bits(self._touching):

@@ -219,7 +219,7 @@ class Simulation:
                 "model": self.mechanism.name,
                 "engine": engine.name,
                 "route": engine.route,
-                "integrator": type(stepper).__name__,
+                "integrator": stepper.name,
                 "settings": settings,
                 "steps": stepper.taken,
                 "attempted_steps": attempted,

@@ -11,7 +11,10 @@ from osimlite.text import did_you_mean, listed
 if TYPE_CHECKING:
     from osimlite.simulation.engines.protocol import EngineFactory
 
-ENGINES = {"bullet": "osimlite.simulation.engines.bullet"}
+ENGINES = {
+    "bullet": "osimlite.simulation.engines.bullet",
+    "compiled": "osimlite.simulation.engines.compiled",
+}
 """Module of each engine, whose `make` makes one."""
 
 

@@ -1,0 +1,330 @@
+"""The compiled engine: accelerations of our own recursion and of PyBullet, the steps and motion of OpenSim.
+
+Compiling takes half a minute where the cache is empty; all tests here use the same machine code.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import osimlite
+from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
+from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody import functions as f
+from osimlite.multibody.joints import MOTIONS, Mobilizer, TransformAxis, custom, ellipsoid, scapulothoracic
+from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.multibody.spatial import offset
+from osimlite.simulation import Simulation
+from osimlite.simulation.elements import Forces, force_elements
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.engines.protocol import Settings
+
+
+def within(ours, expected, tolerance=1e-9):
+    """Relative to the largest acceleration of the state."""
+    error = np.abs(np.subtract(ours, expected)).max(initial=0.0)
+    return error <= tolerance * max(1.0, np.abs(expected).max(initial=0.0))
+
+
+def state_of(mechanism, seed):
+    rng, size = np.random.default_rng(seed), len(mechanism.coordinates)
+    q, u = rng.uniform(-1.0, 1.0, size), rng.uniform(-2.0, 2.0, size)
+    for place, info in enumerate(mechanism.coordinates):
+        if info.locked:
+            q[place], u[place] = info.default_value, 0.0
+    return q, u
+
+
+# ------------------------------------------------------------------------------------- joints of every kind
+AXES = ((1, 0.2, 0), (0, 1, -0.5), (0, 0, -1), (-1, 0, 0), (0, -1, 0), (0.3, 0.4, 0.8))
+KNOTS = (-1.5, -0.4, 0.1, 0.8, 1.6)
+POINTS = (0.1, -0.3, 0.2, 0.4, -0.2)
+FUNCTIONS = {
+    "constant": f.Constant(0.3),
+    "linear": f.Linear(-0.7, 0.2),
+    "polynomial": f.Polynomial((0.1, -0.2, 0.3, 0.1)),
+    "sine": f.Sine(0.5, 1.3, 0.2, 0.1),
+    "step": f.Step(-2.0, 2.0, -0.3, 0.4),
+    "spline": f.SimmSpline(KNOTS, POINTS),
+    "spline of two": f.SimmSpline(KNOTS[:2], POINTS[:2]),
+    "smoothing spline": smoothing_spline(KNOTS, POINTS, 2, 0.0),
+    "lines": f.PiecewiseLinear(KNOTS, POINTS),
+    "stairs": f.PiecewiseConstant(KNOTS, POINTS),
+    "scaled": f.Scaled(-2.0, f.Scaled(0.4, f.Sine(0.5, 1.3, 0.2, 0.1))),
+}
+CONSTANT = (f.Constant, f.PiecewiseConstant)
+
+
+def custom_joint(function):
+    """One coordinate drives a rotation and two translations by a function, two more move axes together."""
+    both = f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2)
+    turns = (
+        # What is constant moves no mass.
+        TransformAxis((0,), AXES[0], f.Linear() if isinstance(function, CONSTANT) else function),
+        TransformAxis((1,), AXES[1], f.Linear()),
+        TransformAxis((1, 2), AXES[2], f.WeightedSum((0.4, 1.1), 0.2)),
+    )
+    slides = (
+        TransformAxis((0,), AXES[3], function),
+        TransformAxis((1, 2), AXES[4], both),
+        TransformAxis((2,), AXES[5], f.Linear(1.0, 0.1)),
+    )
+    return custom(turns, slides)
+
+
+JOINTS = {
+    **{name: motions for name, motions in MOTIONS.items() if name != "WeldJoint"},
+    "EllipsoidJoint": ellipsoid((0.1, 0.2, 0.3)),
+    "ScapulothoracicJoint": scapulothoracic((0.1, 0.2, 0.3), (0.05, -0.1), 0.4),
+    **{f"CustomJoint, {name}": custom_joint(function) for name, function in FUNCTIONS.items()},
+}
+
+
+def tree(joints, *, parents=None, reversed=(), locked=()):
+    """A mechanism of bodies of odd inertia."""
+    bodies, coordinates = [], []
+    for number, name in enumerate(joints):
+        motions = MOTIONS["WeldJoint"] if name == "WeldJoint" else JOINTS[name]
+        count = 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
+        own = tuple(range(len(coordinates), len(coordinates) + count))
+        coordinates += [
+            CoordinateInfo(f"q{k}", f"/q{k}", f"/j{number}", "coupled", default_value=0.4, locked=k in locked)
+            for k in own
+        ]
+        inertia = np.array(((0.5, 0.03, -0.04), (0.03, 0.6, 0.02), (-0.04, 0.02, 0.7)))
+        mass = MassProperties(1.0 + number, np.array((0.1, -0.2, 0.05 * number)), inertia)
+        ends = offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5)), offset((-0.2, 0.1, 0.1), (0.1, 0.6, -0.4))
+        mobilizer = Mobilizer(f"/j{number}", name, motions, own, *ends, number in reversed)
+        parent = number - 1 if parents is None else parents[number]
+        bodies.append(MobileBody(f"b{number}", f"/b{number}", parent, mass, mobilizer))
+    return Mechanism("tree", tuple(bodies), tuple(coordinates), np.array((1.0, -9.0, 2.0)))
+
+
+def check(mechanism, seeds=3):
+    engine = CompiledEngine(mechanism, Forces(()))
+    for seed in range(seeds):
+        q, u = state_of(mechanism, seed)
+        assert within(engine.acceleration(0.0, q, u), mechanism.acceleration(q, u))
+        y = engine.state.pack(q, u)
+        rates = mechanism.coordinate_rates(q, u)[list(engine.order)]
+        assert within(engine.derivative(0.0, y)[: len(engine.order)], rates)
+        kinetic, gravity, stored = engine.energies(0.0, y)
+        assert kinetic == pytest.approx(mechanism.kinetic_energy(q, u), rel=1e-10)
+        assert gravity == pytest.approx(mechanism.potential_energy(q), rel=1e-10, abs=1e-10)
+        assert stored == 0.0
+
+
+@pytest.mark.parametrize("is_reversed", [False, True], ids=["", "reversed"])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_every_joint(joint, is_reversed):
+    check(tree([joint, "PinJoint", joint], reversed=(0, 2) if is_reversed else ()))
+
+
+@given(data=st.data())
+@settings(max_examples=40, deadline=None)
+def test_trees(data):
+    joints = data.draw(st.lists(st.sampled_from([*JOINTS, "WeldJoint"]), min_size=1, max_size=6))
+    parents = [data.draw(st.integers(-1, number - 1)) for number in range(len(joints))]
+    reversed = data.draw(st.sets(st.integers(0, len(joints) - 1)))
+    check(tree(joints, parents=parents, reversed=reversed), seeds=1)
+
+
+def test_far_from_ground_as_near():
+    mechanism = tree(["FreeJoint", "PinJoint", "BallJoint"])
+    engine = CompiledEngine(mechanism, Forces(()))
+    q, u = state_of(mechanism, 1)
+    near = engine.acceleration(0.0, q, u)
+    q[3:6] += 1000.0
+    assert within(engine.acceleration(0.0, q, u), near, 1e-11)
+
+
+def test_locked_coordinates():
+    for locked in ((0,), (1, 2), (0, 1, 2), (3,), (0, 1, 2, 3, 4)):
+        check(tree(["CustomJoint, spline", "PinJoint", "SliderJoint", "PinJoint"], locked=locked))
+    check(tree(["BallJoint", "FreeJoint"], locked=(0, 1, 2)))
+
+
+def test_mixed_joints_of_a_file(fixtures):
+    mechanism = build_mechanism(osimlite.read(fixtures / "kinematics" / "mixed_joint_tree.osim"))
+    check(mechanism)
+
+
+# ---------------------------------------------------------------------------------------------------- forces
+def contact_chain():
+    """Two bodies with spheres on them over a tilted half space."""
+    model = Model(name="chain")
+    carrier, surfaces = model.ground, []
+    for number, kind in enumerate((osimlite.FreeJoint, osimlite.BallJoint)):
+        body = model.add(Body(name=f"b{number}", mass=1.0 + number, inertia=(0.2, 0.3, 0.25, 0.01, -0.02, 0.03)))
+        joint = kind(name=f"j{number}")
+        for place, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{place}"
+        model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
+        for place in range(2):
+            sphere = ContactSphere(name=f"s{number}{place}", socket_frame=body, radius=0.3, location=(0.1, -0.2, place))
+            surfaces.append(model.add(sphere))
+        carrier = body
+    surfaces.append(model.add(ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.1, 0.2, -1.4))))
+    contact = HuntCrossleyForce(name="contact", transition_velocity=0.1)
+    contact.contact_parameters.objects.append(
+        HuntCrossleyForce.ContactParameters(
+            geometry=tuple(surfaces),
+            stiffness=1e5,
+            dissipation=1.5,
+            static_friction=0.8,
+            dynamic_friction=0.4,
+            viscous_friction=0.1,
+        )
+    )
+    limit = CoordinateLimitForce(
+        name="limit", coordinate="q1_1", upper_limit=10.0, lower_limit=-10.0, transition=1.0, damping=0.1
+    )
+    model.add(contact, limit)
+    return model
+
+
+def test_forces_are_those_of_the_bullet_engine():
+    model = contact_chain()
+    mechanism = build_mechanism(model)
+    forces = force_elements(model, mechanism)
+    ours, touched = CompiledEngine(mechanism, forces), 0
+    with BulletEngine(mechanism, forces) as bullet:
+        assert (ours.contacts, ours.columns) == (bullet.contacts, bullet.columns)
+        for seed in range(12):
+            q, u = (values.tolist() for values in state_of(mechanism, seed))
+            assert within(ours.acceleration(0.0, q, u), bullet.acceleration(0.0, q, u))
+            assert ours.loads[-1] == bullet.loads[-1]
+            for number in range(len(ours.contacts)):
+                if ours.loads[-1] >> number & 1:
+                    assert ours.loads[number] == pytest.approx(bullet.loads[number], rel=1e-9)
+                    touched |= 1 << number
+            y, z = ours.state.pack(q, u), bullet.state.pack(q, u)
+            assert within(ours.force_records(0.0, y), bullet.force_records(0.0, z))
+            assert ours.energies(0.0, y) == pytest.approx(bullet.energies(0.0, z), rel=1e-9, abs=1e-12)
+    # With the floor and with one another.
+    assert touched.bit_count() > 3
+
+
+def test_walker_with_all_forces(fixtures):
+    cases = json.loads(gzip.decompress((fixtures / "kinematics" / "walker_dynamics_cases.json.gz").read_bytes()))
+    touched = 0
+    for case in cases["cases"]:
+        model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+        platform = next(item for item in model.components(Coordinate) if item.name == "platform_rz")
+        platform.default_value = case["q"][0]
+        mechanism = build_mechanism(model)
+        engine = CompiledEngine(mechanism, force_elements(model, mechanism))
+        ours = engine.acceleration(0.0, case["q"], case["u_with_locked_platform"])
+        assert within(ours, case["udot_locked_all_forces"])
+        touched += engine.loads[-1] != 0
+    assert touched > 2
+
+
+# ---------------------------------------------------------------------------------------------------- motion
+@pytest.fixture(scope="module")
+def fast(walker):
+    with Simulation(walker, "compiled") as simulation:
+        yield simulation
+
+
+def largest_error(trajectory, table):
+    return max(
+        np.abs(trajectory.values[:, place] - table[name]).max() for place, name in enumerate(trajectory.coordinates)
+    )
+
+
+def test_motion_at_high_accuracy(fast, reference):
+    trajectory = fast.run(2.0, accuracy=1e-10, report_interval=1e-3)
+    assert largest_error(trajectory, reference("trajectory")) < 1e-8
+
+
+def test_same_motion_and_reports_as_with_bullet(fast, simulation):
+    ours, theirs = fast.run(2.0), simulation.run(2.0)
+    assert ours.summary["integrator"] == theirs.summary["integrator"]
+    for count in ("steps", "attempted_steps", "evaluations"):
+        assert ours.summary[count] == theirs.summary[count]
+    assert np.abs(ours.values - theirs.values).max() < 1e-8
+    assert np.abs(ours.speeds - theirs.speeds).max() < 1e-6
+    assert len(ours.summary["contact_events"]) == len(theirs.summary["contact_events"]) > 6
+    for one, other in zip(ours.summary["contact_events"], theirs.summary["contact_events"], strict=True):
+        assert (one["contact"], one["event"]) == (other["contact"], other["event"])
+        assert one["time_s"] == pytest.approx(other["time_s"], abs=1e-7)
+    for name, largest in theirs.summary["largest_contact_forces"].items():
+        assert ours.summary["largest_contact_forces"][name]["force_N"] == pytest.approx(largest["force_N"], rel=1e-5)
+    for label, column in theirs.energy.items():
+        assert ours.energy[label] == pytest.approx(column, rel=1e-6, abs=1e-8)
+
+
+def test_steps_are_those_of_opensim(fast):
+    """OpenSim's Manager takes 135 of 173 steps and 828 evaluations with its default settings."""
+    summary = fast.run(2.0).summary
+    assert (summary["steps"], summary["attempted_steps"], summary["evaluations"]) == (135, 173, 828)
+
+
+def test_compiled_loop_rounds_as_the_one_in_python_does(fast):
+    """With the same accelerations the steps are the same to the last bit."""
+    y = fast._initial_state({}, {})
+    ours, theirs = (fast.engine.stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None) for _ in range(2))
+    (_, end), steps = list(ours.reports([2.0]))[-1], list(theirs.steps(2.0))
+    assert end.tolist() == steps[-1][1]
+    assert (ours.taken, ours.attempted, ours.evaluations) == (theirs.taken, theirs.attempted, theirs.evaluations)
+
+
+def test_log_in_pieces(fast, monkeypatch):
+    whole = fast.run(2.0, accuracy=1e-5)
+    monkeypatch.setattr("osimlite.simulation.engines.compiled.LOGGED_STEPS", 7)
+    pieces = fast.run(2.0, accuracy=1e-5)
+    assert np.array_equal(whole.values, pieces.values)
+    strip = ("wall_time_s",)
+    assert all(whole.summary[key] == pieces.summary[key] for key in whole.summary if key not in strip)
+
+
+def test_fixed_steps(fast, simulation):
+    ours, theirs = (item.run(0.5, fixed_step=1e-3) for item in (fast, simulation))
+    assert np.abs(ours.values - theirs.values).max() < 1e-6
+
+
+# --------------------------------------------------------------------------------------------- what is refused
+def test_partly_locked_ball_is_refused():
+    with pytest.raises(UnsupportedError, match="lock all of them or none"):
+        CompiledEngine(tree(["BallJoint"], locked=(1,)), Forces(()))
+
+
+def test_wholly_locked_mechanism_stands_still(walker):
+    mechanism = tree(["PinJoint"], locked=(0,))
+    engine = CompiledEngine(mechanism, Forces(()))
+    assert engine.derivative(0.0, []) == []
+    assert engine.energies(0.0, [])[1] == pytest.approx(mechanism.potential_energy([0.4]))
+
+
+def test_massless_motion_is_refused():
+    model = Model(name="m")
+    pin = osimlite.PinJoint(name="j", coordinates=[Coordinate(name="turn")])
+    model.add(pin.between(model.ground, model.add(Body(name="b", mass=1.0))))
+    with pytest.raises(SimulationError, match="'turn' moves no mass"):
+        osimlite.simulate(model, to=1.0, engine="compiled")
+
+
+def test_singular_ball_is_refused():
+    engine = CompiledEngine(tree(["BallJoint"]), Forces(()))
+    with pytest.raises(SimulationError, match=r"/j0.*90 degrees"):
+        engine.derivative(0.0, [0.0, np.pi / 2, 0.0, 1.0, 0.0, 0.0])
+
+
+def test_window_and_route_are_refused(walker):
+    with pytest.raises(OsimliteError, match="no window"):
+        Simulation(walker, "compiled", show=True)
+    with pytest.raises(OsimliteError, match="no route 'mass-matrix'"):
+        Simulation(walker, "compiled", route="mass-matrix")
