@@ -5,6 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from osimlite.schema.actuators import (
+    BodyActuator,
+    CoordinateActuator,
+    PointActuator,
+    PointToPointActuator,
+    TorqueActuator,
+)
+from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedBushingForce,
@@ -14,11 +22,25 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
+from osimlite.simulation.actuator_elements import (
+    CoordinateDrive,
+    IdleActuator,
+    PointDrive,
+    PointToPointDrive,
+    Prescribed,
+    TorqueDrive,
+)
 from osimlite.simulation.bushing_elements import Bushing
 from osimlite.simulation.elements import ElementBuilder, ForceElement
 from osimlite.simulation.spring_elements import CoordinateFormula, CoordinateSpring, PointSpring
 
 MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
+    BodyActuator: IdleActuator.of,
+    CoordinateActuator: CoordinateDrive.of,
+    PointActuator: PointDrive.of,
+    PointToPointActuator: PointToPointDrive.of,
+    PrescribedForce: Prescribed.of,
+    TorqueActuator: TorqueDrive.of,
     BushingForce: Bushing.linear,
     ExpressionBasedBushingForce: Bushing.by_formulas,
     ExpressionBasedCoordinateForce: CoordinateFormula.of,
