@@ -10,6 +10,7 @@ result. A benchmark script is then one screen::
 
 from __future__ import annotations
 
+import os
 import shlex
 import subprocess
 import time
@@ -94,8 +95,15 @@ def pair_commands(
 
 def _run(command: str | Sequence[str]) -> None:
     arguments = shlex.split(command) if isinstance(command, str) else list(command)
+    # With this variable Python compiles every module again in every process, which users do not have.
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     done = subprocess.run(
-        arguments, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False
+        arguments,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        env=environment,
+        check=False,
     )
     if done.returncode != 0:
         said = done.stderr.decode(errors="replace").strip()

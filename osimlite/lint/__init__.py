@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from osimlite.document.source import Source
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
-from osimlite.lint.engine import all_rules, check_model, check_source
-from osimlite.schema.model import Model
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from osimlite.document.source import Source
+    from osimlite.lint.engine import all_rules
+    from osimlite.schema.model import Model
 
 __all__ = ["Config", "Finding", "Report", "Severity", "all_rules", "assert_valid", "checked_words", "validate"]
 
@@ -32,6 +36,10 @@ def validate(
         MissingFileError: the file is missing or cannot be read. What is wrong inside a file is a finding.
         OsimliteError: no rule has a code in `select` or `ignore`.
     """
+    from osimlite.document.source import Source
+    from osimlite.lint.engine import check_model, check_source
+    from osimlite.schema.model import Model
+
     if config is None:
         config = Config(checked_words(select), checked_words(ignore))
     if isinstance(model, Model):
@@ -44,3 +52,12 @@ def assert_valid(model: Model | str | Path, *, ignore: tuple[str, ...] | list[st
     report = validate(model, ignore=ignore)
     bad = report.at_least(Severity.WARNING)
     assert not bad, "\n".join(map(str, bad))
+
+
+def __getattr__(name: str) -> Any:
+    # The rules and all that they need are imported when they are wanted, not for what was found before.
+    if name == "all_rules":
+        from osimlite.lint.engine import all_rules
+
+        return all_rules
+    raise AttributeError(f"module 'osimlite.lint' has no attribute '{name}'")

@@ -46,10 +46,12 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
     Raises:
         OsimliteError: no rule has such a code or name.
     """
-    from osimlite.lint.engine import all_rules
-
     given = words.split(",") if isinstance(words, str) else [part for word in words or () for part in word.split(",")]
     cleaned = tuple(word.strip() for word in given if word.strip())
+    if not cleaned:
+        return ()
+    from osimlite.lint.engine import all_rules
+
     for word in cleaned:
         if not any(rule.matches(word) for rule in all_rules()):
             from osimlite.text import did_you_mean

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
+from itertools import groupby
 
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.reporters.style import painted, summary
@@ -12,9 +14,18 @@ _ELLIPSIS = "..."
 
 def render(report: Report, *, colour: bool = False, width: int = 80) -> str:
     """The report as text of at most `width` columns (but for places, which are never broken)."""
-    lines = {file: text.splitlines() for file, text in report.texts.items()}
-    blocks = [_block(finding, lines.get(finding.file or ""), colour, width) for finding in report.findings]
+    blocks: list[str] = []
+    for file, findings in groupby(report.findings, key=lambda finding: finding.file):
+        lines = _lines(report, file)
+        blocks += [_block(finding, lines, colour, width) for finding in findings]
     return "\n\n".join([*blocks, summary(report, colour)]) + "\n"
+
+
+def _lines(report: Report, file: str | None) -> list[str] | None:
+    try:
+        return None if file is None else re.split(r"\n|\r\n?", report.texts[file])
+    except KeyError:
+        return None
 
 
 def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from functools import cache
-from pathlib import Path
+from functools import lru_cache
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
@@ -105,13 +104,16 @@ def _is_file(place: str, name: str) -> bool:
 
 
 def _in_other_case(place: str, name: str) -> str | None:
-    path = Path(name)
-    return _lowered(place / path.parent).get(path.name.lower())
-
-
-@cache
-def _lowered(folder: Path) -> dict[str, str]:
+    """The file that is called `name` but for upper and lower case."""
+    before, last = os.path.split(name)
+    folder = os.path.join(place, before)
     try:
-        return {entry.name.lower(): entry.name for entry in folder.iterdir()}
-    except OSError:
-        return {}
+        # The listing of a folder holds until something in it is made, renamed or removed.
+        return _lowered(folder, os.stat(folder).st_mtime_ns).get(last.lower())
+    except (OSError, ValueError):
+        return None
+
+
+@lru_cache(maxsize=64)
+def _lowered(folder: str, changed: int) -> dict[str, str]:
+    return {name.lower(): name for name in os.listdir(folder)}

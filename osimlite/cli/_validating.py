@@ -1,0 +1,211 @@
+"""What ``osimlite validate`` does, apart from its options: it starts without the library that reads options."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from osimlite.errors import OsimliteError
+from osimlite.lint.config import Config, checked_words
+from osimlite.lint.diagnostic import Report, Severity
+from osimlite.lint.many import check_files, settings_of
+from osimlite.lint.reporters import FORMATS, render
+from osimlite.text import listed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from osimlite.document.source import Source
+
+
+def run(
+    paths: list[str],
+    *,
+    format: str = "full",
+    select: list[str] | None = None,
+    ignore: list[str] | None = None,
+    fail_on: str | None = None,
+    fix: bool = False,
+    unsafe_fixes: bool = False,
+    diff: bool = False,
+    baseline: str | None = None,
+    write_baseline: str | None = None,
+    mesh_path: list[str] | None = None,
+    statistics: bool = False,
+    cached: bool = True,
+) -> int:
+    """Check files and folders, write the report to standard output, and return the exit code."""
+    if fail_on is not None and fail_on not in tuple(Severity):
+        raise OsimliteError(f"--fail-on is one of {listed(Severity)}, not '{fail_on}'")
+    if format not in FORMATS:
+        raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{format}'")
+    given = Config(checked_words(select), checked_words(ignore), mesh_paths=_absolute(mesh_path or []))
+    files = list(_files(paths))
+    if diff:
+        changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
+        return int(any(changed))
+    if fix or unsafe_fixes:
+        count = sum(_mend(path, given, unsafe=unsafe_fixes) for path in files)
+        print(f"Mended {count} {'place' if count == 1 else 'places'}.", file=sys.stderr)
+    with Bar(len(files)) as bar:
+        report = check_files(files, given, cached=cached, progress=bar.show)
+    if write_baseline is not None:
+        from osimlite.lint.baseline import write_baseline as write
+
+        count = write(write_baseline, report)
+        print(f"{write_baseline}: {count} {'finding' if count == 1 else 'findings'}")
+        return 0
+    if baseline is not None:
+        from osimlite.lint.baseline import without_baseline
+
+        report = without_baseline(baseline, report)
+    if statistics:
+        sys.stdout.write(_statistics(report))
+    else:
+        colour = _wants_colour() and format in ("full", "concise")
+        sys.stdout.write(render(report, format, colour=colour, width=min(max(_width(), 40), 120)))
+    worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
+    return int(bool(report.at_least(worst)))
+
+
+class Bar:
+    """A progress bar on a terminal, for work that takes longer than a second."""
+
+    def __init__(self, total: int) -> None:
+        self.total = total
+        self._show: Callable[[int, int], None] | None = None
+        self._stop: Callable[[], None] | None = None
+
+    def __enter__(self) -> Bar:
+        import time
+
+        self._begin = time.monotonic()
+        return self
+
+    def show(self, done: int, total: int) -> None:
+        """Say that `done` of `total` files are checked."""
+        import time
+
+        if self.total < 2 or not sys.stderr.isatty() or time.monotonic() - self._begin < 1:
+            return
+        if self._show is None:
+            self._start(total)
+        assert self._show is not None
+        self._show(done, total)
+
+    def _start(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = TextColumn("Checking models"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        # Without a thread of its own: processes may be started beside it.
+        bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
+        task = bar.add_task("", total=total)
+        bar.start()
+        self._show = lambda done, total: bar.update(task, completed=done, refresh=True)
+        self._stop = bar.stop
+
+    def __exit__(self, *_: object) -> None:
+        if self._stop is not None:
+            self._stop()
+
+
+def _files(paths: list[str]) -> Iterator[str]:
+    """Every file to check, folders opened up."""
+    for text in paths:
+        path = Path(text)
+        if text != "-" and path.is_dir():
+            below = sorted(path.rglob("*.osim"))
+            if not below:
+                raise OsimliteError("there is no .osim file in this folder", file=text)
+            yield from map(str, below)
+        else:
+            yield text
+
+
+def _source(path: str) -> Source:
+    from osimlite.document.source import Source
+
+    if path == "-":
+        return Source(sys.stdin.buffer.read(), "<stdin>")
+    return Source.of_file(path)
+
+
+def _check(source: Source, given: Config) -> Report:
+    """Check one document by the settings of its folder and of the command line."""
+    from osimlite.lint.engine import check_source
+
+    assert source.file is not None
+    return check_source(source, settings_of(source.file).config_for(source.file, given))
+
+
+def _fail_on_of(files: list[str]) -> Severity:
+    """The threshold that the settings of the first file ask for."""
+    return settings_of(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
+
+
+def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int]:
+    """A document, its bytes once everything is mended, and how many mends that took."""
+    from osimlite.document.source import Source
+    from osimlite.lint.fixes import mended
+
+    source = _source(path)
+    data, total = source.data, 0
+    # A mend may bring another to light, as a misspelt set does with all that is in it.
+    for _ in range(10):
+        current = Source(data, source.file)
+        data, count = mended(current, _check(current, given), unsafe=unsafe)
+        total += count
+        if not count:
+            break
+    return source, data, total
+
+
+def _mend(path: str, given: Config, unsafe: bool) -> int:
+    from osimlite.files import write_atomically
+
+    if path == "-":
+        raise OsimliteError("standard input cannot be mended in place; use --diff")
+    _, data, count = _mended(path, given, unsafe)
+    if count:
+        write_atomically(path, data)
+    return count
+
+
+def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
+    """Print what mending would change; whether it would change anything."""
+    import difflib
+
+    from osimlite.document.source import Source
+
+    source, data, count = _mended(path, given, unsafe)
+    new = Source(data).text.splitlines(keepends=True)
+    sys.stdout.writelines(difflib.unified_diff(source.text.splitlines(keepends=True), new, path, path))
+    return bool(count)
+
+
+def _absolute(paths: list[str]) -> tuple[str, ...]:
+    return tuple(str(Path(path).resolve()) for path in paths)
+
+
+def _width() -> int:
+    import shutil
+
+    return shutil.get_terminal_size((80, 24)).columns if sys.stdout.isatty() else 80
+
+
+def _wants_colour() -> bool:
+    if os.environ.get("NO_COLOR"):
+        return False
+    return bool(os.environ.get("FORCE_COLOR")) or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
+
+
+def _statistics(report: Report) -> str:
+    from osimlite.lint.engine import all_rules
+    from osimlite.lint.reporters.style import summary
+
+    known = {rule.code: rule for rule in all_rules()}
+    rows = [f"{count:6d}  {code}  {known[code].name}" for code, count in report.codes.most_common()]
+    return "\n".join([*rows, summary(report)]) + "\n"

@@ -1,0 +1,140 @@
+"""What was found in files before, so that a file that has not changed need not be checked again.
+
+An entry holds for one text, under one path, by one configuration, with this very osimlite. Files that the model names
+may change as well: an entry notes when each of them was last written, or that it was not there.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from osimlite import __version__
+from osimlite.lint.diagnostic import Edit, Finding, Fix, Severity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from osimlite.lint.config import Config
+
+NAME = ".osimlite_cache"
+Stamp = tuple[int, int] | None
+
+
+class Cache:
+    """One folder of entries, a file each; whatever goes wrong with it, models are checked as if it were not there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / __version__
+        self._stamps: dict[str, Stamp] = {}
+
+    def get(self, file: str, key: str) -> list[Finding] | None:
+        """The findings in a file, None unless they were kept for this key and nothing has changed since."""
+        try:
+            entry = json.loads(self._entry(file).read_bytes())
+            if entry["key"] != key or any(self._stamp(path) != _pair(stamp) for path, stamp in entry["outside"]):
+                return None
+            return [_finding(file, *values) for values in entry["findings"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def put(self, file: str, key: str, findings: Iterable[Finding], outside: Iterable[str]) -> None:
+        """Keep the findings in a file; `outside` are the paths at which the check looked for something."""
+        place = self._entry(file)
+        try:
+            # Making the folder changes the one around it, whose time may be noted.
+            self._prepare(place.parent)
+            entry = {
+                "key": key,
+                "outside": [(path, self._stamp(path)) for path in outside],
+                "findings": [_values(finding) for finding in findings],
+            }
+            handle, name = tempfile.mkstemp(dir=place.parent)
+            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+                json.dump(entry, stream, separators=(",", ":"))
+            os.replace(name, place)
+        except OSError:
+            return
+
+    def _entry(self, file: str) -> Path:
+        digest = blake2b(os.path.abspath(file).encode(errors="surrogateescape"), digest_size=16).hexdigest()
+        return self.folder / digest[:2] / f"{digest[2:]}.json"
+
+    def _prepare(self, folder: Path) -> None:
+        if folder.is_dir():
+            return
+        folder.mkdir(parents=True, exist_ok=True)
+        ignore = self.folder.parent / ".gitignore"
+        if self.folder.parent.name == NAME and not ignore.exists():
+            ignore.write_text("*\n")
+
+    def _stamp(self, path: str) -> Stamp:
+        # Many models share their meshes.
+        if path not in self._stamps:
+            try:
+                found = os.stat(path)
+                self._stamps[path] = found.st_mtime_ns, found.st_size
+            except (OSError, ValueError):
+                self._stamps[path] = None
+        return self._stamps[path]
+
+
+def folder_for(settings_file: Path | None) -> Path:
+    """Where entries are kept: beside the settings of a project, else where programs of a user keep such things."""
+    if settings_file is not None:
+        return settings_file.parent / NAME
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "osimlite" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "osimlite"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "osimlite"
+
+
+def key_of(data: bytes, file: str, config: Config) -> str:
+    """What an entry holds for: the text, its path as it was given, the configuration, and the code that checks."""
+    severity = sorted((word, str(level)) for word, level in config.severity.items())
+    setting = (_code(), file, os.path.abspath(file), config.select, config.ignore, severity, config.mesh_paths)
+    digest = blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16)
+    digest.update(data)
+    return digest.hexdigest()
+
+
+@cache
+def _code() -> str:
+    """Which code this is. In a working copy the version stays the same while rules change: the files then tell."""
+    package = Path(__file__).parents[1]
+    newest = count = 0
+    for part in ("document", "document/upgrade", "lint", "lint/rules", "schema"):
+        with os.scandir(package / part) as entries:
+            for entry in entries:
+                if entry.name.endswith(".py"):
+                    newest, count = max(newest, entry.stat().st_mtime_ns), count + 1
+    return f"{__version__} {newest} {count}"
+
+
+def _pair(stamp: Any) -> Stamp:
+    return None if stamp is None else (stamp[0], stamp[1])
+
+
+def _values(finding: Finding) -> list[object]:
+    fix = finding.fix
+    return [
+        finding.code, finding.name, finding.severity.value, finding.message, finding.line, finding.column,
+        finding.length, finding.component, finding.suggestion,
+        None if fix is None else [fix.safe, [[edit.start, edit.end, edit.text] for edit in fix.edits]],
+    ]  # fmt: skip
+
+
+def _finding(
+    file: str, code: str, name: str, severity: str, message: str, line: int | None, column: int | None, length: int,
+    component: str, suggestion: str | None, fix: Any,
+) -> Finding:  # fmt: skip
+    mend = None if fix is None else Fix(tuple(Edit(*edit) for edit in fix[1]), fix[0])
+    level = Severity(severity)
+    return Finding(code, name, level, message, file, line, column, length, component, suggestion, mend)

@@ -1,0 +1,201 @@
+"""Checking many files: those that have changed, on all processors if there is enough to do."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from osimlite.errors import MissingFileError
+from osimlite.lint.cache import Cache, folder_for, key_of
+from osimlite.lint.config import Config
+from osimlite.lint.diagnostic import Finding, Report
+from osimlite.lint.settings import Settings, settings_for
+
+if TYPE_CHECKING:
+    from osimlite.lint.subject import Subject
+
+WORTH_SHARING = 4_000_000
+"""Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""
+
+Progress = Callable[[int, int], None]
+
+
+class Job(NamedTuple):
+    """One file to check, by which configuration, and the folder its findings are kept in (None: nowhere)."""
+
+    file: str
+    config: Config
+    kept_in: Path | None
+
+
+def check_files(
+    files: list[str],
+    given: Config,
+    *,
+    cached: bool = True,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Check files, each by the settings of its folder and what `given` says besides.
+
+    Args:
+        files: paths of models, ``-`` for standard input.
+        given: what comes before the settings of the project.
+        cached: whether findings of files that have not changed are taken from the cache, and new ones kept there.
+        processes: how many processes to use; if not given, as many as there is work for.
+        progress: called with the number of files done and that of all.
+
+    Raises:
+        MissingFileError: a file is missing or cannot be read.
+        OsimliteError: the settings make no sense.
+    """
+    found: dict[str, list[Finding]] = {}
+    texts = Texts()
+    jobs: list[Job] = []
+    caches: dict[Path, Cache] = {}
+    for file in dict.fromkeys(files):
+        settings = settings_of(file)
+        config = settings.config_for(file, given)
+        if file == "-":
+            found[file] = _standard_input(config, texts)
+            continue
+        job = Job(file, config, folder_for(settings.file) if cached else None)
+        known = None
+        if job.kept_in is not None:
+            kept = caches.setdefault(job.kept_in, Cache(job.kept_in))
+            known = kept.get(file, key_of(_read(file), file, config))
+        if known is None:
+            jobs.append(job)
+        else:
+            found[file] = known
+    for count, (job, findings) in enumerate(_checked(jobs, processes), len(found) + 1):
+        found[job.file] = findings
+        if progress is not None:
+            progress(count, len(files))
+    return Report([finding for file in files for finding in found[file]], texts, len(files))
+
+
+class Texts(dict[str, str]):
+    """The text of each file, read again when it is asked for: a thousand models are not kept in memory."""
+
+    def __missing__(self, file: str) -> str:
+        from osimlite.document.source import Source
+
+        try:
+            return Source.of_file(file).text
+        except MissingFileError:
+            return ""
+
+
+def settings_of(file: str) -> Settings:
+    """The settings that hold for a file; for standard input those of the working folder."""
+    return settings_for(Path.cwd() if file in ("-", "<stdin>") else _resolved(os.path.dirname(file)))
+
+
+@cache
+def _resolved(folder: str) -> Path:
+    return Path(folder).resolve()
+
+
+def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, list[Finding]]]:
+    if not jobs:
+        return
+    if processes is None:
+        processes = _processes(jobs)
+    if processes < 2:
+        yield from ((job, check_one(job)) for job in jobs)
+        return
+    import gc
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    from osimlite.lint.engine import all_rules
+
+    # On Linux the processes begin with all that is loaded here.
+    all_rules()
+    gc.freeze()
+    context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    share = max(1, min(16, len(jobs) // (4 * processes)))
+    with ProcessPoolExecutor(processes, context) as pool:
+        yield from zip(jobs, pool.map(check_one, jobs, chunksize=share), strict=True)
+
+
+def _processes(jobs: list[Job]) -> int:
+    size = 0
+    for job in jobs:
+        try:
+            size += os.path.getsize(job.file)
+        except OSError:
+            continue
+    if size < WORTH_SHARING or len(jobs) < 2:
+        return 1
+    present = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return min(present, len(jobs), 61)
+
+
+def check_one(job: Job) -> list[Finding]:
+    """Check one file, and keep what was found."""
+    from osimlite.document.reader import collector_paused
+    from osimlite.document.source import Source
+    from osimlite.document.survey import survey
+    from osimlite.lint.engine import run
+    from osimlite.lint.subject import Subject
+
+    with collector_paused():
+        source = Source.of_file(job.file)
+        subject = Subject(survey(source), job.config)
+        findings = run(subject).findings
+        if job.kept_in is not None:
+            outside = looked_at(subject)
+            if outside is not None:
+                # A file that changes while it is checked must not be taken for one that was checked after.
+                Cache(job.kept_in).put(job.file, key_of(source.data, job.file, job.config), findings, outside)
+    return findings
+
+
+def looked_at(subject: Subject) -> list[str] | None:
+    """Every path outside the text that findings may depend on; None if nobody can say."""
+    from osimlite.schema.base import reference_specs
+    from osimlite.schema.fields import Reference
+
+    if any(note.kind == "include" for note in subject.notes) or b"file=" in getattr(subject.source, "data", b""):
+        return None
+    folder = subject.folder
+    if folder is None or subject.model is None:
+        return []
+    places = [os.path.abspath(folder / place) for place in (".", "Geometry", *subject.config.mesh_paths)]
+    found: dict[str, None] = {}
+    for cls, items in subject.by_class.items():
+        for spec in reference_specs(cls):
+            if not isinstance(spec.kind, Reference) or spec.kind.rule != "file":
+                continue
+            for item in items:
+                name = getattr(item, spec.name)
+                if name:
+                    paths = [os.path.join(place, name) for place in places]
+                    found |= dict.fromkeys(paths)
+                    if not any(map(os.path.isfile, paths)):
+                        # Another file in the same folder may be what was meant.
+                        found |= dict.fromkeys(map(os.path.dirname, paths))
+    return list(found)
+
+
+def _standard_input(config: Config, texts: dict[str, str]) -> list[Finding]:
+    from osimlite.document.source import Source
+    from osimlite.lint.engine import check_source
+
+    source = Source(sys.stdin.buffer.read(), "<stdin>")
+    texts["<stdin>"] = source.text
+    return check_source(source, config).findings
+
+
+def _read(file: str) -> bytes:
+    try:
+        return Path(file).read_bytes()
+    except OSError:
+        # Whoever checks the file says what is wrong.
+        return b""

@@ -1,0 +1,160 @@
+"""Many files: what is kept of a check, when it is believed again, and sharing the work."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from osimlite.errors import MissingFileError
+from osimlite.lint import Config, validate
+from osimlite.lint import many as module
+from osimlite.lint.cache import NAME, folder_for
+from osimlite.lint.many import Texts, check_files, settings_of
+
+MESH = """\
+<OpenSimDocument Version="40600">
+<Model name="m">
+<BodySet><objects><Body name="b">
+<attached_geometry><Mesh name="g"><mesh_file>bone.vtp</mesh_file></Mesh></attached_geometry>
+<mass>1</mass><inertia>1 1 1 0 0 0</inertia></Body></objects></BodySet>
+<JointSet><objects><FreeJoint name="j"><socket_parent_frame>/ground</socket_parent_frame>
+<socket_child_frame>/bodyset/b</socket_child_frame></FreeJoint></objects></JointSet>
+<gravty>0 0 0</gravty>
+</Model>
+</OpenSimDocument>
+"""
+
+
+@pytest.fixture
+def project(tmp_path):
+    settings_of.__globals__["settings_for"].cache_clear()
+    module._resolved.cache_clear()
+    (tmp_path / "osimlite.toml").write_text("")
+    (tmp_path / "m.osim").write_text(MESH)
+    yield tmp_path
+    settings_of.__globals__["settings_for"].cache_clear()
+
+
+@pytest.fixture
+def checked(monkeypatch):
+    """The files that were really checked."""
+    files: list[str] = []
+    real = module.check_one
+
+    def spy(job):
+        files.append(Path(job.file).name)
+        return real(job)
+
+    monkeypatch.setattr(module, "check_one", spy)
+    return files
+
+
+def codes(project, **options):
+    return sorted(finding.code for finding in check_files([str(project / "m.osim")], Config(), **options))
+
+
+def test_an_unchanged_file_is_not_checked_again(project, checked):
+    first = check_files([str(project / "m.osim")], Config())
+    again = check_files([str(project / "m.osim")], Config())
+    assert checked == ["m.osim"]
+    assert again.findings == first.findings == validate(project / "m.osim").findings
+    assert [finding.fix for finding in again] == [finding.fix for finding in first]
+    assert any(finding.fix for finding in again)
+    assert again.texts[str(project / "m.osim")] == MESH
+    assert (project / NAME / ".gitignore").read_text() == "*\n"
+
+
+def test_another_text_or_configuration_is_checked(project, checked):
+    codes(project)
+    (project / "m.osim").write_text(MESH.replace("gravty", "gravity"))
+    assert "OSIM101" not in codes(project)
+    check_files([str(project / "m.osim")], Config(ignore=("OSIM7",)))
+    assert len(checked) == 3
+    codes(project, cached=False)
+    assert len(checked) == 4
+
+
+def test_a_mesh_that_comes_or_goes_counts(project, checked):
+    assert "OSIM701" in codes(project)
+    (project / "Geometry").mkdir()
+    (project / "Geometry" / "bone.vtp").write_text("")
+    assert "OSIM701" not in codes(project)
+    assert "OSIM701" not in codes(project) and len(checked) == 2
+    (project / "Geometry" / "bone.vtp").unlink()
+    assert "OSIM701" in codes(project)
+
+
+def test_a_mesh_in_other_letter_case_counts(project, checked):
+    codes(project)
+    (project / "BONE.vtp").write_text("")
+    report = check_files([str(project / "m.osim")], Config())
+    assert [finding.suggestion for finding in report if finding.code == "OSIM701"] == ["BONE.vtp"]
+
+
+def test_a_model_that_includes_another_file_is_always_checked(project, checked):
+    (project / "markers.osim").write_text('<OpenSimDocument Version="40600"><MarkerSet/></OpenSimDocument>')
+    (project / "m.osim").write_text(MESH.replace("<BodySet>", '<MarkerSet file="markers.osim"/><BodySet>'))
+    assert codes(project) == codes(project)
+    assert len(checked) == 2
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"key": 1}', "\x00"])
+def test_a_broken_entry_is_no_entry(project, checked, content):
+    first = codes(project)
+    (entry,) = (project / NAME).rglob("*.json")
+    entry.write_text(content)
+    assert codes(project) == first and len(checked) == 2
+    assert json.loads(entry.read_text())["findings"]
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(project, checked):
+    (project / NAME).write_text("a file stands in its place")
+    assert codes(project) == codes(project)
+    assert len(checked) == 2
+
+
+def test_without_settings_the_cache_is_the_users(monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert folder_for(None) == tmp_path / "osimlite"
+    assert folder_for(tmp_path / "pyproject.toml") == tmp_path / NAME
+
+
+def test_shared_work_finds_the_same_in_the_same_order(project):
+    files = []
+    for number in range(9):
+        file = project / f"m{number}.osim"
+        file.write_text(MESH.replace("<mass>1", f"<mass>{number - 4}"))
+        files.append(str(file))
+    seen: list[tuple[int, int]] = []
+    alone = check_files(files, Config(), cached=False, processes=1)
+    shared = check_files(files, Config(), cached=False, processes=2, progress=lambda *counts: seen.append(counts))
+    assert shared.findings == alone.findings and shared.checked == 9
+    assert seen == [(count, 9) for count in range(1, 10)]
+
+
+def test_a_missing_file_is_named_also_by_another_process(project):
+    absent = str(project / "absent.osim")
+    for processes in (1, 2):
+        with pytest.raises(MissingFileError, match="absent"):
+            check_files([absent, str(project / "m.osim")], Config(), processes=processes)
+
+
+def test_work_is_shared_only_if_there_is_enough(project, monkeypatch):
+    jobs = [module.Job(str(project / "m.osim"), Config(), None)] * 3
+    assert module._processes(jobs) == 1
+    monkeypatch.setattr(module, "WORTH_SHARING", 10)
+    monkeypatch.setattr("os.cpu_count", lambda: 4)
+    monkeypatch.setattr("sys.platform", "win32")
+    assert module._processes(jobs) == 3
+
+
+def test_the_text_of_a_file_that_has_gone_is_empty(project):
+    file = project / "m.osim"
+    texts = Texts()
+    assert texts[str(file)] == MESH
+    shutil.move(file, project / "moved.osim")
+    assert texts[str(file)] == ""
