@@ -77,7 +77,8 @@ def stretch(length: float, l0: float, clamped: bool) -> float:
 def blankevoort_tension(length: float, rate: float, l0: float, k: float, e1: float, c: float) -> float:
     """Tension of a ligament, in N, at the strain e = l / l0 - 1.
 
-    k e^2 / (2 e1) for 0 < e < e1, k (e - e1 / 2) beyond; while the ligament is taut and lengthens, c v / l0 more.
+    k e^2 / (2 e1) for 0 < e < e1, k (e - e1 / 2) beyond; while the ligament is taut and lengthens, c v / l0 more, which
+    sets in along 10 x^3 - 15 x^4 + 6 x^5 with x = e / 0.01, as OpenSim has it.
 
     Args:
         length: l, m.
@@ -91,7 +92,10 @@ def blankevoort_tension(length: float, rate: float, l0: float, k: float, e1: flo
     if e <= 0.0:
         return 0.0
     tension = 0.5 * k / e1 * e * e if e < e1 else k * (e - 0.5 * e1)
-    return tension + c * rate / l0 if rate > 0.0 else tension
+    if rate > 0.0:
+        x = e / 0.01 if e < 0.01 else 1.0
+        tension += x * x * x * (10.0 + x * (6.0 * x - 15.0)) * c * rate / l0
+    return tension
 
 
 def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:

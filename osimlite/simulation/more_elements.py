@@ -32,9 +32,11 @@ from osimlite.simulation.actuator_elements import (
 )
 from osimlite.simulation.bushing_elements import Bushing
 from osimlite.simulation.elements import ElementBuilder, ForceElement
+from osimlite.simulation.path_elements import PATH_MAKERS
 from osimlite.simulation.spring_elements import CoordinateFormula, CoordinateSpring, PointSpring
 
 MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
+    **PATH_MAKERS,
     BodyActuator: IdleActuator.of,
     CoordinateActuator: CoordinateDrive.of,
     PointActuator: PointDrive.of,

@@ -18,6 +18,8 @@ from osimlite.schema.actuators import (
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, LinearFunction, PolynomialFunction, SimmSpline, Sine
+from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
+from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -317,4 +319,56 @@ def test_prescribed_forces(model, tmp_path):
                     if "t" in parts:
                         force.torqueFunctions.objects += [line.model_copy(), spline.model_copy(), wave.model_copy()]
                     model.add(force)
+    compare(model, tmp_path)
+
+
+ROUTES = (
+    (("/ground", (1.0, 0.5, 0.2)), ("/bodyset/b2", (0.1, 0.2, 0.3))),
+    (
+        ("/bodyset/b1/f1", (0.1, 0.0, 0.2)),
+        ("/bodyset/b1", (0.3, 0.2, 0.0)),
+        ("/bodyset/b0", (0.0, 0.4, 0.1)),
+        ("/ground", (-0.5, 0.1, 0.0)),
+        ("/bodyset/b2/f2", (0.2, 0.1, 0.0)),
+    ),
+)
+
+
+def along(kind, **more):
+    found = []
+    for number, route in enumerate(ROUTES):
+        force = kind(name=f"along{number}", **more)
+        path = GeometryPath(name="path")
+        for place, (frame, at) in enumerate(route):
+            path.path_point_set.objects.append(PathPoint(name=f"p{place}", socket_parent_frame=frame, location=at))
+        force.geometry_path = path
+        found.append(force)
+    return found
+
+
+@pytest.mark.parametrize("rest", [0.1, 2.0, 20.0])
+def test_springs_along_paths(model, rest, tmp_path):
+    model.add(*along(PathSpring, resting_length=rest, stiffness=40.0, dissipation=0.3))
+    # OpenSim counts no energy for this spring, nor for the ligament.
+    compare(model, tmp_path, counted=0)
+
+
+@pytest.mark.parametrize("clamped", [True, False])
+@pytest.mark.parametrize("rest", [0.1, 2.0, 20.0])
+def test_formulas_along_paths(model, rest, clamped, tmp_path):
+    expression = "3*s + s^2 + 0.1*ldot*(1+s)"
+    model.add(*along(ExpressionBasedPathForce, resting_length=rest, expression=expression, clamp_stretch=clamped))
+    compare(model, tmp_path)
+
+
+@pytest.mark.parametrize("rest", [0.8, 1.5, 20.0])
+def test_ligaments(model, rest, tmp_path):
+    model.add(*along(Ligament, resting_length=rest, pcsa_force=50.0))
+    compare(model, tmp_path, counted=0)
+
+
+@pytest.mark.parametrize("slack", [0.5, 1.5, 3.0, 20.0])
+def test_ligaments_of_blankevoort(model, slack, tmp_path):
+    constants = {"linear_stiffness": 30.0, "transition_strain": 0.5, "damping_coefficient": 2.0}
+    model.add(*along(Blankevoort1991Ligament, slack_length=slack, **constants))
     compare(model, tmp_path)
