@@ -325,7 +325,7 @@ class ElementBuilder:
                         f"the force '{self.path(force)}' names the contact geometry '{text}', which the model "
                         "does not have; run 'osimlite validate'"
                     )
-                surfaces.append(self._surface(force, found.target, material))
+                surfaces.append(self.surface(force, found.target, material))
         self.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):
@@ -354,9 +354,12 @@ class ElementBuilder:
         for position, word in enumerate(parameters.geometry):
             yield Use(parameters, self.tree.owner_of(parameters), spec, word, position)
 
-    def _surface(
-        self, force: HuntCrossleyForce, geometry: Any, material: tuple[float, float, float, float, float]
-    ) -> ContactSurface:
+    def surface(self, force: Any, geometry: Any, material: tuple[float, float, float, float, float]) -> ContactSurface:
+        """A contact geometry as the surface of a contact.
+
+        Raises:
+            UnsupportedError: it is neither a half space nor a sphere, or not fixed to a body.
+        """
         if not isinstance(geometry, ContactHalfSpace | ContactSphere):
             raise self.unsupported(force, f" on the {kind_of(geometry)} '{self.path(geometry)}'")
         frame = self._frame(geometry)

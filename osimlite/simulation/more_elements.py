@@ -12,6 +12,7 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
+from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -33,6 +34,7 @@ from osimlite.simulation.actuator_elements import (
 from osimlite.simulation.bushing_elements import Bushing
 from osimlite.simulation.elements import ElementBuilder, ForceElement
 from osimlite.simulation.path_elements import PATH_MAKERS
+from osimlite.simulation.smooth_contact_element import SmoothContact
 from osimlite.simulation.spring_elements import CoordinateFormula, CoordinateSpring, PointSpring
 
 MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
@@ -49,5 +51,6 @@ MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
     ExpressionBasedPointToPointForce: PointSpring.of_formula,
     FunctionBasedBushingForce: Bushing.by_functions,
     PointToPointSpring: PointSpring.of,
+    SmoothSphereHalfSpaceForce: SmoothContact.of,
     SpringGeneralizedForce: CoordinateSpring.of,
 }

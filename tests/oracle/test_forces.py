@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, Model
+from osimlite import Body, ContactHalfSpace, ContactSphere, Model
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import (
     BodyActuator,
@@ -15,6 +15,7 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
+from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, LinearFunction, PolynomialFunction, SimmSpline, Sine
@@ -371,4 +372,30 @@ def test_ligaments(model, rest, tmp_path):
 def test_ligaments_of_blankevoort(model, slack, tmp_path):
     constants = {"linear_stiffness": 30.0, "transition_strain": 0.5, "damping_coefficient": 2.0}
     model.add(*along(Blankevoort1991Ligament, slack_length=slack, **constants))
+    compare(model, tmp_path)
+
+
+@pytest.mark.parametrize("dissipation", [0.0, 0.4])
+@pytest.mark.parametrize("carried", ["/ground", "/bodyset/b0/f0"])
+def test_smooth_contact(model, dissipation, carried, tmp_path):
+    plane = ContactHalfSpace(name="plane", socket_frame=carried, location=(0, -0.1, 0.2), orientation=(0.1, 0.2, -1.4))
+    model.add(plane)
+    for number, frame in enumerate(("/bodyset/b1/f1", "/bodyset/b2", "/bodyset/b2/f2")):
+        ball = ContactSphere(name=f"ball{number}", socket_frame=frame, location=(0.1, 0.0, -0.1), radius=0.3)
+        model.add(ball)
+        model.add(
+            SmoothSphereHalfSpaceForce(
+                name=f"contact{number}",
+                socket_sphere=ball,
+                socket_half_space=plane,
+                stiffness=1e4,
+                dissipation=dissipation,
+                static_friction=0.8,
+                dynamic_friction=0.5,
+                viscous_friction=0.1,
+                transition_velocity=0.2 + number,
+                hertz_smoothing=3.0,
+                hunt_crossley_smoothing=0.5,
+            )
+        )
     compare(model, tmp_path)
