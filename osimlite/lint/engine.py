@@ -45,10 +45,12 @@ _MODULES = (
     "references",
     "names",
     "contact",
+    "wiring",
     "topology",
     "joints",
     "bodies",
     "physics",
+    "space",
     "paths",
     "files",
 )

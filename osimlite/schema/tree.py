@@ -320,18 +320,25 @@ def _name_in_tree(spec: FieldSpec, item: Component) -> str:
 
 
 def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    if _is_no_path(text):
+        return Resolution(None, "illegal")
     if target == "Frame":
-        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever the file says;
-        # not of one that it merely holds among its components.
+        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever path the file
+        # gives; not of one that it merely holds among its components.
         parent = tree.parent_of(owner)
         if parent is not None and is_a(parent, "Frame") and not any(item is owner for item in parent.subcomponents):
             return Resolution(parent)
     if not text:
         return Resolution(None, "empty")
-    if any(character in text for character in ILLEGAL_CHARACTERS[:-1]):
-        return Resolution(None, "illegal")
     base = tree.path_of(owner) or "/"
     return tree._walk(text, "" if base == "/" else base, target)
+
+
+def _is_no_path(text: str) -> bool:
+    """Whether OpenSim cannot even read the text as a path, which it does of every socket when it loads the file."""
+    if any(character in text for character in ILLEGAL_CHARACTERS[:-1]):
+        return True
+    return text.startswith("/") and normalised(text) is None
 
 
 def _model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:

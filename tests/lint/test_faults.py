@@ -52,8 +52,9 @@ def test_what_is_valid_is_left_alone(name, tmp_path):
 def test_the_walker_has_neither_errors_nor_warnings():
     report = validate(WALKER)
     assert report.ok and not report.warnings
-    assert [finding.code for finding in report.infos] == ["OSIM508", "OSIM508"]
+    assert [finding.code for finding in report.infos] == ["OSIM508", "OSIM508", "OSIM521"]
     assert "-140 deg" in report.infos[0].message
+    assert "'RFootContact' starts 21.5694 mm deep" in report.infos[2].message
 
 
 def test_a_missing_file_is_no_finding():

@@ -103,10 +103,11 @@ def test_a_value_that_changes_is_an_unsafe_mend(name, expected):
 @pytest.mark.parametrize("fault", faults.FAULTS, ids=lambda fault: fault.name)
 def test_no_mend_makes_a_model_worse(fault):
     text, _ = fault.change(WALKER.read_text())
-    before = validate(Source(text.encode()))
+    # A model that holds together again shows where its feet are.
+    before = validate(Source(text.encode()), ignore="OSIM521")
     for unsafe in (False, True):
         fixed, count = mend(text, unsafe=unsafe)
-        after = validate(Source(fixed.encode()))
+        after = validate(Source(fixed.encode()), ignore="OSIM521")
         assert len(after.errors) <= len(before.errors)
         assert count == 0 or len(after) < len(before), f"{before}\n->\n{after}"
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypedDict
 
+from osimlite.lint.diagnostic import Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.fixes import replaced
+from osimlite.lint.inertia import possible_inertia
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.frames import Body
@@ -71,6 +75,7 @@ def impossible_inertia(subject: Subject, found: Found) -> None:
                 + (f", by {excess:.3g} %" if math.isfinite(excess) else ""),
                 body,
                 tag="inertia",
+                **_nearest(subject, body),
             )
 
 
@@ -103,6 +108,7 @@ def inertia_not_positive(subject: Subject, found: Found) -> None:
                 f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}",
                 body,
                 tag="inertia",
+                **_nearest(subject, body),
             )
 
 
@@ -136,6 +142,18 @@ def no_inertia(subject: Subject, found: Found) -> None:
                 body,
                 tag="inertia",
             )
+
+
+class _Mend(TypedDict):
+    suggestion: str
+    fix: Fix | None
+
+
+def _nearest(subject: Subject, body: Body) -> _Mend:
+    """The nearest possible inertia, as what to write instead."""
+    text = " ".join(f"{number:.9g}" for number in possible_inertia(body.inertia))
+    place = subject.position(body, tag="inertia") if subject.element_of(body, "inertia") is not None else None
+    return {"suggestion": text, "fix": replaced(subject.source, place, text, safe=False)}
 
 
 def _inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:

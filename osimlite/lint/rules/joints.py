@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from osimlite.lint.axes import axes_of, axes_refused, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
-from osimlite.text import listed
+from osimlite.text import listed, nearest
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)
@@ -53,7 +55,8 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     """A joint has not as many coordinates as it needs.
 
     ## What it does
-    Reports joints with more or fewer coordinates than their class moves by, and (as a warning) with none at all.
+    Reports joints with more or fewer coordinates than their class moves by, custom joints with a coordinate that none
+    of their axes uses, and (as a warning) joints with none at all.
 
     ## Why is this bad
     OpenSim refuses the model. Without any it makes coordinates up, with a name such as `_coord_0` and the value 0.
@@ -76,6 +79,15 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     </PinJoint>
     ```
     """
+    for custom in subject.each(CustomJoint):
+        names, declared_names = names_on_axes(custom), [coordinate.name for coordinate in custom.coordinates]
+        if axes_refused(custom) and all(name in declared_names for name in names):
+            unused = [f"'{name}'" for name in declared_names if name not in names]
+            found(
+                f"no axis of {called(custom)} uses {listed(unused)}: OpenSim refuses the model",
+                custom,
+                number=subject.element_of(custom, "coordinates"),
+            )
     for joint in subject.each(Joint):
         if joint.motion_types is None:
             continue
@@ -163,7 +175,8 @@ def ground_as_child(subject: Subject, found: Found) -> None:
         <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
         <socket_child_frame>/ground</socket_child_frame>
         <coordinates>
-            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" /> <Coordinate name="pelvis_ty" />
+            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" />
+            <Coordinate name="pelvis_ty"> <default_value>-1</default_value> </Coordinate>
         </coordinates>
     </PlanarJoint>
     ```
@@ -174,7 +187,8 @@ def ground_as_child(subject: Subject, found: Found) -> None:
         <socket_parent_frame>/ground</socket_parent_frame>
         <socket_child_frame>/bodyset/pelvis</socket_child_frame>
         <coordinates>
-            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" /> <Coordinate name="pelvis_ty" />
+            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" />
+            <Coordinate name="pelvis_ty"> <default_value>1</default_value> </Coordinate>
         </coordinates>
     </PlanarJoint>
     ```
@@ -246,6 +260,81 @@ def stray_joint_frame(subject: Subject, found: Found) -> None:
                 tag="socket_parent",
                 severity=ERROR if late else None,
             )
+
+
+@rule("OSIM410", "made-up-coordinate", severity=ERROR)
+def made_up_coordinate(subject: Subject, found: Found) -> None:
+    """An axis of a custom joint names a coordinate that the joint does not declare.
+
+    ## What it does
+    Reports such names where OpenSim takes the model all the same; where it refuses the model, the name is reported as
+    a reference that leads nowhere. It is a warning if the joint declares no coordinate at all.
+
+    ## Why is this bad
+    OpenSim makes a coordinate of that name up, without a word: the joint has one degree of freedom more, its value is
+    0, and the axis no longer follows the coordinate it was meant to follow.
+
+    ## Example
+    ```xml
+    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    <CustomJoint name="ankle">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/foot</socket_child_frame>
+        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+        <SpatialTransform>
+            <TransformAxis name="rotation1">
+                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+            </TransformAxis>
+            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+            <TransformAxis name="translation1">
+                <coordinates>ankle_angel</coordinates>
+                <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
+            </TransformAxis>
+        </SpatialTransform>
+    </CustomJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    <CustomJoint name="ankle">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/foot</socket_child_frame>
+        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+        <SpatialTransform>
+            <TransformAxis name="rotation1">
+                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+            </TransformAxis>
+            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+            <TransformAxis name="translation1">
+                <coordinates>ankle_angle</coordinates>
+                <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
+            </TransformAxis>
+        </SpatialTransform>
+    </CustomJoint>
+    ```
+    """
+    for joint in subject.each(CustomJoint):
+        declared = [coordinate.name for coordinate in joint.coordinates]
+        if axes_refused(joint):
+            continue
+        for axis in axes_of(joint):
+            for place, name in enumerate(axis.coordinates):
+                if not isinstance(name, str) or name in declared:
+                    continue
+                word, nth = subject.word_at(axis, "coordinates", place)
+                found(
+                    f"{axis.name} of {called(joint)} names '{name}', which the joint does not declare: OpenSim makes a "
+                    "coordinate of that name up",
+                    axis,
+                    tag="coordinates",
+                    word=word,
+                    nth=nth,
+                    suggestion=nearest(name, declared),
+                    severity=None if declared else WARNING,
+                )
 
 
 def a_joint(joint: Joint) -> str:

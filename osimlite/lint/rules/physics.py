@@ -56,7 +56,9 @@ def friction_order(subject: Subject, found: Found) -> None:
     Reports contact materials whose static coefficient is below the dynamic one.
 
     ## Why is this bad
-    No material resists sliding more than sticking; usually the two numbers are swapped.
+    No material resists sliding more than sticking; usually the two numbers are swapped. Simbody's friction rises with
+    the speed v of sliding, measured in transition velocities, as min(v, 1) (d + 2 (s - d) / (1 + v^2)), with s static
+    and d dynamic: where s is less than half of d this is negative at small v, and friction pushes the way things slide.
 
     ## Example
     ```xml
@@ -90,7 +92,8 @@ def friction_order(subject: Subject, found: Found) -> None:
         if 0 <= material.static_friction < material.dynamic_friction:
             found(
                 f"static friction of {subject.called(material)}, {quantity(material.static_friction)}, is smaller than "
-                f"dynamic friction, {quantity(material.dynamic_friction)}",
+                f"dynamic friction, {quantity(material.dynamic_friction)}"
+                + ("; less than half of it, so that friction drives slow sliding on" if _drives(material) else ""),
                 material,
                 tag="static_friction",
             )
@@ -172,6 +175,58 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
                     f"({quantity(low)} to {quantity(high, unit)})",
                     force,
                     tag=tag,
+                )
+
+
+@rule("OSIM509", "limit-inside-range", severity=INFO)
+def limit_inside_range(subject: Subject, found: Found) -> None:
+    """A limit force begins well inside the range of its coordinate.
+
+    ## What it does
+    Reports limits inside the range of the coordinate by more than the transition and a quarter of the range. It is a
+    warning if the default value of the coordinate is already beyond the limit.
+
+    ## Why is this bad
+    Part of the range can only be reached against the spring. Past the limit in the default pose, the force is there
+    from the first instant. Note that limits are in degrees and ranges in radians.
+
+    ## Example
+    ```xml
+    <CoordinateLimitForce name="stop">
+        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-2.1</lower_limit>
+    </CoordinateLimitForce>
+    ```
+
+    ## Use instead
+    ```xml
+    <CoordinateLimitForce name="stop">
+        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-120</lower_limit>
+    </CoordinateLimitForce>
+    ```
+    """
+    for force in subject.each(CoordinateLimitForce):
+        coordinate, motion = _limited(subject, force)
+        if coordinate is None or motion is None or "range" not in coordinate.model_fields_set:
+            continue
+        scale, unit = (180 / math.pi, "deg") if motion == "rotational" else (1.0, "m")
+        low, high = sorted(bound * scale for bound in coordinate.range)
+        slack = max(abs(force.transition), 0.25 * (high - low)) + 1e-6
+        start = coordinate.default_value * scale
+        for tag, limit, inside, beyond in (
+            ("upper_limit", force.upper_limit, low <= force.upper_limit < high - slack, start - force.upper_limit),
+            ("lower_limit", force.lower_limit, high >= force.lower_limit > low + slack, force.lower_limit - start),
+        ):
+            acts = beyond > abs(force.transition)
+            # A range of many turns stands for none, or is in degrees; so does a limit that is not given.
+            given = tag in force.model_fields_set and (motion != "rotational" or high - low < 720)
+            if inside and given and force.lower_limit <= force.upper_limit:
+                found(
+                    f"{tag} of {called(force)} is {quantity(limit, unit)}, inside the range of '{coordinate.name}' "
+                    f"({quantity(low)} to {quantity(high, unit)})"
+                    + (f"; it acts in the default pose, {quantity(start, unit)}" if acts else ""),
+                    force,
+                    tag=tag,
+                    severity=WARNING if acts else None,
                 )
 
 
@@ -360,6 +415,11 @@ def degrees_for_radians(subject: Subject, found: Found) -> None:
                     tag="default_value",
                     suggestion=f"{math.radians(coordinate.default_value):.6g}",
                 )
+
+
+def _drives(material: HuntCrossleyContactParameters) -> bool:
+    """Whether friction at the smallest speeds acts along the sliding, even with the viscous part."""
+    return 2 * material.static_friction + material.viscous_friction < material.dynamic_friction
 
 
 def _limited(subject: Subject, force: CoordinateLimitForce) -> tuple[Coordinate | None, str | None]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple, cast
 
+from osimlite.lint.axes import axes_refused
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Object, Unknown, reference_specs
 from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.fields import Reference
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
@@ -218,15 +220,24 @@ def _find(subject: Subject) -> Iterator[Broken]:
             if _wants_plain_path(use) and isinstance(use.value, str) and use.value != written:
                 yield Broken(use, use.value, "form", None, written)
             continue
-        if _overwritten(subject, use):
+        if resolution.failure != "illegal" and _overwritten(subject, use):
             continue
         value = use.value
         text = value if isinstance(value, str) else value.name
-        if isinstance(value, str) and (resolution.failure == "empty" or value == "UNASSIGNED"):
+        if isinstance(value, str) and (resolution.failure == "empty" or _unassigned(use)):
             if use.reference.required and use.position is None:
                 yield Broken(use, text, "empty")
+        elif use.reference.rule == "own-joint-coordinate" and isinstance(use.owner, CustomJoint):
+            # Often OpenSim makes such a coordinate up, of which another rule speaks.
+            if axes_refused(use.owner):
+                yield _explained(subject, use, text, resolution)
         elif not _undecided(subject, use, text) and not _special(use, text):
             yield _explained(subject, use, text, resolution)
+
+
+def _unassigned(use: Use) -> bool:
+    """Whether the text is the word that OpenSim prints for a single name which was never given."""
+    return use.value == "UNASSIGNED" and use.position is None and use.spec.name != "name"
 
 
 def _uses(subject: Subject) -> Iterator[Use]:
@@ -255,6 +266,9 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
         return Broken(use, text, "form", None, _closest(text, same_name), "" if len(same_name) == 1 else "several")
     other = resolution.found or _elsewhere(subject, use, text)
+    if other is not None and is_a(other, reference.target):
+        # A coordinate, but of another joint.
+        other = None
     if other is not None and not same_name:
         return Broken(use, text, "wrong-type", other, nearest(text, right, cutoff=75))
     if same_name and resolution.failure == "wrong-type":
@@ -388,6 +402,8 @@ def _report(subject: Subject, found: Found, broken: Broken, message: str) -> Non
     # OpenSim drops what a group names wrongly and goes on.
     severity = WARNING if use.reference.rule == "set-member" else None
     by_name = use.spec.name == "name"
+    if by_name:
+        message += "; OpenSim switches the whole probe off"
     place = None if by_name else subject.position(use.holder, tag=use.spec.tag, word=broken.text, nth=nth)
     certain = broken.hint == "comma" or (broken.why in ("case", "form") and not broken.hint)
     # A frame deep in another component only happens to have the name.

@@ -29,13 +29,13 @@ def unreadable_value(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.4, 0</location>
+    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.2, 0</location>
         <radius>0.05</radius> </ContactSphere>
     ```
 
     ## Use instead
     ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.4 0</location>
+    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location>
         <radius>0.05</radius> </ContactSphere>
     ```
     """

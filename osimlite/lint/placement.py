@@ -1,0 +1,187 @@
+"""Where bodies are in the default pose, as far as a few lines of plain arithmetic can tell.
+
+The numeric library that simulations use is not needed to validate, so that this knows only what it takes to look at
+the first pose: joints that are made of plain rotations and translations, and custom joints whose functions are
+constant, linear or polynomial. What hangs on another joint, on a prescribed coordinate or on a frame laid through
+stations has no known place. Constraints, which may move the model when it is assembled, are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from osimlite.lint.axes import axes_of
+from osimlite.lint.skeleton import skeleton
+from osimlite.lint.subject import Subject
+from osimlite.schema.base import Component
+from osimlite.schema.custom_joint import CustomJoint, TransformAxis
+from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
+from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction, PolynomialFunction
+from osimlite.schema.joints import (
+    BallJoint,
+    FreeJoint,
+    GimbalJoint,
+    Joint,
+    PinJoint,
+    PlanarJoint,
+    SliderJoint,
+    UniversalJoint,
+    WeldJoint,
+)
+
+Vector = tuple[float, float, float]
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class Pose(NamedTuple):
+    """A frame in another: the rows of its rotation matrix, and its origin (m)."""
+
+    rotation: tuple[Vector, Vector, Vector] = (X, Y, Z)
+    position: Vector = (0.0, 0.0, 0.0)
+
+    def turned(self, vector: Vector) -> Vector:
+        """A vector of the inner frame, expressed in the outer one."""
+        return (dot(self.rotation[0], vector), dot(self.rotation[1], vector), dot(self.rotation[2], vector))
+
+    def of(self, point: Vector) -> Vector:
+        """A point of the inner frame, in the outer one."""
+        x, y, z = self.turned(point)
+        return x + self.position[0], y + self.position[1], z + self.position[2]
+
+    def then(self, inner: Pose) -> Pose:
+        """A frame within this one, seen from outside."""
+        one, two, three = (self.turned(column) for column in zip(*inner.rotation, strict=True))
+        rows = tuple(zip(one, two, three, strict=True))
+        return Pose((rows[0], rows[1], rows[2]), self.of(inner.position))
+
+    def inverse(self) -> Pose:
+        """The outer frame, seen from the inner one."""
+        one, two, three = zip(*self.rotation, strict=True)
+        back = Pose((one, two, three))
+        x, y, z = back.turned(self.position)
+        return Pose(back.rotation, (-x, -y, -z))
+
+
+def dot(one: Vector, other: Vector) -> float:
+    """The scalar product."""
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def about(axis: Vector, angle: float) -> Pose:
+    """A rotation about an axis, by Rodrigues' formula."""
+    length = math.sqrt(dot(axis, axis)) or 1.0
+    x, y, z = (part / length for part in axis)
+    c, s = math.cos(angle), math.sin(angle)
+    v = 1 - c
+    return Pose(
+        (
+            (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
+            (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
+            (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
+        )
+    )
+
+
+def fixed(angles: Vector, position: Vector) -> Pose:
+    """A frame displaced, and turned by body-fixed X-Y-Z angles."""
+    return Pose(about(X, angles[0]).then(about(Y, angles[1])).then(about(Z, angles[2])).rotation, position)
+
+
+def on_base(subject: Subject, frame: Component | None) -> tuple[Component, Pose] | None:
+    """The body or ground that a frame is fixed to, and where it is on it; None if that is not known."""
+    pose, seen = Pose(), 0
+    while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
+        pose = fixed(frame.orientation, frame.translation).then(pose)
+        frame, seen = subject.target_of(frame, "socket_parent"), seen + 1
+    return (frame, pose) if isinstance(frame, (Body, Ground)) else None
+
+
+def default_poses(subject: Subject) -> dict[int, Pose]:
+    """The pose in ground of each body (by identity) whose place is known; worked out once per subject."""
+    known = subject.kept.get("default poses")
+    if isinstance(known, dict):
+        return known
+    bones = skeleton(subject)
+    poses: dict[int, Pose] = {id(bones.ground): Pose()}
+    pending: list[Component] = [bones.ground]
+    while pending:
+        base = pending.pop(0)
+        for link in bones.of(base):
+            parent, child = on_base(subject, link.parent), on_base(subject, link.child)
+            motion = _motion(link.joint)
+            if parent is None or child is None or motion is None:
+                continue
+            across = parent[1].then(motion).then(child[1].inverse())
+            for start, end, step in ((parent[0], child[0], across), (child[0], parent[0], across.inverse())):
+                if start is base and id(end) not in poses:
+                    poses[id(end)] = poses[id(base)].then(step)
+                    pending.append(end)
+    subject.kept["default poses"] = poses
+    return poses
+
+
+def _motion(joint: Joint) -> Pose | None:
+    """The child frame of a joint in its parent frame, at the default values of the coordinates."""
+    if any(coordinate.prescribed for coordinate in joint.coordinates):
+        return None
+    values = [coordinate.default_value for coordinate in joint.coordinates]
+    if isinstance(joint, CustomJoint):
+        return _custom(joint, dict(zip([item.name for item in joint.coordinates], values, strict=True)))
+    if joint.motion_types is None or len(values) != len(joint.motion_types):
+        return None
+    match joint:
+        case WeldJoint():
+            return Pose()
+        case PinJoint():
+            return about(Z, values[0])
+        case SliderJoint():
+            return Pose(position=(values[0], 0.0, 0.0))
+        case PlanarJoint():
+            return Pose(about(Z, values[0]).rotation, (values[1], values[2], 0.0))
+        case UniversalJoint():
+            return about(X, values[0]).then(about(Y, values[1]))
+        case BallJoint() | GimbalJoint():
+            return fixed((values[0], values[1], values[2]), (0.0, 0.0, 0.0))
+        case FreeJoint():
+            return fixed((values[0], values[1], values[2]), (values[3], values[4], values[5]))
+    return None
+
+
+def _custom(joint: CustomJoint, values: dict[str, float]) -> Pose | None:
+    axes = axes_of(joint)
+    moved = [_along(axis, values) for axis in axes]
+    known = [amount for amount in moved if amount is not None]
+    if len(known) < len(axes):
+        return None
+    turned = Pose()
+    for axis, amount in zip(axes[:3], known[:3], strict=True):
+        turned = turned.then(about(axis.axis, amount))
+    place = [0.0, 0.0, 0.0]
+    for axis, amount in zip(axes[3:], known[3:], strict=True):
+        length = math.sqrt(dot(axis.axis, axis.axis)) or 1.0
+        place = [before + amount * part / length for before, part in zip(place, axis.axis, strict=True)]
+    return Pose(turned.rotation, (place[0], place[1], place[2]))
+
+
+def _along(axis: TransformAxis, values: dict[str, float]) -> float | None:
+    names = [word if isinstance(word, str) else word.name for word in axis.coordinates]
+    return _value(axis.function, [values.get(name, 0.0) for name in names])
+
+
+def _value(function: Function | None, arguments: list[float]) -> float | None:
+    match function:
+        case Constant():
+            return function.value
+        case LinearFunction() if len(function.coefficients) == len(arguments) + 1:
+            *weights, rest = function.coefficients
+            return rest + sum(weight * value for weight, value in zip(weights, arguments, strict=True))
+        case PolynomialFunction() if len(arguments) == 1:
+            total = 0.0
+            for coefficient in function.coefficients:
+                total = total * arguments[0] + coefficient
+            return total
+        case MultiplierFunction():
+            inner = _value(function.function, arguments)
+            return None if inner is None else function.scale * inner
+    return None

@@ -1,0 +1,242 @@
+"""What only shows once frames are put in their places: frames laid through points, contact, lengths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import combinations
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.placement import Pose, default_poses, fixed, on_base
+from osimlite.lint.skeleton import base_of
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, quantity
+from osimlite.schema.base import Component, Object
+from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
+from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.fields import Value
+from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.schema.frames import Body, Ground, StationDefinedFrame
+from osimlite.schema.markers import Station
+
+
+@rule("OSIM411", "degenerate-frame", severity=ERROR)
+def degenerate_frame(subject: Subject, found: Found) -> None:
+    """The points of a frame do not make a frame.
+
+    ## What it does
+    Reports frames laid through stations of which two of the three that give the axes are in the same place, or which
+    are fixed to different bodies.
+
+    ## Why is this bad
+    OpenSim refuses the model.
+
+    ## Example
+    ```xml
+    <ComponentSet>
+        <objects>
+            <Station name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
+            <Station name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
+            <Station name="c">
+                <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 0.1 0</location>
+            </Station>
+            <StationDefinedFrame name="segment">
+                <socket_point_a>/componentset/a</socket_point_a> <socket_point_b>/componentset/b</socket_point_b>
+                <socket_point_c>/componentset/c</socket_point_c>
+                <socket_origin_point>/componentset/a</socket_origin_point>
+            </StationDefinedFrame>
+        </objects>
+    </ComponentSet>
+    ```
+
+    ## Use instead
+    ```xml
+    <ComponentSet>
+        <objects>
+            <Station name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
+            <Station name="b">
+                <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.1 0 0</location>
+            </Station>
+            <Station name="c">
+                <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 0.1 0</location>
+            </Station>
+            <StationDefinedFrame name="segment">
+                <socket_point_a>/componentset/a</socket_point_a> <socket_point_b>/componentset/b</socket_point_b>
+                <socket_point_c>/componentset/c</socket_point_c>
+                <socket_origin_point>/componentset/a</socket_origin_point>
+            </StationDefinedFrame>
+        </objects>
+    </ComponentSet>
+    ```
+    """
+    for frame in subject.each(StationDefinedFrame):
+        points = [subject.target_of(frame, f"socket_{word}") for word in ("point_a", "point_b", "point_c")]
+        tags = ["socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"]
+        stations = [point for point in [*points, subject.target_of(frame, tags[3])] if isinstance(point, Station)]
+        places = [on_base(subject, subject.target_of(station, "socket_parent_frame")) for station in stations]
+        if len(stations) < 4:
+            continue
+        fixed_to = [place[0] if place is not None else None for place in places]
+        stray = next((n for n, base in enumerate(fixed_to) if base is not None and base is not fixed_to[0]), None)
+        if fixed_to[0] is not None and stray is not None:
+            found(
+                f"{called(stations[stray])} of {called(frame)} is fixed to {called(fixed_to[stray] or frame)}, "
+                f"{called(stations[0])} to {called(fixed_to[0])}: OpenSim refuses the model",
+                frame,
+                tag=tags[stray],
+            )
+            continue
+        spots = [
+            place[1].of(station.location) if place else None for place, station in zip(places, stations, strict=True)
+        ]
+        for one, other in combinations(range(3), 2):
+            if spots[one] is not None and spots[one] == spots[other]:
+                found(
+                    f"{tags[one]} and {tags[other]} of {called(frame)} are in the same place: OpenSim refuses "
+                    "the model",
+                    frame,
+                    tag=tags[other],
+                )
+                break
+
+
+@rule("OSIM521", "starts-in-contact", severity=INFO)
+def starts_in_contact(subject: Subject, found: Found) -> None:
+    """Contact surfaces are inside each other in the default pose.
+
+    ## What it does
+    Puts the model in its default pose and reports balls that start inside a half-space or another ball of their
+    contact force, by more than 1 mm and a tenth of the radius. It is a warning if the middle of the ball is inside.
+    Only bodies whose place plain arithmetic tells are looked at: those that hang on joints made of plain rotations and
+    translations, or on custom joints with constant, linear or polynomial functions. Meshes and other shapes are left
+    out.
+
+    ## Why is this bad
+    The contact pushes with full force from the first instant: the model is thrown up, and the integrator takes tiny
+    steps. Often the floor or a default value is in the wrong place.
+
+    ## Example
+    ```xml
+    <ContactSphere name="heel">
+        <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.38 0</location> <radius>0.05</radius>
+    </ContactSphere>
+    ```
+
+    ## Use instead
+    ```xml
+    <ContactSphere name="heel">
+        <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location> <radius>0.05</radius>
+    </ContactSphere>
+    ```
+    """
+    for force, surfaces in _contact_groups(subject):
+        for one, other in combinations(surfaces, 2):
+            ball, against = (one, other) if isinstance(one, ContactSphere) else (other, one)
+            if not isinstance(ball, ContactSphere):
+                continue
+            depth = _depth(subject, ball, against)
+            if depth is None or not depth > max(1e-3, 0.1 * ball.radius):
+                continue
+            sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
+            found(
+                f"{called(ball)} starts {quantity(1000 * depth, 'mm')} deep in {called(against)} of {called(force)}"
+                + (f"; its middle is inside, its radius is {quantity(1000 * ball.radius, 'mm')}" if sunk else ""),
+                ball,
+                attribute="name",
+                severity=WARNING if sunk else None,
+            )
+
+
+@rule("OSIM522", "lengths-in-millimetres", severity=WARNING)
+def lengths_in_millimetres(subject: Subject, found: Found) -> None:
+    """A length on a body is longer than ten metres.
+
+    ## What it does
+    Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground may be far away, and
+    prescribed or infinite values are not looked at.
+
+    ## Why is this bad
+    OpenSim works in metres. A place in millimetres is a thousand times too far out, and what is fixed there has a
+    lever arm to match.
+
+    ## Example
+    ```xml
+    <Marker name="asis">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>15 20 128</location>
+    </Marker>
+    ```
+
+    ## Use instead
+    ```xml
+    <Marker name="asis">
+        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>0.015 0.02 0.128</location>
+    </Marker>
+    ```
+    """
+    for cls, items in subject.by_class.items():
+        specs = [
+            spec
+            for spec in cls.field_specs().values()
+            if isinstance(spec.kind, Value) and spec.kind.unit == "m" and spec.kind.scalar == "double"
+        ]
+        for item in items if specs else ():
+            for spec in specs:
+                value = item.__dict__[spec.name]
+                numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
+                if not any(10 < abs(number) < math.inf for number in numbers) or not _on_body(subject, item):
+                    continue
+                better = " ".join(f"{number / 1000:.6g}" for number in numbers)
+                found(
+                    f"{subject.titled(item, spec)} is {quantity(value, 'm')}; in millimetres?",
+                    item,
+                    tag=spec.tag,
+                    suggestion=better,
+                )
+
+
+def _on_body(subject: Subject, item: Object) -> bool:
+    """Whether an object is fixed to a body, so that nothing about it can be ten metres long."""
+    owner: Component | None = subject.owner(item)
+    if isinstance(owner, Body):
+        return True
+    for tag in ("socket_parent_frame", "socket_parent", "socket_frame"):
+        if owner is not None and tag in type(owner).field_specs():
+            return isinstance(base_of(subject, subject.target_of(owner, tag)), Body)
+    above = subject.tree.parent_of(owner) if owner is not None else None
+    return isinstance(above, Body) and not isinstance(above, Ground)
+
+
+def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
+    """The surfaces that each contact force sets against each other."""
+    groups: dict[int, tuple[Component, list[ContactGeometry]]] = {}
+    for use in subject.uses:
+        if isinstance(use.owner, (HuntCrossleyForce, SmoothSphereHalfSpaceForce)):
+            target = subject.resolution(use).target
+            if isinstance(target, ContactGeometry):
+                group = groups.setdefault(id(use.owner), (use.owner, []))[1]
+                if not any(known is target for known in group):
+                    group.append(target)
+    yield from groups.values()
+
+
+def _depth(subject: Subject, ball: ContactSphere, other: ContactGeometry) -> float | None:
+    """How deep a ball is in another surface (m), negative if they are apart; None if nobody can tell."""
+    inner, outer = _in_ground(subject, ball), _in_ground(subject, other)
+    if inner is None or outer is None or inner[0] is outer[0]:
+        return None
+    centre = inner[1].position
+    if isinstance(other, ContactHalfSpace):
+        # It fills the side of its frame where x is positive.
+        return outer[1].inverse().of(centre)[0] + ball.radius
+    if isinstance(other, ContactSphere):
+        return ball.radius + other.radius - math.dist(centre, outer[1].position)
+    return None
+
+
+def _in_ground(subject: Subject, surface: ContactGeometry) -> tuple[Component, Pose] | None:
+    """The body a surface is fixed to, and where the surface is in ground."""
+    place = on_base(subject, subject.target_of(surface, "socket_frame"))
+    pose = default_poses(subject).get(id(place[0])) if place is not None else None
+    if place is None or pose is None:
+        return None
+    return place[0], pose.then(place[1]).then(fixed(surface.orientation, surface.location))

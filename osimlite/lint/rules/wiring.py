@@ -1,0 +1,206 @@
+"""OSIM33x: what is wired by position or by output: controllers with their actuators, inputs with outputs."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.fixes import replaced
+from osimlite.lint.outputs import outputs_of
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import a, called, times
+from osimlite.schema.base import Component, Unknown
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.frames import Frame
+from osimlite.schema.geometry import Geometry
+from osimlite.schema.tree import Use, normalised
+from osimlite.text import nearest
+
+
+@rule("OSIM331", "control-function-count", severity=ERROR)
+def control_function_count(subject: Subject, found: Found) -> None:
+    """A prescribed controller has not one function for each of its actuators.
+
+    ## What it does
+    Compares the number of control functions with the number of actuators. Controllers that read their controls from a
+    file are left out.
+
+    ## Why is this bad
+    The first function drives the first actuator, and so on; names play no part. OpenSim refuses the model where the
+    numbers differ.
+
+    ## Example
+    ```xml
+    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    <PrescribedController name="drive">
+        <socket_actuators>/forceset/motor</socket_actuators>
+        <FunctionSet name="ControlFunctions"> <objects /> </FunctionSet>
+    </PrescribedController>
+    ```
+
+    ## Use instead
+    ```xml
+    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    <PrescribedController name="drive">
+        <socket_actuators>/forceset/motor</socket_actuators>
+        <FunctionSet name="ControlFunctions">
+            <objects> <Constant name="motor"> <value>0.1</value> </Constant> </objects>
+        </FunctionSet>
+    </PrescribedController>
+    ```
+    """
+    for controller in subject.each(PrescribedController):
+        functions, actuators = len(controller.ControlFunctions.objects), len(controller.socket_actuators)
+        if controller.controls_file is None and functions != actuators:
+            found(
+                f"{called(controller)} has {times(functions, 'control function')} for {times(actuators, 'actuator')}: "
+                "OpenSim refuses the model",
+                controller.ControlFunctions if functions else controller,
+            )
+
+
+@rule("OSIM332", "broken-input", severity=ERROR)
+def broken_input(subject: Subject, found: Found) -> None:
+    """An input names an output that does not exist.
+
+    ## What it does
+    Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and one of its outputs
+    of the type that the input takes.
+
+    ## Why is this bad
+    OpenSim refuses the model when it is connected. Paths are absolute or begin at the component with the input. It
+    also refuses an input of a geometry that a frame draws.
+
+    ## Example
+    ```xml
+    <components>
+        <TableReporter__double_ name="table">
+            <input_inputs>/jointset/knee/knee_angle|velocity</input_inputs>
+        </TableReporter__double_>
+    </components>
+    ```
+
+    ## Use instead
+    ```xml
+    <components>
+        <TableReporter__double_ name="table">
+            <input_inputs>/jointset/knee/knee_angle|speed</input_inputs>
+        </TableReporter__double_>
+    </components>
+    ```
+    """
+    for use in subject.uses:
+        if use.reference.rule != "input" or not isinstance(use.value, str) or not use.value:
+            continue
+        fault = _fault_of(subject, use, use.value)
+        if fault is None:
+            continue
+        value = getattr(use.holder, use.spec.name)
+        nth = value[: use.position].count(use.value) if isinstance(value, tuple) else 0
+        place = subject.position(use.holder, tag=use.spec.tag, word=use.value, nth=nth)
+        found(
+            f"{called(use.holder)}: {use.spec.tag} names '{use.value}'{fault.message}",
+            use.holder,
+            at=place,
+            suggestion=fault.suggestion,
+            fix=replaced(subject.source, place, fault.suggestion, safe=False),
+        )
+
+
+@rule("OSIM333", "connected-twice", severity=ERROR)
+def connected_twice(subject: Subject, found: Found) -> None:
+    """A list of sockets names the same component twice.
+
+    ## What it does
+    Reports every mention of an actuator after the first in the list of one controller.
+
+    ## Why is this bad
+    OpenSim refuses the model when it is connected.
+
+    ## Example
+    ```xml
+    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    <PrescribedController name="drive">
+        <socket_actuators>/forceset/motor /forceset/motor</socket_actuators>
+        <FunctionSet name="ControlFunctions">
+            <objects> <Constant name="a" /> <Constant name="b" /> </objects>
+        </FunctionSet>
+    </PrescribedController>
+    ```
+
+    ## Use instead
+    ```xml
+    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    <PrescribedController name="drive">
+        <socket_actuators>/forceset/motor</socket_actuators>
+        <FunctionSet name="ControlFunctions"> <objects> <Constant name="a" /> </objects> </FunctionSet>
+    </PrescribedController>
+    ```
+    """
+    seen: dict[tuple[int, str], list[tuple[Component, str]]] = {}
+    for use in subject.uses:
+        if use.reference.rule != "socket" or use.position is None:
+            continue
+        target = subject.resolution(use).target
+        if target is None:
+            continue
+        text = use.value if isinstance(use.value, str) else use.value.name
+        known = seen.setdefault((id(use.holder), use.spec.tag), [])
+        if any(other is target for other, _ in known):
+            found(
+                f"{called(use.holder)} lists {called(target)} again: OpenSim refuses the model",
+                use.holder,
+                tag=use.spec.tag,
+                word=text,
+                nth=sum(1 for _, word in known if word == text),
+            )
+        known.append((target, text))
+
+
+class _Fault(NamedTuple):
+    """What is wrong with the text of an input, and a text that would be right."""
+
+    message: str
+    suggestion: str | None = None
+
+
+# The path of a component, a bar, an output, a channel of it and another name for it; the last two may be left out.
+_INPUT = re.compile(r"(?:(?P<path>.*)\|)?(?P<output>[^|:(]*)(?::(?P<channel>[^(]*))?(?:\((?P<alias>.*)\))?")
+
+
+def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
+    match = _INPUT.fullmatch(text)
+    if match is None or match["path"] is None:
+        return _Fault("; an input wants the path of a component, a bar and an output")
+    tree, path = subject.tree, match["path"]
+    base = tree.path_of(use.owner) or "/"
+    whole = normalised(path if path.startswith("/") else f"{base}/{path}")
+    component = tree.by_path.get(whole) if whole is not None else None
+    if component is None:
+        if subject.has_unknown:
+            return None
+        right = nearest(path, [known for known, item in tree.by_path.items() if outputs_of(type(item))])
+        return _Fault(f", but there is no component '{path}'", text.replace(path, right, 1) if right else None)
+    if isinstance(component, Unknown):
+        return None
+    outputs = outputs_of(type(component))
+    kind = use.reference.target
+    known = outputs.get(match["output"])
+    if known is None:
+        right = nearest(match["output"], [name for name, output in outputs.items() if output.type == kind])
+        suggestion = None if right is None else f"{path}|{right}" + text[match.end("output") :]
+        return _Fault(f", but {called(component)} has no output '{match['output']}'", suggestion)
+    if known.type != kind:
+        return _Fault(f", which is {_a_type(known.type)}, not {_a_type(kind)}")
+    if match["channel"] and not known.channels:
+        return _Fault(f", but that output has no channel '{match['channel']}'")
+    parent = tree.parent_of(use.owner)
+    if isinstance(use.owner, Geometry) and isinstance(parent, Frame):
+        held = any(item is use.owner for item in parent.subcomponents)
+        return None if held else _Fault(f"; {called(parent)} draws it and moves it already: OpenSim refuses the model")
+    return None
+
+
+def _a_type(kind: str) -> str:
+    return "a number" if kind == "double" else a(kind)

@@ -1,0 +1,32 @@
+"""Where the validator thinks bodies are in the default pose is where OpenSim has them."""
+
+from __future__ import annotations
+
+import gzip
+import json
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.document.survey import survey
+from osimlite.lint.placement import default_poses
+from osimlite.lint.subject import Subject
+from osimlite.schema.constraints import Constraint
+from osimlite.schema.frames import Body
+from tests.conftest import CorpusModel
+
+
+def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    subject = Subject(survey(Source(gzip.decompress(corpus_model.converted.read_bytes()))))
+    if next(subject.each(Constraint), None) is not None:
+        pytest.skip("OpenSim assembles this model, which moves it")
+    truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))["default_pose"]["body_xform"]
+    poses = default_poses(subject)
+    for body in subject.each(Body):
+        if id(body) in poses and subject.path(body) in truth:
+            pose = poses[id(body)]
+            position, rotation = truth[subject.path(body)]
+            assert pose.position == pytest.approx(position, abs=1e-8), body.name
+            assert [number for row in pose.rotation for number in row] == pytest.approx(rotation, abs=1e-8), body.name

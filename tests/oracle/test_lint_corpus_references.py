@@ -1,0 +1,193 @@
+"""References of real models, broken at random: the validator's verdict is OpenSim's.
+
+A few hundred cases by default; ``OSIMLITE_BREAKAGES=2000`` asks for that many.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.document.survey import survey
+from osimlite.lint import validate
+from osimlite.lint.subject import Subject
+from tests.conftest import CorpusModel
+
+pytestmark = pytest.mark.oracle
+
+WANTED = int(os.environ.get("OSIMLITE_BREAKAGES", "250"))
+# Of the few hundred; whoever asks for more waits for them.
+SECONDS = 90 if "OSIMLITE_BREAKAGES" not in os.environ else 3600
+
+# Errors that OpenSim passes over in silence, and computes something other than what the text says.
+SILENT = {"OSIM311", "OSIM322", "OSIM406", "OSIM410"}
+SILENTLY = "OpenSim switches the whole probe off"
+# Said by Simbody when a model whose references all lead somewhere cannot take its first pose: constraints that cannot
+# be met, a cable with no way around its obstacles.
+ASSEMBLY = ("projectQ", "CableSpan")
+
+
+class Place(NamedTuple):
+    """A word of the text that names a component: what kind of reference it is, and where it stands."""
+
+    kind: str
+    start: int
+    word: str
+
+
+class Breakage(NamedTuple):
+    """A changed text, and what was done to it."""
+
+    what: str
+    text: str
+
+
+class Victim(NamedTuple):
+    """A model to break: its text, where it is kept with the files it needs, its references by kind."""
+
+    name: str
+    folder: Path
+    text: str
+    places: dict[str, list[Place]]
+    names: list[str]
+
+
+def places_of(source: Source) -> Iterator[Place]:
+    """Every reference in a document that stands in its text."""
+    subject = Subject(survey(source))
+    seen = set()
+    for use in subject.uses:
+        if use.reference.rule in ("file", "column", "positional", "point-index", "input"):
+            continue
+        number = use.holder._index
+        if number is None or not isinstance(use.value, str):
+            continue
+        if use.spec.name == "name":
+            line, column, _ = source.of_attribute(number, "name")
+            start, kind = source.line_start(line) + column - 1, f"{type(use.holder).__name__}.name"
+        else:
+            element = source.child(number, use.spec.tag)
+            if element is None:
+                continue
+            span = source.spans[element]
+            start = source.text.find(use.value, span.tag_end, span.inner_end)
+            kind = f"{use.spec.declared_in.__name__}.{use.spec.tag}"
+        if source.text.startswith(use.value, start) and start >= 0 and start not in seen:
+            seen.add(start)
+            yield Place(kind, start, use.value)
+
+
+def victim(model: CorpusModel, folder: Path) -> Victim | None:
+    """A model that OpenSim loads, in OpenSim's own print of it; None if the validator finds errors in it as it is."""
+    if model.converted is None:
+        return None
+    folder.mkdir()
+    for other in model.path.parent.iterdir():
+        if other.is_file() and other != model.path:
+            shutil.copy(other, folder / other.name)
+    text = gzip.decompress(model.converted.read_bytes()).decode()
+    source = Source(text.encode())
+    if not validate(source).ok:
+        return None
+    places: dict[str, list[Place]] = {}
+    for place in places_of(source):
+        places.setdefault(place.kind, []).append(place)
+    names = sorted({place.word for group in places.values() for place in group})
+    return Victim(model.id, folder, text, places, names) if names else None
+
+
+CHANGES: tuple[Callable[[random.Random, str, list[str]], str], ...] = (
+    lambda draw, word, names: word[: (at := draw.randrange(len(word)))] + word[at + 1 :],
+    lambda draw, word, names: word[: (at := draw.randrange(len(word)))] + word[at] + word[at:],
+    lambda draw, word, names: word[: (at := draw.randrange(len(word)))] + word[at:].swapcase(),
+    lambda draw, word, names: word.lower(),
+    lambda draw, word, names: draw.choice(names),
+    lambda draw, word, names: draw.choice(names),
+    lambda draw, word, names: draw.choice(names).rpartition("/")[2],
+    lambda draw, word, names: word.rpartition("/")[2],
+    lambda draw, word, names: word.rpartition("/")[0],
+    lambda draw, word, names: word.lstrip("/"),
+    lambda draw, word, names: f"/{word}",
+    lambda draw, word, names: f"{word}/",
+    lambda draw, word, names: f"{word},",
+    lambda draw, word, names: word.replace("/", "//"),
+    lambda draw, word, names: f"./{word}",
+    lambda draw, word, names: f"../{word}",
+    lambda draw, word, names: f"../../{word.lstrip('/')}",
+    lambda draw, word, names: f"/bodyset/{word}",
+    lambda draw, word, names: f"/forceset/{word}",
+    lambda draw, word, names: f"/contactgeometryset/{word}",
+    lambda draw, word, names: f" {word} ",
+    lambda draw, word, names: f"{word[: len(word) // 2]} {word[len(word) // 2 :]}",
+    lambda draw, word, names: f"{word}*",
+    lambda draw, word, names: "/ground",
+    lambda draw, word, names: "all",
+    lambda draw, word, names: "UNASSIGNED",
+    lambda draw, word, names: "",
+)
+
+
+def broken(model: Victim, draw: random.Random) -> Breakage:
+    """One reference of a model changed; rare kinds of reference as often as common ones."""
+    place = draw.choice(model.places[draw.choice(sorted(model.places))])
+    new = draw.choice(CHANGES)(draw, place.word, model.names)
+    text = model.text[: place.start] + new + model.text[place.start + len(place.word) :]
+    return Breakage(f"{model.name} {place.kind}: '{place.word}' -> '{new}'", text)
+
+
+@pytest.fixture(scope="module")
+def opensim_says() -> Iterator[Callable[[Path], str | None]]:
+    """Asks OpenSim about a file: None if it takes it, else what it says."""
+    pytest.importorskip("opensim")
+    command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_verdicts.py"))]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None and process.stdout is not None
+
+        def ask(path: Path) -> str | None:
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(f"{path}\n")
+            process.stdin.flush()
+            answer = json.loads(process.stdout.readline())
+            assert answer is None or isinstance(answer, str)
+            return answer
+
+        yield ask
+        process.stdin.close()
+
+
+@pytest.mark.timeout(SECONDS + 300)
+def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(corpus, opensim_says, tmp_path):
+    victims = [found for model in corpus if (found := victim(model, tmp_path / model.id)) is not None]
+    draw = random.Random(int(os.environ.get("OSIMLITE_SEED", "1")))
+    wrong, refused, asked = [], 0, 0
+    end = time.monotonic() + SECONDS
+    while asked < WANTED and time.monotonic() < end:
+        model = victims[asked % len(victims)]
+        what, text = broken(model, draw)
+        path = model.folder / "model.osim"
+        path.write_text(text, encoding="utf-8")
+        message = opensim_says(path)
+        asked += 1
+        if message is not None and any(words in message for words in ASSEMBLY):
+            message = None
+        report = validate(path)
+        errors = [f for f in report.errors if f.code not in SILENT and SILENTLY not in f.message]
+        refused += message is not None
+        if bool(errors) != (message is not None):
+            ours = "; ".join(map(str, errors)) or "no error"
+            wrong.append(f"{what}\n  OpenSim: {(message or 'takes it').splitlines()[0][:300]}\n  here: {ours}")
+    print(f"{asked} cases, {refused} refused by OpenSim, {len(wrong)} with another verdict")
+    assert asked == WANTED or "OSIMLITE_BREAKAGES" not in os.environ
+    assert not wrong, f"{len(wrong)} of {asked}:\n" + "\n".join(wrong)
