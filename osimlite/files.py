@@ -33,8 +33,12 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     Raises:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
-    target = Path(path)
+    # A link stays a link to the file that is written; a pipe or a device takes the text as it is.
+    target = Path(os.path.realpath(path))
     data = content.encode() if isinstance(content, str) else content
+    if target.exists() and not target.is_file():
+        _write_into(target, data)
+        return
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     except OSError as error:
@@ -51,6 +55,31 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def make_folder(path: str | Path) -> Path:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises:
+        OsimliteError: it cannot be made; the message says why.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        file = next((place for place in (folder, *folder.parents) if place.exists() and not place.is_dir()), None)
+        reason = "this is a file, not a folder" if file is not None else error.strerror
+        raise OsimliteError(f"cannot make a folder here: {reason}", file=str(file or folder)) from None
+    return folder
+
+
+def _write_into(target: Path, data: bytes) -> None:
+    if target.is_dir():
+        raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(target))
+    try:
+        target.write_bytes(data)
+    except OSError as error:
+        raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
 
 
 def _umask() -> int:

@@ -8,6 +8,8 @@ from pathlib import Path
 from rich.console import Console
 
 from osimlite.document.reader import read
+from osimlite.errors import OsimliteError
+from osimlite.files import make_folder
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.recorded import RecordedMotion
 from osimlite.simulation.storage import StoTable, write_sto
@@ -16,12 +18,15 @@ from osimlite.text import listed
 
 def opened(file: Path, motion: Path) -> RecordedMotion:
     """The motion of the model."""
-    return RecordedMotion.read(build_mechanism(read(file)), motion)
+    recorded = RecordedMotion.read(build_mechanism(read(file)), motion)
+    if not len(recorded.times):
+        raise OsimliteError("the motion has no rows", file=str(motion))
+    return recorded
 
 
 def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path) -> None:
     """Write tables into a folder and say what they are made from."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for name, table in tables.items():
         write_sto(
             folder / name, table.name, table.times, table.columns, table.rows.tolist(), in_degrees=table.in_degrees

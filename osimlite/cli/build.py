@@ -12,13 +12,19 @@ def build(
     source: Annotated[
         str | None,
         typer.Argument(
-            help="A built-in model (see --list), a Python file or module:function that returns a Model, or YAML or JSON.",
+            help="A built-in model (see --list), a Python file or module:function that returns a Model, "
+            "or a YAML or JSON file.",
             show_default=False,
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="File to write; default is <model name>.osim here.", show_default=False),
+        typer.Option(
+            "-o",
+            "--output",
+            help="File to write, - for standard output; default is <model name>.osim here.",
+            show_default=False,
+        ),
     ] = None,
     parameter: Annotated[
         list[str] | None,
@@ -37,16 +43,17 @@ def build(
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
-    from osimlite.document.printer import write
+    from osimlite.document.printer import Numbers, to_text, write
     from osimlite.errors import OsimliteError
     from osimlite.lint import validate
     from osimlite.models import BUILT_IN
     from osimlite.models.source import describe, make_model
 
     if list_models:
-        width = max(map(len, BUILT_IN))
+        import textwrap
+
         for name in BUILT_IN:
-            typer.echo(f"{name:{width}}  {describe(name)}")
+            typer.echo(textwrap.fill(f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)))
         return
     if source is None:
         raise OsimliteError("name a model to build, or use --list")
@@ -66,7 +73,13 @@ def build(
         typer.echo(render(report, "full"), err=True)
         typer.echo(f"osimlite: '{source}' has errors; nothing was written", err=True)
         raise typer.Exit(1)
+    style: Numbers = "opensim" if numbers == "opensim" else "shortest"
+    if str(output) == "-":
+        typer.echo(to_text(model, numbers=style), nl=False)
+        return
     target = output or Path(f"{model.name or 'model'}.osim")
-    write(model, target, numbers="opensim" if numbers == "opensim" else "shortest")
+    write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
-    typer.echo(f"{target}: {count} components, {len(report.findings)} remarks")
+    warnings = len(report.warnings)
+    advice = f"; {warnings} warning{'s' * (warnings != 1)}: see osimlite validate {target}" if warnings else ""
+    typer.echo(f"{target}: {count} components{advice}")

@@ -35,12 +35,13 @@ def demo(
     from rich.console import Console
 
     from osimlite._require import require
+    from osimlite.files import make_folder
 
     if find_spec("pybullet") is None:
         require("pybullet", extra="sim", purpose="the simulation")
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
-    output.mkdir(parents=True, exist_ok=True)
+    make_folder(output)
     tour = _Tour(Console(), output)
     model, trajectory = _work(tour)
     if pictures:

@@ -39,7 +39,12 @@ def diff(
         title, (old, new) = "", files
     else:
         raise OsimliteError("diff takes two model files")
-    models = [Model() if str(file) == "/dev/null" else read(file) for file in (old, new)]
+    try:
+        models = [Model() if str(file) == "/dev/null" else read(file) for file in (old, new)]
+    except OsimliteError as error:
+        # 1 says that the models differ.
+        typer.echo(f"osimlite: {error}", err=True)
+        raise typer.Exit(2) from None
     found = differences(models[0], models[1])
     if git:
         typer.echo(f"--- {title}\n+++ {title}")

@@ -122,6 +122,10 @@ def quantities(words: Sequence[str], mechanism: Mechanism, option: str) -> dict[
     return found
 
 
+PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}
+"""What --plot and --animate draw."""
+
+
 def _write(
     console: Console, model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool
 ) -> list[Path]:
@@ -130,10 +134,11 @@ def _write(
     import tempfile
 
     from osimlite.errors import OsimliteError
+    from osimlite.files import make_folder
 
     is_new = not folder.exists()
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         beside = Path(tempfile.mkdtemp(prefix=".osimlite-", dir=folder))
     except OSError as error:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
@@ -150,6 +155,9 @@ def _write(
                 written.append(draw(model, trajectory, beside / "animation.gif", progress=progress))
         for path in written:
             path.replace(folder / path.name)
+        # Pictures of an earlier simulation would be taken for those of this one.
+        for name in PICTURES - {path.name for path in written}:
+            (folder / name).unlink(missing_ok=True)
     except BaseException:
         shutil.rmtree(folder if is_new else beside, ignore_errors=True)
         raise

@@ -187,4 +187,8 @@ def has_content(value: Any) -> bool:
         return False
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True
-    return any(has_content(held) for _, held in value.objects_held())
+    # The member of a list is content even if nothing in it was set: a set of one marker at the origin has a marker.
+    return any(
+        (isinstance(spec.kind, Held) and spec.kind.form in ("list", "optional")) or has_content(held)
+        for spec, held in value.objects_held()
+    )

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from lxml import etree
 
@@ -29,6 +29,8 @@ OLDEST = 10500
 
 OLDEST_KNOWN = 10901
 """The oldest version whose every word is known; of an older document nothing may be left over."""
+
+_COUNT = etree.XPath("count(descendant-or-self::*)")
 
 _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
@@ -191,13 +193,18 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         root = etree.fromstring(body, parser)
     except etree.XMLSyntaxError as error:
         line, column = error.position
-        message = _plain_words(str(error.msg or "the text is not XML")) if body else "the file is empty"
+        if not body:
+            raise NotWellFormedError("the file is empty", file=source.file, line=1, column=1) from None
+        message = _plain_words(str(error.msg or "the text is not XML"))
+        if "<" not in source.text:
+            message = "there is no element in it"
         raise NotWellFormedError(
             f"not well-formed XML: {message}", file=source.file, line=max(line, 1) + blank, column=max(column, 1)
         ) from None
     if root is None:
         raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
-    source.well_formed = not recover
+    if not recover:
+        source.elements = int(cast("float", _COUNT(root)))
     return root
 
 

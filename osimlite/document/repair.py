@@ -60,7 +60,7 @@ def read_repaired(
             "not well-formed XML: what begins here with '<!' has no end", file=source.file, line=line, column=column
         )
     text, repairs = repaired(source.text)
-    if not repairs:
+    if not repairs or not source.spans:
         raise fault
     root = parse(Source(text.encode("utf-8", "replace"), source.file))
     spans = source.spans

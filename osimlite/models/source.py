@@ -6,7 +6,8 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
@@ -37,7 +38,9 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
         return read_data(source)
     function = _function(source)
     arguments = _arguments(function, parameters or {}, source)
-    model = function(**arguments)
+    file = inspect.getsourcefile(function)
+    with _errors_placed(str(file)):
+        model = function(**arguments)
     if not isinstance(model, Model):
         raise OsimliteError(f"'{source}' returned a {type(model).__name__}, not an osimlite.Model")
     return model
@@ -82,18 +85,17 @@ def _module_of_file(path: Path) -> ModuleType:
     sys.path.insert(0, str(path.resolve().parent))
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
-    except OsimliteError:
-        raise
-    except Exception as error:
-        line = _line_in(error, str(path))
-        raise OsimliteError(f"{type(error).__name__}: {error}", file=str(path), line=line) from error
+        with _errors_placed(str(path)):
+            spec.loader.exec_module(module)
     finally:
         sys.path.pop(0)
     return module
 
 
 def _module_named(name: str) -> ModuleType:
+    # `python -m osimlite` finds modules in the current folder; so must the command of that name.
+    if "" not in sys.path:
+        sys.path.insert(0, "")
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -140,6 +142,13 @@ def _arguments(function: Callable[..., Any], parameters: Mapping[str, str], sour
             hint = did_you_mean(name, known) or f"; it has {listed(known) or 'none'}"
             raise OsimliteError(f"'{source}' has no parameter '{name}'{hint}")
         arguments[name] = _value(name, text, known[name])
+    for name, parameter in known.items():
+        optional = parameter.default is not parameter.empty or parameter.kind in (
+            parameter.VAR_POSITIONAL,
+            parameter.VAR_KEYWORD,
+        )
+        if name not in arguments and not optional:
+            raise OsimliteError(f"'{source}' needs its parameter '{name}'; give it with -p {name}=VALUE")
     return arguments
 
 
@@ -157,6 +166,19 @@ def _value(name: str, text: str, parameter: inspect.Parameter) -> Any:
             return text
         noun = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
         raise OsimliteError(f"parameter '{name}' must be {noun}, got '{text}'") from None
+
+
+@contextmanager
+def _errors_placed(file: str) -> Iterator[None]:
+    """Tell of any error in the user's own code with the file and the line of it."""
+    try:
+        yield
+    except OsimliteError as error:
+        if error.file is None:
+            error.file, error.line = file, _line_in(error, file)
+        raise
+    except Exception as error:
+        raise OsimliteError(f"{type(error).__name__}: {error}", file=file, line=_line_in(error, file)) from error
 
 
 def _line_in(error: BaseException, file: str) -> int | None:

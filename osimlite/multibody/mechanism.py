@@ -8,6 +8,7 @@ scapulothoracic joints, whose rotational speeds are the angular velocity of the 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -94,14 +95,20 @@ class Mechanism:
     # ------------------------------------------------------------------------------------ names and states
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names in the order of all arrays."""
-        return tuple(info.name for info in self.coordinates)
+        """Names in the order of all arrays; of coordinates that share a name, the paths."""
+        counts = Counter(info.name for info in self.coordinates)
+        return tuple(info.name if counts[info.name] == 1 else info.path for info in self.coordinates)
 
     def coordinate_index(self, name: str) -> int:
-        """Place of a coordinate, by its name or absolute path; of several with one name, that of the first."""
+        """Place of a coordinate, by its absolute path, or by its name if no other has it."""
         try:
             return self._coordinate_places[name]
         except KeyError:
+            alike = [info.path for info in self.coordinates if info.name == name]
+            if alike:
+                raise ModelError(
+                    f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(alike)}"
+                ) from None
             near = did_you_mean(name, self.coordinate_names)
             raise ModelError(f"'{self.name}' has no coordinate '{name}'{near}") from None
 
@@ -311,8 +318,7 @@ class Mechanism:
     @cached_property
     def _coordinate_places(self) -> dict[str, int]:
         places = {info.path: index for index, info in enumerate(self.coordinates)}
-        for index, info in enumerate(self.coordinates):
-            places.setdefault(info.name, index)
+        places.update((name, index) for index, name in enumerate(self.coordinate_names))
         return places
 
     @cached_property

@@ -14,7 +14,7 @@ from osimlite.schema.fields import Single, Text, Unnamed, Vec3, epoch, real, vec
 from osimlite.schema.forces import ForceSet
 from osimlite.schema.frames import BodySet, Ground
 from osimlite.schema.geometry import ModelVisualPreferences
-from osimlite.schema.joints import JointSet
+from osimlite.schema.joints import Joint, JointSet
 from osimlite.schema.markers import MarkerSet
 from osimlite.schema.probes import ProbeSet
 from osimlite.schema.sets import ComponentSet
@@ -131,5 +131,9 @@ class Model(ModelComponent):
                 if not isinstance(component, ModelComponent):
                     raise ModelError(f"a model has no place for a {type(component).__name__}")
                 self.component_set.objects.append(component)
+            if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
+                # As in OpenSim's API: a file that leaves them out would call them all alike.
+                for number, coordinate in enumerate(component.coordinates):
+                    coordinate.name = f"{component.name}_coord_{number}"
             object.__setattr__(component, "_model", self)
         return components[0]

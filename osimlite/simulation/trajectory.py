@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from osimlite._require import require
-from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
+from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.storage import sto_text
@@ -136,10 +135,7 @@ class Trajectory:
             "forces.sto": self.forces_text(),
             "summary.json": json.dumps(self.summary, indent=2, ensure_ascii=False) + "\n",
         }
-        try:
-            base.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(base)) from None
+        make_folder(base)
         for name, text in texts.items():
             write_atomically(base / name, text)
         return [base / name for name in texts]

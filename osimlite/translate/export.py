@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
+from osimlite.files import make_folder, write_atomically
 from osimlite.multibody import build_mechanism
 from osimlite.schema.model import Model
 from osimlite.translate.collisions import collect_collisions
@@ -64,10 +64,7 @@ class Urdf:
         urdf, account = base / f"{self.name}.urdf", base / "fidelity.json"
         meshes = [(base / name, content) for name, content in self.files.items()]
         for parent in sorted({base, *(path.parent for path, _ in meshes)}):
-            try:
-                parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(parent)) from None
+            make_folder(parent)
         for path, content in meshes:
             write_atomically(path, content)
         coordinates = base / f"{self.name}.coordinates.json"

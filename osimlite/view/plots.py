@@ -197,7 +197,8 @@ def _style(number: int) -> dict[str, Any]:
 
 def _lines(panel: Any, times: Array, lines: Mapping[str, Array]) -> None:
     for number, (label, column) in enumerate(lines.items()):
-        panel.plot(times, column, label=label, **_style(number))
+        # Matplotlib leaves a label that begins with an underscore out of the legend.
+        panel.plot(times, column, label=f" {label}" if label.startswith("_") else label, **_style(number))
     # Beside the panel, where it covers no data.
     panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9)
 

@@ -132,3 +132,41 @@ def test_build_takes_data(fixtures: Path, tmp_path: Path) -> None:
     code, _, error = run("build", "w.json", "-p", "a=1", folder=tmp_path)
     assert code == 2 and "takes no parameters" in error
     assert run("build", "nowhere.yaml", folder=tmp_path)[0] == 2
+
+
+def test_errors_in_the_users_own_code_have_their_place(tmp_path: Path) -> None:
+    for text, words in {
+        "import osimlite\ndef m():\n    return osimlite.Bdy(name='b')\n": "mine.py:3: AttributeError",
+        "import osimlite\ndef m():\n    return osimlite.Body(mas=1.0)\n": "mine.py:3: Body has no property 'mas'",
+        "import osimlite\ndef m(n):\n    return osimlite.Model(name=n)\n": "-p n=VALUE",
+    }.items():
+        (tmp_path / "mine.py").write_text(text)
+        code, _, error = run("build", "mine.py", folder=tmp_path)
+        assert code in (1, 2) and words in error
+
+
+def test_build_writes_to_standard_output_and_through_links(tmp_path: Path) -> None:
+    (tmp_path / "real.osim").write_text("before")
+    (tmp_path / "link.osim").symlink_to("real.osim")
+    assert run("build", "dynamic-walker", "-o", "link.osim", folder=tmp_path)[0] == 0
+    assert (tmp_path / "link.osim").is_symlink()
+    code, out, _ = run("build", "dynamic-walker", "-o", "-", folder=tmp_path)
+    assert code == 0 and out == (tmp_path / "real.osim").read_text()
+    assert not (tmp_path / "-").exists()
+
+
+def test_folders_that_cannot_be_made_are_named(fixtures: Path, tmp_path: Path) -> None:
+    (tmp_path / "afile").write_text("")
+    model = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    for words in (("simulate", model, "--to", "0.01"), ("demo", "--no-pictures"), ("translate", model)):
+        for place in ("afile", "afile/sub"):
+            code, _, error = run(*words, "-o", place, folder=tmp_path)
+            assert code == 2 and "afile: cannot make" in error, (words, error)
+
+
+def test_diff_of_what_cannot_be_read_is_no_difference(fixtures: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty.osim").write_text("")
+    (tmp_path / "text.osim").write_text("hello\n")
+    model = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    assert run("diff", model, "empty.osim", folder=tmp_path)[0] == 2
+    assert "no element in it" in run("info", "text.osim", folder=tmp_path)[2]

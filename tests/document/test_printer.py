@@ -110,3 +110,20 @@ def test_writing_is_whole_or_not_at_all(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["m.osim"]
     with pytest.raises(OsimliteError, match="cannot write here"):
         osimlite.write(Model(name="m"), tmp_path / "no" / "m.osim")
+
+
+def test_members_with_nothing_but_defaults_are_members_all_the_same() -> None:
+    model = Model(name="m")
+    model.add(osimlite.Marker(name="a"), osimlite.HuntCrossleyForce(name="f"))
+    again = osimlite.read_text(osimlite.to_text(model))
+    assert [c.path for c in again.components()] == [c.path for c in model.components()]
+    assert "Joint" not in osimlite.to_text(Model(name="m"))
+
+
+def test_coordinates_that_a_joint_makes_itself_have_names_of_their_own() -> None:
+    model = Model(name="m")
+    a = model.add(Body(name="a", mass=1.0))
+    model.add(PinJoint(name="hinge").between(model.ground, a))
+    assert [c.name for c in osimlite.read_text(osimlite.to_text(model)).components(osimlite.Coordinate)] == [
+        "hinge_coord_0"
+    ]

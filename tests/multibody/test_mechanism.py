@@ -37,12 +37,15 @@ def test_names_left_out_take_their_default():
     )
 
 
-def test_of_two_coordinates_with_one_name_the_first_is_meant():
+def test_two_coordinates_with_one_name_are_told_apart_by_their_paths():
     tree = mixed_tree()
     twice = (*tree.coordinates[:-1], dataclasses.replace(tree.coordinates[-1], name="a1"))
     tree = Mechanism(tree.name, tree.bodies, twice)
-    assert tree.coordinate_index("a1") == 0
+    assert tree.coordinate_index(twice[0].path) == 0
     assert tree.coordinate_index(twice[-1].path) == len(twice) - 1
+    assert tree.coordinate_names[0] == twice[0].path and tree.coordinate_names[1] == twice[1].name
+    with pytest.raises(ModelError, match="several coordinates 'a1'"):
+        tree.coordinate_index("a1")
 
 
 @pytest.mark.parametrize(
