@@ -1,0 +1,208 @@
+"""Force elements without OpenSim: what is refused by name, what conserves energy, what depends on time."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import Body, Coordinate, Model, PinJoint, SliderJoint
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.multibody import build_mechanism
+from osimlite.schema.actuators import ActivationCoordinateActuator, BodyActuator, CoordinateActuator
+from osimlite.schema.controller_types import ControlSetController, PrescribedController
+from osimlite.schema.functions import Constant, Function, LinearFunction, PolynomialFunction, SimmSpline, Sine
+from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
+from osimlite.schema.springs import (
+    BushingForce,
+    ExpressionBasedCoordinateForce,
+    FunctionBasedBushingForce,
+    PointToPointSpring,
+    SpringGeneralizedForce,
+)
+from osimlite.simulation.elements import force_elements
+
+
+def arm() -> Model:
+    """Two pendulums on a slide."""
+    model = Model(name="arm")
+    below = model.ground
+    for number, kind in enumerate((SliderJoint, PinJoint, PinJoint)):
+        inertia = (0.02, 0.02, 0.02, 0, 0, 0)
+        body = model.add(Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia))
+        joint = kind(name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)])
+        model.add(joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0, 0, 0.2)))
+        below = body
+    return model
+
+
+def path(*points) -> GeometryPath:
+    found = GeometryPath(name="path")
+    found.path_point_set.objects += points
+    return found
+
+
+def straight(*more) -> GeometryPath:
+    start = PathPoint(name="start", socket_parent_frame="/ground", location=(0.5, 0.1, 0.0))
+    end = PathPoint(name="end", socket_parent_frame="/bodyset/b2", location=(0.0, -0.3, 0.1))
+    return path(start, *more, end)
+
+
+def controlled(controller) -> tuple:
+    controller.socket_actuators = ("/forceset/a",)
+    return CoordinateActuator(name="a", coordinate="q0"), controller
+
+
+def prescribed(function: Function, **more) -> PrescribedController:
+    controller = PrescribedController(name="c", **more)
+    controller.ControlFunctions.objects.append(function)
+    return controller
+
+
+def wrapped() -> PathSpring:
+    force = PathSpring(name="a", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=straight())
+    force.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball"))
+    return force
+
+
+def by_body() -> tuple:
+    controller = prescribed(Constant(value=1.0))
+    controller.socket_actuators = ("/forceset/a",)
+    return BodyActuator(name="a", socket_body="/bodyset/b0"), controller
+
+
+SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (wrapped, r"'/forceset/a' \(PathSpring that wraps around 'ball'\)"),
+        (
+            lambda: PathSpring(name="a", **SPRING, geometry_path=straight(ConditionalPathPoint(name="c"))),
+            r"'/forceset/a' \(PathSpring with the ConditionalPathPoint 'c'\)",
+        ),
+        (
+            lambda: Ligament(name="a", resting_length=1.0, geometry_path=straight(MovingPathPoint(name="m"))),
+            r"'/forceset/a' \(Ligament with the MovingPathPoint 'm'\)",
+        ),
+        (
+            lambda: ActivationCoordinateActuator(name="a", coordinate="q0"),
+            r"'/forceset/a' \(ActivationCoordinateActuator\)",
+        ),
+        (
+            lambda: controlled(ControlSetController(name="c")),
+            r"'/forceset/a' \(CoordinateActuator driven by the ControlSetController '/controllerset/c'\)",
+        ),
+        (
+            lambda: controlled(prescribed(Constant(), controls_file="controls.sto")),
+            r"PrescribedController '/controllerset/c' with a file of controls",
+        ),
+        (by_body, r"'/forceset/a' \(BodyActuator driven by '/controllerset/c'\)"),
+    ],
+)
+def test_what_cannot_be_computed_is_named(make, message):
+    model = arm()
+    made = make()
+    for component in made if isinstance(made, tuple) else (made,):
+        model.add(component)
+    with pytest.raises(UnsupportedError, match=message):
+        force_elements(model, build_mechanism(model))
+    assert len(force_elements(model, build_mechanism(model), skip_unsupported=True).skipped) == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SpringGeneralizedForce(name="a"), "'/forceset/a' names no coordinate"),
+        (lambda: SpringGeneralizedForce(name="a", coordinate="q9"), "names 'q9'"),
+        (lambda: SpringGeneralizedForce(name="a", coordinate="q0", stiffness=math.nan), "not a finite number"),
+        (lambda: PointToPointSpring(name="a", socket_body1="/ground"), "'socket_body2' of '/forceset/a' is empty"),
+        (lambda: PathSpring(name="a", **SPRING), "has 0 points"),
+        (lambda: PathSpring(name="a", geometry_path=straight()), "not a finite number"),
+        (lambda: Ligament(name="a", geometry_path=straight()), "resting_length of '/forceset/a' is not positive"),
+        (
+            lambda: Blankevoort1991Ligament(name="a", geometry_path=straight()),
+            "slack_length of '/forceset/a' is not positive",
+        ),
+        (
+            lambda: ExpressionBasedCoordinateForce(name="a", coordinate="q0", expression="3*x"),
+            "the expression of '/forceset/a' is '3\\*x': there is no 'x'",
+        ),
+        (lambda: controlled(PrescribedController(name="c")), "has 0 functions for 1 actuators"),
+    ],
+)
+def test_what_has_no_meaning_is_said(make, message):
+    model = arm()
+    made = make()
+    for component in made if isinstance(made, tuple) else (made,):
+        model.add(component)
+    with pytest.raises(ModelError, match=message):
+        force_elements(model, build_mechanism(model))
+
+
+def test_the_compiled_engine_refuses_by_name():
+    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+    model = arm()
+    model.add(SpringGeneralizedForce(name="spring", coordinate="q0", stiffness=1.0))
+    with pytest.raises(UnsupportedError, match="'/forceset/spring'"):
+        osimlite.simulate(model, 0.01, engine="compiled")
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        SpringGeneralizedForce(name="a", coordinate="q1", stiffness=30.0, rest_length=-0.4),
+        PointToPointSpring(
+            name="a", socket_body1="/ground", socket_body2="/bodyset/b2", point1=(1, 0, 0), stiffness=30.0
+        ),
+        BushingForce(
+            name="a",
+            socket_frame1="/bodyset/b0",
+            socket_frame2="/bodyset/b2",
+            rotational_stiffness=(1, 2, 9),
+            translational_stiffness=(50, 30, 10),
+        ),
+        FunctionBasedBushingForce(
+            name="a",
+            socket_frame1="/ground",
+            socket_frame2="/bodyset/b2",
+            m_z_theta_z_function=SimmSpline(x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)),
+            f_x_delta_x_function=PolynomialFunction(coefficients=(20.0, 0.0, 5.0, 1.0)),
+            f_y_delta_y_function=LinearFunction(coefficients=(10.0, 1.0)),
+        ),
+        PathSpring(name="a", resting_length=0.9, stiffness=50.0, dissipation=0.0, geometry_path=straight()),
+        Ligament(name="a", resting_length=0.9, pcsa_force=100.0, geometry_path=straight()),
+        Blankevoort1991Ligament(
+            name="a", slack_length=0.9, linear_stiffness=90.0, damping_coefficient=0.0, geometry_path=straight()
+        ),
+    ],
+    ids=lambda force: type(force).__name__,
+)
+def test_springs_conserve_energy(force):
+    model = arm()
+    model.add(force)
+    trajectory = osimlite.simulate(model, 1.0, accuracy=1e-9)
+    energy = trajectory.summary["energy_J"]
+    assert energy["end"]["total"] == pytest.approx(energy["start"]["total"], abs=1e-6)
+    assert abs(energy["end"]["stored"] - energy["start"]["stored"]) > 1e-3
+
+
+@pytest.mark.parametrize("how", [{"accuracy": 1e-10}, {"fixed_step": 1e-5}])
+def test_a_control_follows_the_time(how):
+    """A mass pushed by A sin(w t) alone moves as A/(m w) (t - sin(w t)/w)."""
+    model = Model(name="push", gravity=(0, 0, 0))
+    body = model.add(Body(name="mass", mass=2.0, inertia=(1, 1, 1, 0, 0, 0)))
+    model.add(SliderJoint(name="slide", coordinates=[Coordinate(name="x")]).between(model.ground, body))
+    model.add(CoordinateActuator(name="a", coordinate="x", optimal_force=3.0))
+    controller = prescribed(Sine(amplitude=1.0, omega=4.0, phase=0.0, offset=0.0))
+    controller.socket_actuators = ("/forceset/a",)
+    model.add(controller)
+    trajectory = osimlite.simulate(model, 0.5, **how)
+    t = np.array(trajectory.times)
+    expected = 3.0 / (2.0 * 4.0) * (t - np.sin(4.0 * t) / 4.0)
+    assert np.abs(trajectory.values[:, 0] - expected).max() < 2e-5 * (1.0 if "fixed_step" in how else 1e-4)
