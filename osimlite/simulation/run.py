@@ -242,9 +242,7 @@ class Simulation:
             lambda: [engine.energies(*moment) for moment in zip(times, states, strict=True)],
             summary,
         )
-        values = [self.state.values(y) for y in states]
-        speeds = [self.state.speeds(y) for y in states]
-        return Trajectory(self.mechanism, times, values, speeds, report)
+        return Trajectory(self.mechanism, times, *self.state.histories(states), report)
 
 
 def report_times(to: float, interval: float) -> list[float]:

@@ -33,6 +33,14 @@ from osimlite.simulation.kernels.pack import pack
 
 numba = require("numba", extra="fast", purpose="the compiled engine")
 
+LEAN = tuple(
+    f"osimlite.{name}" for name in ("forces", *(f"simulation.kernels.{x}" for x in ("functions", "motion", "dynamics")))
+)
+"""Modules whose functions allocate nothing."""
+
+SHARED = ("evaluate", "contacts_at", "ball", "limit_force", "contact_force")
+"""Functions of them that are called, not copied to where they are called."""
+
 LOGGED_STEPS = 2048
 """So many steps are taken in one call of a motion that is watched."""
 
@@ -57,7 +65,11 @@ def _compile(function: Any, is_kept: bool) -> Any:
     # Numba looks at the time of one source file only; a kept function depends on several.
     copy.__qualname__ = f"{function.__qualname__}_{_digest()}" if is_kept else function.__qualname__
     copy.__module__ = function.__module__
-    return numba.njit(copy, nogil=True, cache=is_kept, error_model="numpy")
+    if not function.__module__.startswith(LEAN):
+        return numba.njit(copy, nogil=True, cache=is_kept, error_model="numpy")
+    # These work on arrays that somebody else holds; counting references to them would take half of the time.
+    inline = not is_kept and function.__name__ not in SHARED
+    return numba.njit(copy, nogil=True, cache=is_kept, error_model="numpy", forceinline=inline, _nrt=False)
 
 
 @cache

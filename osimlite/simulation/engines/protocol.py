@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
@@ -115,6 +117,13 @@ class FreeState:
     def values(self, y: Sequence[float]) -> list[float]:
         """Values of all coordinates, in the mechanism's order."""
         return self.spread(y[: len(self.order)], self._q)
+
+    def histories(self, states: Sequence[Sequence[float]]) -> tuple[Any, Any]:
+        """Values and speeds (k, n) of all coordinates at k states."""
+        rows, count = np.array(states, dtype=float).reshape(len(states), 2 * len(self.order)), len(self.order)
+        values, speeds = np.tile(self._q, (len(states), 1)), np.zeros((len(states), len(self._q)))
+        values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count:]
+        return values, speeds
 
     def speeds(self, y: Sequence[float]) -> list[float]:
         """Generalized speeds of all coordinates, in the mechanism's order."""
