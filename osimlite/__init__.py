@@ -24,6 +24,19 @@ if TYPE_CHECKING:
     from osimlite.simulation import simulate as simulate
     from osimlite.translate import to_urdf as to_urdf
 
+__all__ = [
+    "Model",
+    "OsimliteError",
+    "mechanism",
+    "read",
+    "read_text",
+    "simulate",
+    "to_text",
+    "to_urdf",
+    "validate",
+    "write",
+]
+
 _FUNCTIONS = {
     "read": "osimlite.document.reader",
     "read_text": "osimlite.document.reader",

@@ -70,6 +70,12 @@ class SimulationError(OsimliteError):
     exit_code = 1
 
 
+class SettingError(SimulationError):
+    """A simulation is asked for in a way that means nothing: a negative time, a coordinate that is not there."""
+
+    exit_code = 2
+
+
 class UnsupportedError(OsimliteError):
     """The model uses something this version cannot do; the message names it."""
 

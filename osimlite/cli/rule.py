@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import textwrap
 from typing import Annotated
 
 import typer
@@ -23,11 +26,13 @@ def rule(
     rules = all_rules()
     if code is None:
         width = max(len(known.name) for known in rules)
+        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
         for known in rules:
-            typer.echo(f"{known.code}  {known.name:{width}}  {known.severity.value:7}  {known.summary}")
+            head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
+            typer.echo(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)))
         return
     found = next((known for known in rules if code.upper() == known.code or code == known.name), None)
     if found is None:
         names = [word for known in rules for word in (known.code, known.name)]
-        raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)} `osimlite rule` lists all rules")
+        raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)}; 'osimlite rule' lists all rules")
     typer.echo(f"# {found.name} ({found.code}, {found.severity.value})\n\n{found.page}")

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from math import inf, isfinite, sqrt
 
-from osimlite.errors import SimulationError
+from osimlite.errors import SettingError, SimulationError
 
 Derivative = Callable[[float, list[float]], Sequence[float]]
 Observer = Callable[[float, list[float]], object]
@@ -211,7 +211,7 @@ class RungeKuttaMerson(Stepper):
         names: Sequence[str] | None = None,
     ) -> None:
         if not 0.0 < accuracy < 1.0:
-            raise SimulationError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
+            raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
         if not 0.0 <= minimum_step <= maximum_step or maximum_step == 0.0:
             raise SimulationError(
                 f"The smallest step ({minimum_step} s) must not be negative nor exceed the largest ({maximum_step} s)."
@@ -337,7 +337,7 @@ class SemiImplicitEuler(Stepper):
         names: Sequence[str] | None = None,
     ) -> None:
         if not 0.0 < h < inf:
-            raise SimulationError(f"The fixed step must be positive and finite; {h} s is not.")
+            raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
         super().__init__(f, t, y, observe, names)
         if rates is None and len(self.state) != 2 * nq:
             raise ValueError(f"{nq} coordinates and {len(self.state) - nq} speeds need a function for qdot")
