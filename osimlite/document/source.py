@@ -31,8 +31,8 @@ class Source:
         self.data = data
         self.encoding = _encoding(data)
         self.text = _decoded(data, self.encoding)
-        self.well_formed = False
-        """Whether the text is known to be well-formed, as it is once the parser has found it so."""
+        self.elements: int | None = None
+        """The number of elements, once the parser has found the text well-formed."""
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 
@@ -52,7 +52,17 @@ class Source:
     @cached_property
     def spans(self) -> Sequence[Span]:
         """Every element in document order; of a text that is not well-formed, as far as its tags go."""
-        return PlainSpans(self.text) if self.well_formed and PlainSpans.suit(self.text) else spans_of(self.text)
+        if self.elements is not None:
+            plain = PlainSpans(self.text)
+            # Of a well-formed text no more "<" can be found than there are elements, but in comments and the like.
+            if len(plain) == self.elements:
+                return plain
+        return spans_of(self.text)
+
+    @property
+    def well_formed(self) -> bool:
+        """Whether the text is known to be well-formed."""
+        return self.elements is not None
 
     @cached_property
     def _starts(self) -> list[int]:

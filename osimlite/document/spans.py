@@ -151,7 +151,6 @@ def spans_of(text: str) -> list[Span]:
 
 
 _BEGIN = re.compile(r"<[^/!?]")
-_COMMENT = re.compile(r"<!--[^<]*-->")
 
 
 class PlainSpans(Sequence[Span]):
@@ -164,14 +163,6 @@ class PlainSpans(Sequence[Span]):
         self.text = text
         self.starts = [match.start() for match in _BEGIN.finditer(text)]
         self._known: dict[int, Span] = {}
-
-    @staticmethod
-    def suit(text: str) -> bool:
-        """Whether no ``<`` of a well-formed text stands in a comment or the like."""
-        declarations = text.count("<?")
-        return len(_COMMENT.findall(text)) == text.count("<!") and (
-            declarations == 0 or (declarations == 1 and text.lstrip("\ufeff \t\r\n").startswith("<?xml "))
-        )
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -203,12 +194,17 @@ class PlainSpans(Sequence[Span]):
         if self.text[close + 1] == "/":
             return close
         depth = 1
-        same = re.compile(rf"<(?:/{re.escape(tag)}\s*>|{re.escape(tag)}(?![^\s/>])(?:[^<>\"']|\"[^\"]*\"|'[^']*')*>)")
+        name = re.escape(tag)
+        same = re.compile(
+            rf"<(?:/{name}\s*>|{name}(?![^\s/>])(?:[^<>\"']|\"[^\"]*\"|'[^']*')*>|"
+            r"!--.*?-->|!\[CDATA\[.*?\]\]>|\?.*?\?>)",
+            re.DOTALL,
+        )
         for match in same.finditer(self.text, close):
             if match[0][1] == "/":
                 depth -= 1
                 if not depth:
                     return match.start()
-            elif match[0][-2] != "/":
+            elif match[0][1] not in "!?" and match[0][-2] != "/":
                 depth += 1
         raise AssertionError(f"the text is not well-formed: <{tag}> has no end")

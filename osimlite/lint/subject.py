@@ -14,7 +14,7 @@ from osimlite.document.survey import Survey
 from osimlite.errors import DocumentError
 from osimlite.lint.config import Config
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, FieldSpec, Object, Unknown
+from osimlite.schema.base import Component, FieldSpec, Object, Unknown, object_specs
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Resolution, Tree, Use
 
@@ -33,6 +33,7 @@ class Subject:
         self.sure_until: int | None = None
         self.version: int | None = None
         self.upgraded = False
+        self.changes: list[Change] = []
         self.kept: dict[str, object] = {}
         # The uses are kept alive by `uses`, so that their identities stay theirs.
         self._resolutions: dict[int, Resolution] = {}
@@ -45,7 +46,8 @@ class Subject:
             self.model = found.document.model if found.document else None
             self.notes = found.document.notes if found.document else []
             self.version = found.document.version if found.document else None
-            self.upgraded = bool(found.document and found.document.changes)
+            self.changes = found.document.changes if found.document else []
+            self.upgraded = bool(self.changes)
             if self.sure_until is not None:
                 self.notes = [note for note in self.notes if self._is_sure(note)]
 
@@ -75,8 +77,17 @@ class Subject:
         """Every object of the model by its exact class, in document order."""
         found: dict[type[Object], list[Object]] = {}
         if self.model is not None:
-            for item in self.model.walk():
-                found.setdefault(type(item), []).append(item)
+            # The same order as `walk`, without a generator to resume for each of thousands of objects.
+            pending: list[Object] = [self.model]
+            while pending:
+                item = pending.pop()
+                cls = type(item)
+                if cls in found:
+                    found[cls].append(item)
+                else:
+                    found[cls] = [item]
+                if object_specs(cls):
+                    pending += [held for _, held in item.objects_held()][::-1]
         return found
 
     def each(self, cls: type[T]) -> Iterator[T]:

@@ -69,7 +69,7 @@ def stray_text(subject: Subject, found: Found) -> None:
             found(f"OpenSim ignores the text '{note.word}' outside the document", at=source.position(max(start, 0)))
     if source is None or not (_MAYBE_AFTER.search(source.text) or _MAYBE_BEFORE.search(source.text)):
         return
-    plain = _REMARKS.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source.text)
+    plain = _REMARKS.sub(lambda match: " " * len(match[0]), source.text)
     texts = {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}
     in_values = [
         (source.spans[note.number].start, source.spans[note.number].end)
