@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from math import floor, isfinite
 from typing import Any
 
-from osimlite.errors import SimulationError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
@@ -141,7 +141,7 @@ class Simulation:
         started = time.perf_counter()
         times = report_times(to, report_interval)
         if self._show and fixed_step is None:
-            raise SimulationError("showing the motion needs a fixed step, for instance 0.001 s")
+            raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         y = self._initial_state(initial or {}, initial_speeds or {})
         settings = Settings(accuracy=accuracy, fixed_step=fixed_step, route=self.engine.route, show=self._show)
         recorder = Recorder(self.engine)
@@ -188,7 +188,7 @@ class Simulation:
                         "be set; unlock it in the model"
                     )
                 if not isfinite(value):
-                    raise SimulationError(f"the {what} of coordinate '{name}' is {value}; give a number")
+                    raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
                 row[place] = float(value)
         return self.state.pack(q, u)
 
@@ -252,11 +252,11 @@ def report_times(to: float, interval: float) -> list[float]:
         SimulationError: a number has no meaning.
     """
     if not (isfinite(to) and to > 0.0):
-        raise SimulationError(f"a simulation goes on for a positive time, not {to:g} s")
+        raise SettingError(f"a simulation goes on for a positive time, not {to:g} s")
     if not (isfinite(interval) and interval > 0.0):
-        raise SimulationError(f"the report interval is a positive time, not {interval:g} s")
+        raise SettingError(f"the report interval is a positive time, not {interval:g} s")
     if to / interval > 1e7:
-        raise SimulationError(f"a report every {interval:g} s makes more than ten million rows; take a longer interval")
+        raise SettingError(f"a report every {interval:g} s makes more than ten million rows; take a longer interval")
     times = [number * interval for number in range(floor(to / interval) + 1)]
     # A last moment that differs from `to` only by rounding is `to`.
     if to - times[-1] <= 1e-9 * interval:
