@@ -52,6 +52,7 @@ _MODULES = (
     "physics",
     "space",
     "paths",
+    "muscles",
     "files",
 )
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from osimlite.document.notes import Note
 from osimlite.document.source import Position, Source
@@ -17,6 +17,9 @@ from osimlite.lint.words import called
 from osimlite.schema.base import Component, FieldSpec, Object, Unknown, object_specs
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Resolution, Tree, Use
+
+if TYPE_CHECKING:
+    from osimlite.document.upgrade.draft import Change
 
 T = TypeVar("T", bound=Object)
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
+from pathlib import Path
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactMesh
+from osimlite.schema.controller_types import ControlSetController, PrescribedController
 from osimlite.schema.geometry import Mesh
+from osimlite.schema.prescribed import ExternalLoads
+from osimlite.schema.reporters import TableSource
 from osimlite.text import listed
 
 
@@ -99,11 +103,59 @@ def included_file(subject: Subject, found: Found) -> None:
         )
 
 
-def _is_file(place: str, name: str) -> bool:
+@rule("OSIM703", "missing-data-file", severity=ERROR)
+def missing_data_file(subject: Subject, found: Found) -> None:
+    """A file of measured loads, of controls or of a table is not there.
+
+    ## What it does
+    Looks for the files of external loads, of controllers and of table sources beside the model and in the folder that
+    the program was started in.
+
+    ## Why is this bad
+    OpenSim refuses the model when it is connected; only a ControlSetController goes on, without any controls.
+
+    ## Example
+    ```xml
+    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    <PrescribedController name="drive">
+        <socket_actuators>/forceset/motor</socket_actuators> <controls_file>no_such_controls.sto</controls_file>
+    </PrescribedController>
+    ```
+
+    ## Use instead
+    ```xml
+    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    <PrescribedController name="drive">
+        <socket_actuators>/forceset/motor</socket_actuators>
+        <FunctionSet name="ControlFunctions"> <objects> <Constant name="motor" /> </objects> </FunctionSet>
+    </PrescribedController>
+    ```
+    """
+    if subject.folder is None:
+        return
+    places = [str(subject.folder), ""]
+    for cls, tag in (
+        (PrescribedController, "controls_file"),
+        (ControlSetController, "controls_file"),
+        (ExternalLoads, "datafile"),
+        (TableSource, "filename"),
+    ):
+        for item in subject.each(cls):
+            name = getattr(item, tag)
+            if name is None or (cls is not PrescribedController and name.lower() in ("", "unassigned")):
+                continue
+            if name and any(_is_file(place, name) for place in places):
+                continue
+            twin = next((twin for place in places if (twin := _in_other_case(place, name)) is not None), None)
+            fate = "it has no controls" if cls is ControlSetController else "OpenSim refuses the model"
+            found(f"the file '{name}' of {called(item)} is not there: {fate}", item, tag=tag, suggestion=twin)
+
+
+def _is_file(place: str | Path, name: str) -> bool:
     return os.path.isfile(os.path.join(place, name))
 
 
-def _in_other_case(place: str, name: str) -> str | None:
+def _in_other_case(place: str | Path, name: str) -> str | None:
     """The file that is called `name` but for upper and lower case."""
     before, last = os.path.split(name)
     folder = os.path.join(place, before)

@@ -140,7 +140,7 @@ def reference_form(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports references that would be right in another form: a bare name in a socket, a path without its leading slash,
-    a path where OpenSim looks a bare name up.
+    a path where OpenSim looks a bare name up, a path of the years before version 4 that leaves the sets out.
 
     ## Why is this bad
     OpenSim does not search. A bare name in a socket means a child of the component itself; a path in
@@ -162,6 +162,16 @@ def reference_form(subject: Subject, found: Found) -> None:
             wanted = "a path that begins with a slash"
         message = f"{_names(subject, broken.use)} '{broken.text}'; this property wants {wanted}"
         _report(subject, found, broken, message)
+    for change in subject.changes:
+        if change.step == "set_levels" and subject.source is not None:
+            place = subject.source.of_text(change.number)
+            start = subject.source.line_start(place.line) + place.column - 1
+            text = subject.source.text[start : start + place.length]
+            found(
+                f"{change.where} names '{text}', as files did while version 4 was made: OpenSim 4.6 finds nothing "
+                "there and refuses the model; `osimlite upgrade` writes the path anew",
+                at=place,
+            )
 
 
 @rule("OSIM305", "reference-case", severity=ERROR)

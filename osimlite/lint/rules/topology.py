@@ -123,7 +123,8 @@ def parallel_joints(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     OpenSim adds a hidden body and welds it with a constraint: more coordinates, and a joint that is much stiffer than
-    either.
+    either. If one of the two is ground and the second joint is a weld, free, or the other way round, it refuses the
+    model.
 
     ## Example
     ```xml
@@ -145,14 +146,16 @@ def parallel_joints(subject: Subject, found: Found) -> None:
     ```
     """
     first: dict[frozenset[int], Joint] = {}
+    bones = skeleton(subject)
     for link in skeleton(subject).links:
         if link.parent_base is None or link.child_base is None or link.parent_base is link.child_base:
             continue
         pair = frozenset((id(link.parent_base), id(link.child_base)))
         if pair in first:
             found(
-                f"{called(link.joint)} connects the same two bodies as {called(first[pair])}: OpenSim welds a hidden "
-                "body between them",
+                f"{called(link.joint)} connects the same two bodies as {called(first[pair])}: OpenSim "
+                + ("refuses the model, or " if id(bones.ground) in pair else "")
+                + "welds a hidden body between them",
                 link.joint,
                 attribute="name",
             )

@@ -1,0 +1,78 @@
+"""OSIM62x: muscles."""
+
+from __future__ import annotations
+
+import math
+
+from osimlite.lint.engine import WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, quantity
+from osimlite.schema.muscles import Muscle
+
+
+@rule("OSIM621", "doubtful-muscle", severity=WARNING)
+def doubtful_muscle(subject: Subject, found: Found) -> None:
+    """A muscle has fibres that no muscle has.
+
+    ## What it does
+    Reports a pennation angle of a quarter turn or more, and a default fibre length, given in the file, that is less
+    than 0.2 or more than 2 optimal lengths. Numbers that OpenSim refuses are reported as impossible values.
+
+    ## Why is this bad
+    Fibres across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the optimal length a
+    muscle is torn, and below a fifth it has no force; the search for equilibrium then starts far from any, and often
+    the numbers belong to two different muscles.
+
+    ## Example
+    ```xml
+    <Millard2012EquilibriumMuscle name="soleus">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+        <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.5</default_fiber_length>
+    </Millard2012EquilibriumMuscle>
+    ```
+
+    ## Use instead
+    ```xml
+    <Millard2012EquilibriumMuscle name="soleus">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+        <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.05</default_fiber_length>
+    </Millard2012EquilibriumMuscle>
+    ```
+    """
+    for muscle in subject.each(Muscle):
+        angle = muscle.pennation_angle_at_optimal
+        if math.pi / 2 <= angle < math.inf:
+            found(
+                f"the pennation angle of {called(muscle)} is {quantity(angle, 'rad')}, a quarter turn or more"
+                + ("; in degrees?" if angle > math.pi else ""),
+                muscle,
+                tag="pennation_angle_at_optimal",
+            )
+        length, optimal = getattr(muscle, "default_fiber_length", None), muscle.optimal_fiber_length
+        # 0.1, the default, is what OpenSim prints of every muscle that does not say.
+        given = "default_fiber_length" in muscle.model_fields_set and length != 0.1
+        if given and length is not None and optimal > 0 and 0 < length < math.inf:
+            ratio = length / optimal
+            if not 0.2 <= ratio <= 2:
+                found(
+                    f"the default fibre length of {called(muscle)}, {quantity(length, 'm')}, is {ratio:.3g} times its "
+                    "optimal length",
+                    muscle,
+                    tag="default_fiber_length",
+                )
