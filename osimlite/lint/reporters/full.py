@@ -18,7 +18,13 @@ def render(report: Report, *, colour: bool = False, width: int = 80) -> str:
     for file, findings in groupby(report.findings, key=lambda finding: finding.file):
         lines = _lines(report, file)
         blocks += [_block(finding, lines, colour, width) for finding in findings]
-    return "\n\n".join([*blocks, summary(report, colour)]) + "\n"
+    return "\n\n".join([*blocks, summary(report, colour) + _fixes(report)]) + "\n"
+
+
+def _fixes(report: Report) -> str:
+    """How many findings ``--fix`` mends."""
+    count = sum(finding.fixable for finding in report.findings)
+    return f" {'1 is' if count == 1 else f'{count} are'} mended by --fix." if count else ""
 
 
 def _lines(report: Report, file: str | None) -> list[str] | None:
@@ -35,14 +41,16 @@ def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) 
     rows += [f"  {row}" for row in textwrap.wrap(finding.message, width - 4, break_on_hyphens=False)]
     if finding.line is not None and lines is not None and finding.line <= len(lines):
         rows += _snippet(finding, lines[finding.line - 1], colour, width)
-    notes = []
+    notes: list[tuple[str, str]] = []
     if finding.suggestion is not None:
-        notes.append(f"did you mean '{finding.suggestion}'?" if "\n" not in finding.suggestion else finding.suggestion)
-    if finding.component and finding.line is not None:
-        notes.append(f"in {finding.component}")
+        question = f"did you mean '{finding.suggestion}'?"
+        notes.append((question if "\n" not in finding.suggestion else finding.suggestion, "hint"))
+    # Of the model itself the path says nothing.
+    if finding.component not in ("", "/") and finding.line is not None:
+        notes.append((f"in {finding.component}", "dim"))
     margin = " " * len(str(finding.line or ""))
-    for note in notes:
-        rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(note, 'hint', colour)}")
+    for note, style in notes:
+        rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(note, style, colour)}")
     return "\n".join(rows)
 
 
