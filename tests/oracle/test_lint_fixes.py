@@ -1,0 +1,88 @@
+"""Safe mends: after them OpenSim reads the model that the author meant, or still the one it read before."""
+
+from __future__ import annotations
+
+import importlib.util
+import random
+import re
+from pathlib import Path
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.lint import validate
+from osimlite.lint.fixes import mended
+from tests.oracle.test_lint_corpus_references import victim
+
+pytestmark = pytest.mark.oracle
+
+HERE = Path(__file__).resolve().parents[1]
+WALKER = HERE.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+
+_spec = importlib.util.spec_from_file_location("faults", HERE / "lint" / "faults.py")
+assert _spec is not None and _spec.loader is not None
+faults = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(faults)
+
+
+def safely_mended(text: str) -> tuple[str, int]:
+    """The text after the safe mends, and how many these were."""
+    source = Source(text.encode())
+    data, count = mended(source, validate(source))
+    return data.decode(), count
+
+
+MENDED = [fault for fault in faults.FAULTS if safely_mended(fault.change(WALKER.read_text())[0])[1]]
+
+
+def printed(text: str, path: Path) -> str | None:
+    """OpenSim's print of a document, None if it refuses it."""
+    opensim = pytest.importorskip("opensim")
+    opensim.Logger.setLevelString("Off")
+    path.write_text(text, encoding="utf-8")
+    try:
+        model = opensim.Model(str(path))
+        model.initSystem()
+    except RuntimeError:
+        return None
+    return re.sub(r"<!--.*?-->", "", str(model.dump()), flags=re.DOTALL)
+
+
+def test_there_are_faults_with_a_safe_mend():
+    assert len(MENDED) >= 10
+
+
+@pytest.mark.parametrize("fault", MENDED, ids=lambda fault: fault.name)
+def test_after_a_safe_mend_opensim_reads_what_was_meant(fault, tmp_path):
+    original = printed(WALKER.read_text(), tmp_path / "original.osim")
+    broken, _ = fault.change(WALKER.read_text())
+    assert original is not None
+    assert printed(safely_mended(broken)[0], tmp_path / "mended.osim") == original
+
+
+DAMAGE = (
+    lambda word: word.lstrip("/"),
+    lambda word: word.swapcase(),
+    lambda word: word.rpartition("/")[2],
+    lambda word: f"{word},",
+)
+
+
+def test_safe_mends_of_damaged_real_files_give_the_models_back(corpus, tmp_path):
+    draw = random.Random(7)
+    wrong, mends = [], 0
+    for model in corpus:
+        found = victim(model, tmp_path / model.id)
+        if found is None or len(found.text) > 400_000:
+            continue
+        path = found.folder / "model.osim"
+        original = printed(found.text, path)
+        for damage in DAMAGE:
+            place = draw.choice(found.places[draw.choice(sorted(found.places))])
+            text = found.text[: place.start] + damage(place.word) + found.text[place.start + len(place.word) :]
+            fixed, count = safely_mended(text)
+            mends += count
+            if count and fixed != found.text and printed(fixed, path) != original:
+                wrong.append(f"{model.id} {place.kind}: {place.word} -> {damage(place.word)}")
+    assert not wrong, "\n".join(wrong)
+    assert mends > 20
