@@ -134,6 +134,7 @@ class Model(ModelComponent):
             if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
                 # As in OpenSim's API: a file that leaves them out would call them all alike.
                 for number, coordinate in enumerate(component.coordinates):
-                    coordinate.name = f"{component.name}_coord_{number}"
+                    if coordinate.name == f"_coord_{number}":
+                        coordinate.name = f"{component.name}_coord_{number}"
             object.__setattr__(component, "_model", self)
         return components[0]

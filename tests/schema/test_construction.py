@@ -130,3 +130,13 @@ def test_a_property_without_a_name_takes_exactly_its_class() -> None:
     point = CLASSES["ConditionalPathPoint"](name="p")
     with pytest.raises(ModelError, match="expected a PathPoint and no class derived from it"):
         CLASSES["Scholz2015GeometryPathPoint"](path_point=point)
+
+
+def test_coordinates_that_were_named_keep_their_names_in_a_model():
+    from osimlite import Body, Model, UniversalJoint
+
+    model = Model(name="m")
+    joint = UniversalJoint(name="hip")
+    joint.coordinates[1].name = "swing"
+    model.add(joint.between(model.ground, model.add(Body(name="thigh", mass=1.0))))
+    assert [coordinate.name for coordinate in joint.coordinates] == ["hip_coord_0", "swing"]
