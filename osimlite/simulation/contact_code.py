@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 from osimlite.forces.hunt_crossley import simbody_pair_order
 
 if TYPE_CHECKING:
-    from osimlite.simulation.elements import ContactPair, HuntCrossley
+    from osimlite.simulation.elements import ContactPair, PairContact
     from osimlite.simulation.field import Writer
 
 
-def write_contacts(element: HuntCrossley, writer: Writer) -> None:
+def write_contacts(element: PairContact, writer: Writer) -> None:
     """Write all contacts of one force."""
     if not element.early_return:
         for place, pair in enumerate(element.pairs):
@@ -48,7 +48,7 @@ class _Pair:
     """
 
     def __init__(
-        self, element: HuntCrossley, writer: Writer, place: int, pair: ContactPair, at_no_force: str = ""
+        self, element: PairContact, writer: Writer, place: int, pair: ContactPair, at_no_force: str = ""
     ) -> None:
         self.writer = writer
         self.script = writer.script
@@ -69,15 +69,22 @@ class _Pair:
             apart = script.sum(
                 *zip(center, normal, strict=True), *((-1.0, *xn) for xn in zip(other, normal, strict=True))
             )
+            # Of an ellipsoid, this is where the sphere around it touches.
             touching = f"{apart} < {self.two.radius!r}"
         else:
             gap = script.combine((1.0, center), (-1.0, other))
             reach = self.one.radius + self.two.radius
             touching = f"{script.dot(gap, gap)} < {reach * reach!r}"
         with script.block(f"if {touching}:"):
-            if self.one.is_half_space:
+            radius: float | str = self.two.radius
+            if self.two.radii and self.two.axes:
+                axes = script.multiply(writer.chain.body(script, self.two.body).rotation, self.two.axes)
+                entries = (entry for row in axes for entry in row)
+                d, radius, *point = writer.call(
+                    "half_space_ellipsoid", *other, *normal, *center, *entries, *self.two.radii, a, results=5
+                )
+            elif self.one.is_half_space:
                 d, *point = writer.call("half_space_sphere", *other, *normal, *center, self.two.radius, a, results=4)
-                radius: float | str = self.two.radius
             else:
                 d, radius, nx, ny, nz, *point = writer.call(
                     "sphere_sphere", *other, self.one.radius, *center, self.two.radius, a, results=8

@@ -23,7 +23,7 @@ from osimlite.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import rotation_xyz
 from osimlite.schema.base import Unknown
-from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
+from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.forces import CoordinateLimitForce, Force, HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.model import Model
@@ -64,14 +64,16 @@ class ForceElement(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ContactSurface:
-    """A half space or a sphere, fixed to a body (index, -1 for ground).
+    """A half space, a sphere or an ellipsoid, fixed to a body (index, -1 for ground).
 
     Attributes:
         frame: name of the frame that holds it in the model.
         center: of the sphere, or a point on the plane, in the body frame (m).
-        radius: of the sphere (m), infinite for a half space.
+        radius: of the sphere or the largest of the ellipsoid (m), infinite for a half space.
         normal: unit vector out of the half space, in the body frame.
         material: the law's K (Pa), c (s/m), us, ud (1), uv (s/m).
+        radii: half axes of an ellipsoid (m), None for the others.
+        axes: their directions in the body frame, as the columns of a matrix.
     """
 
     name: str
@@ -81,6 +83,8 @@ class ContactSurface:
     radius: float
     normal: Triple
     material: tuple[float, float, float, float, float]
+    radii: Triple | None = None
+    axes: tuple[Triple, Triple, Triple] | None = None
 
     @property
     def is_half_space(self) -> bool:
@@ -101,8 +105,8 @@ class ContactPair:
 
 
 @dataclass(frozen=True)
-class HuntCrossley:
-    """One HuntCrossleyForce: all its surfaces on different bodies, in pairs.
+class PairContact:
+    """Contact of all surfaces of one force on different bodies, in pairs.
 
     Attributes:
         vt: transition velocity, m/s.
@@ -153,6 +157,16 @@ class HuntCrossley:
         for surface in self.surfaces:
             row += loads.get(surface.body, [0.0] * 6)
         return row
+
+
+@dataclass(frozen=True)
+class HuntCrossley(PairContact):
+    """One HuntCrossleyForce on half spaces and spheres."""
+
+
+@dataclass(frozen=True)
+class EllipsoidContact(PairContact):
+    """One HuntCrossleyForce with ellipsoids among its surfaces, each of which may touch half spaces only."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +321,7 @@ class ElementBuilder:
         except UnsupportedError:
             raise self.unsupported(force, f" with the {kind_of(function)} '{what}'") from None
 
-    def _hunt_crossley(self, force: HuntCrossleyForce) -> HuntCrossley:
+    def _hunt_crossley(self, force: HuntCrossleyForce) -> PairContact:
         surfaces = []
         for parameters in force.contact_parameters.objects:
             material = (
@@ -334,11 +348,17 @@ class ElementBuilder:
                 continue
             if b.is_half_space:
                 first, second, a, b = second, first, b, a
+            if not a.is_half_space and (a.radii or b.radii):
+                raise self.unsupported(force, f" with an ellipsoid against a round surface, '{a.name}' and '{b.name}'")
             try:
                 pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
             except ValueError as error:
                 raise ModelError(f"the force '{self.path(force)}': {error}") from None
-        return HuntCrossley(
+        has_ellipsoid = any(surface.radii for surface in surfaces)
+        if has_ellipsoid and self.early_return and len(pairs) > 1:
+            raise self.unsupported(force, " with an ellipsoid, and Simbody's early return")
+        kind = EllipsoidContact if has_ellipsoid else HuntCrossley
+        return kind(
             self.path(force),
             force.name,
             tuple(surfaces),
@@ -358,15 +378,24 @@ class ElementBuilder:
         """A contact geometry as the surface of a contact.
 
         Raises:
-            UnsupportedError: it is neither a half space nor a sphere, or not fixed to a body.
+            UnsupportedError: it is no half space, sphere or ellipsoid, or not fixed to a body.
         """
-        if not isinstance(geometry, ContactHalfSpace | ContactSphere):
+        if not isinstance(geometry, ContactHalfSpace | ContactSphere | ContactEllipsoid):
             raise self.unsupported(force, f" on the {kind_of(geometry)} '{self.path(geometry)}'")
         frame = self._frame(geometry)
         body, placed = self.mechanism.placement(self.path(frame))
         center = placed[:3, :3] @ np.array(geometry.location) + placed[:3, 3]
         # The half space is x > 0 of the geometry's own frame.
         normal = -(placed[:3, :3] @ rotation_xyz(np.array(geometry.orientation)))[:, 0]
+        if isinstance(geometry, ContactEllipsoid):
+            axes = placed[:3, :3] @ rotation_xyz(np.array(geometry.orientation))
+            self.check(geometry, (*center, *axes.ravel(), *geometry.radii))
+            if not min(geometry.radii) > 0.0:
+                raise ModelError(f"the radii of '{self.path(geometry)}' are not all positive; give such")
+            place, still = triple(center), (0.0, 0.0, 0.0)
+            rows = triple(axes[0]), triple(axes[1]), triple(axes[2])
+            longest, radii = max(geometry.radii), triple(geometry.radii)
+            return ContactSurface(geometry.name, body, frame.name, place, longest, still, material, radii, rows)
         radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
         self.check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
         return ContactSurface(geometry.name, body, frame.name, triple(center), radius, triple(normal), material)

@@ -17,17 +17,25 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import UnsupportedError
-from osimlite.forces import bushing, coordinate_limit, formulas, hunt_crossley, smooth_contact, springs
+from osimlite.forces import (
+    bushing,
+    coordinate_limit,
+    ellipsoid_contact,
+    formulas,
+    hunt_crossley,
+    smooth_contact,
+    springs,
+)
 from osimlite.multibody.functions import Constant, Function
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.chain import Chain, Column
-from osimlite.simulation.elements import ForceElement, HuntCrossley, Triple
+from osimlite.simulation.elements import ForceElement, PairContact, Triple
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
 from osimlite.translate.robot import Robot, RobotJoint
 
 LAWS: dict[str, Callable[..., Any]] = {
     name: law
-    for module in (bushing, coordinate_limit, formulas, hunt_crossley, smooth_contact, springs)
+    for module in (bushing, coordinate_limit, ellipsoid_contact, formulas, hunt_crossley, smooth_contact, springs)
     for name, law in vars(module).items()
     if isinstance(law, FunctionType) and law.__module__ == module.__name__
 }
@@ -67,7 +75,7 @@ class Writer:
         for element in elements:
             element.write(self)
             self._slot += slots(element)
-            self._contact += len(element.pairs) if isinstance(element, HuntCrossley) else 0
+            self._contact += len(element.pairs) if isinstance(element, PairContact) else 0
 
     def coordinate(self, place: int) -> tuple[Scalar, Scalar]:
         """Value and generalized speed of a coordinate; numbers if it is locked."""
@@ -169,7 +177,7 @@ class ForceField:
         self.contacts = tuple(
             element.pair_name(place)
             for element in self.elements
-            if isinstance(element, HuntCrossley)
+            if isinstance(element, PairContact)
             for place in range(len(element.pairs))
         )
 
@@ -292,7 +300,7 @@ def integral(function: Function, start: float, end: float) -> float:
 
 def slots(element: ForceElement) -> int:
     """How many places an element has to keep something for its record."""
-    return len(element.pairs) if isinstance(element, HuntCrossley) else 1
+    return len(element.pairs) if isinstance(element, PairContact) else 1
 
 
 def _coordinate(joint: RobotJoint) -> int:

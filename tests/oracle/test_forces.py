@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactSphere, Model
+from osimlite import Body, ContactHalfSpace, ContactSphere, HuntCrossleyForce, Model
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import (
     BodyActuator,
@@ -15,6 +15,7 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
+from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import PhysicalOffsetFrame
@@ -78,8 +79,10 @@ def carrier(kinds) -> Model:
 def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     """Accelerations, records with their labels, and energy at some states.
 
-    `counted` says how often OpenSim counts the energy of the forces; None if it has an energy of its own.
+    `counted` says how often OpenSim counts the energy of the forces; None if it has an energy of its own. Returns how
+    many numbers of the records differ from zero.
     """
+    busy = 0
     from osimlite.simulation.engines.bullet import BulletEngine
 
     opensim.Logger.setLevelString("off")
@@ -108,6 +111,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
                 found, row = forces.get(number).getRecordLabels(), forces.get(number).getRecordValues(state)
                 labels += [found.get(place) for place in range(found.getSize())]
                 values += [row.get(place) for place in range(found.getSize())]
+            busy += np.count_nonzero(values)
             y = engine.state.pack(q, u)
             assert list(engine.columns) == labels
             recorded = engine.force_records(TIME, y)
@@ -117,6 +121,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
                 assert kinetic == pytest.approx(theirs.calcKineticEnergy(state), rel=1e-10)
                 total = theirs.calcPotentialEnergy(state)
                 assert gravity + counted * stored == pytest.approx(total, rel=1e-9, abs=1e-9)
+    return busy
 
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
@@ -399,3 +404,35 @@ def test_smooth_contact(model, dissipation, carried, tmp_path):
             )
         )
     compare(model, tmp_path)
+
+
+@pytest.mark.parametrize("carried", ["/ground", "/bodyset/b0/f0"])
+def test_ellipsoids_on_a_plane(model, carried, tmp_path):
+    plane = ContactHalfSpace(name="plane", socket_frame=carried, location=(0, -0.6, 0), orientation=(0.1, 0.2, -1.4))
+    model.add(plane)
+    for number, (frame, hardness) in enumerate(
+        (("/bodyset/b1/f1", 1e4), ("/bodyset/b2", 1e5), ("/bodyset/b2/f2", 1e3))
+    ):
+        egg = ContactEllipsoid(
+            name=f"egg{number}",
+            socket_frame=frame,
+            location=(0.1, 0.0, -0.1),
+            orientation=(0.5, -0.3, 0.7 * number),
+            radii=(0.2, 0.5 + 0.2 * number, 0.9),
+        )
+        model.add(egg)
+        force = HuntCrossleyForce(name=f"contact{number}", transition_velocity=0.1)
+        for surface, stiffness in ((egg, hardness), (plane, 1e4)):
+            force.contact_parameters.objects.append(
+                HuntCrossleyForce.ContactParameters(
+                    geometry=(surface,),
+                    stiffness=stiffness,
+                    dissipation=0.3,
+                    static_friction=0.8,
+                    dynamic_friction=0.4,
+                    viscous_friction=0.2,
+                )
+            )
+        model.add(force)
+    # Some of them touch, some do not.
+    assert 0 < compare(model, tmp_path) < STATES * 3 * 12

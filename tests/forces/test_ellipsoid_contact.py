@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.forces.ellipsoid_contact import half_space_ellipsoid
+from osimlite.forces.hunt_crossley import half_space_sphere
+
+NUMBERS = st.floats(-1.0, 1.0)
+TRIPLES = st.tuples(NUMBERS, NUMBERS, NUMBERS)
+
+
+def turned(seed):
+    q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return q * np.sign(np.linalg.det(q))
+
+
+@given(TRIPLES, TRIPLES, st.integers(0, 99), st.floats(0.1, 1.0), st.floats(0.0, 1.0))
+def test_three_equal_axes_make_a_sphere(plane, center, seed, r, a):
+    normal = turned(seed + 100)[0]
+    d, R, *point = half_space_ellipsoid(*plane, *normal, *center, *turned(seed).ravel(), r, r, r, a)
+    depth, *where = half_space_sphere(*plane, *normal, *center, r, a)
+    assert d == pytest.approx(depth, abs=1e-12)
+    if depth > 1e-9:
+        assert pytest.approx(r) == R and point == pytest.approx(where, abs=1e-12)
+
+
+@given(st.integers(0, 99), st.tuples(*[st.floats(0.2, 2.0)] * 3))
+def test_depth_and_point_against_a_search(seed, radii):
+    """With the whole depth the half space's, the point is the deepest of the surface."""
+    axes, normal = turned(seed), turned(seed + 100)[0]
+    d, _, *point = half_space_ellipsoid(1.0, 2.0, 3.0, *normal, 1.0, 2.0, 3.0, *axes.ravel(), *radii, 1.0)
+    directions = np.random.default_rng(1).normal(size=(4000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    heights = directions * radii @ axes.T @ normal
+    assert heights.min() == pytest.approx(-d, rel=0.02)
+    own = axes.T @ (np.array(point) - (1.0, 2.0, 3.0)) / radii
+    assert own @ own == pytest.approx(1.0)
+    assert (np.array(point) - (1.0, 2.0, 3.0)) @ normal == pytest.approx(-d)
