@@ -126,12 +126,12 @@ def run_many(
     counts, endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
     reports, events = np.full((count, len(moments), size), np.nan), np.zeros((count, most_events, 3))
     peaks, control = np.zeros((count, pairs, 2)), engine.control(to, accuracy, most_tries)
-    run_several = compiled(merson.run_several)
+    run_several, no_log, no_forces = compiled(merson.run_several), np.zeros((1, 0, 0)), np.zeros((1, 0, pairs, 3))
 
     def work(first: int) -> None:
         run_several(
             engine.structure, vectors, clocks, counts, starts, control, moments, reports, events, peaks, kinds,
-            levels, endings, first, min(first + AT_ONCE, count),
+            levels, no_log, no_forces, endings, first, min(first + AT_ONCE, count),
         )  # fmt: skip
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:

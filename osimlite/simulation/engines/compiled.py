@@ -27,7 +27,7 @@ from osimlite.simulation.elements import CoordinateLimit, Forces, HuntCrossley
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.integrators import Observer, RungeKuttaMerson, SemiImplicitEuler, Stepper
 from osimlite.simulation.kernels import dynamics, merson
-from osimlite.simulation.kernels.arrays import Floats, Ints, numbers_of, vector_of, work_for
+from osimlite.simulation.kernels.arrays import Floats, numbers_of, vector_of, work_for
 from osimlite.simulation.kernels.motion import FINE, SINGULAR_MASS, SINGULAR_RATES
 from osimlite.simulation.kernels.pack import pack
 
@@ -175,19 +175,29 @@ class CompiledEngine:
 
     def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
-        energies_at = compiled(dynamics.energies_at)
-        kinetic, gravity = energies_at(self.structure, self._views, self._work, np.array(y, dtype=float), self._f)
+        self._touch(y)
+        kinetic, gravity = self._mechanical()
         for (link, frame), body in zip(self.placements, self.mechanism.bodies, strict=True):
             if link == GROUND:
                 center = frame[:3, :3] @ body.mass_properties.center + frame[:3, 3]
                 gravity -= body.mass_properties.mass * float(self.mechanism.gravity @ center)
-        self._touch(y)
         stored = sum(value[-1] for _, values in self._reported(y) for value in values if value is not None)
         return float(kinetic), float(gravity), float(stored)
 
+    def _mechanical(self) -> tuple[float, float]:
+        """Kinetic energy and potential energy of gravity of all links, after `_touch`."""
+        w, inertia = self._work, self._views.inertia
+        rotations, turning = w.rotation.reshape(-1, 3, 3), w.velocity[:, :3]
+        arms = w.position - w.origin + (rotations @ inertia[:, 1:4, None])[:, :, 0]
+        v = w.velocity[:, 3:] + np.cross(turning, arms)
+        own = (turning[:, None, :] @ rotations)[:, 0]
+        moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
+        spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
+        kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
+        return kinetic, -float(inertia[:, 0] @ (arms + w.origin) @ self._views.gravity)
+
     def _touch(self, y: Sequence[float]) -> None:
-        contacts_at = compiled(dynamics.contacts_at)
-        contacts_at(self.structure, self._views, self._work, np.array(y, dtype=float), self._f)
+        self._evaluate(self.structure, self._views, self._work, np.array(y, dtype=float), self._f)
         self._note_loads(self._work.contacts[:, :3])
 
     def _reported(self, y: Sequence[float]) -> Iterator[tuple[Any, list[Any]]]:
@@ -241,10 +251,6 @@ class CompiledEngine:
         count = len(self.mechanism.coordinates)
         spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
         return merson.Control(float(limit), float(accuracy), inf, 0.0, count + spare, count, most_tries)
-
-    def no_watches(self) -> tuple[Ints, Floats]:
-        """Watches and levels of records without any."""
-        return np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
 
     def close(self) -> None:
         """Nothing is held."""
@@ -304,25 +310,28 @@ class CompiledMerson(RungeKuttaMerson):
         engine, size, pairs = self._engine, len(self.state), len(self._engine.contacts)
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
-        clock = np.array((self.time, self._next_step))
-        counts = np.array((self.taken, self.attempted, self.evaluations, 0, 0, 0), dtype=np.int64)
-        y, states = np.array(self.state, dtype=float), np.zeros((len(times), size))
+        clocks = np.array(((self.time, self._next_step),))
+        counts = np.array(((self.taken, self.attempted, self.evaluations, 0, 0, 0),), dtype=np.int64)
+        rows, states = np.array((self.state,), dtype=float), np.zeros((1, len(times), size))
         control, moments = engine.control(times[-1], self._accuracy), np.array(times, dtype=float)
-        watches, levels = engine.no_watches()
-        run, done, status = compiled(merson.run), 0, merson.FULL
-        while status == merson.FULL:
-            log, forces = np.zeros((LOGGED_STEPS, 1 + 2 * size)), np.zeros((LOGGED_STEPS, pairs, 3))
-            counts[merson.LOGGED] = 0
-            records = merson.Records(moments, states, log, forces, np.zeros((0, 3)), np.zeros((0, 2)), watches, levels)
-            status = run(engine.structure, engine.numbers, clock, counts, y, control, records)
-            logged = int(counts[merson.LOGGED])
-            self._put_off.append((log[:logged], forces[:logged]))
-            self.time, self._next_step, self.state = float(clock[0]), float(clock[1]), y.tolist()
-            self.taken, self.attempted, self.evaluations = (int(count) for count in counts[:3])
-            if status == merson.FAILED:
+        run, done, endings = compiled(merson.run_several), 0, np.array((merson.FULL,))
+        while endings[0] == merson.FULL:
+            logs, forces = np.zeros((1, LOGGED_STEPS, 1 + 2 * size)), np.zeros((1, LOGGED_STEPS, pairs, 3))
+            counts[0, merson.LOGGED] = 0
+            run(
+                engine.structure, engine.numbers[None], clocks, counts, rows, control, moments, states,
+                np.zeros((1, 0, 3)), np.zeros((1, 0, 2)), np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7)),
+                logs, forces, endings, 0, 1,
+            )  # fmt: skip
+            (clock,), (count,), (y,), log = clocks.tolist(), counts.tolist(), rows.tolist(), logs[0]
+            logged = count[merson.LOGGED]
+            self._put_off.append((log[:logged], forces[0, :logged]))
+            self.time, self._next_step, self.state = clock[0], clock[1], y
+            self.taken, self.attempted, self.evaluations = count[:3]
+            if endings[0] == merson.FAILED:
                 self._explain()
-            reached = int(counts[merson.REPORTED])
-            yield from zip(times[done:reached], states[done:reached], strict=True)
+            reached = count[merson.REPORTED]
+            yield from zip(times[done:reached], states[0, done:reached], strict=True)
             done = reached
 
     def catch_up(self) -> None:

@@ -62,29 +62,6 @@ def contacts_at(s: Structure, x: Numbers, w: Work, y: Floats, f: Floats) -> None
     touch(s, x, w)
 
 
-def energies_at(s: Structure, x: Numbers, w: Work, y: Floats, f: Floats) -> tuple[float, float]:
-    """Kinetic energy, and potential energy of gravity, J; f is overwritten."""
-    size = len(s.above)
-    place(s, x, w, y[:size])
-    move(s, x, w, y[:size], y[size:], f[:size])
-    weigh(s, x, w)
-    kinetic = potential = 0.0
-    for link in range(len(s.parent)):
-        i, v = w.inertia, w.velocity
-        h = momentum(i, link, v[link, 0], v[link, 1], v[link, 2], v[link, 3], v[link, 4], v[link, 5])
-        kinetic += 0.5 * (
-            v[link, 0] * h[0]
-            + v[link, 1] * h[1]
-            + v[link, 2] * h[2]
-            + v[link, 3] * h[3]
-            + v[link, 4] * h[4]
-            + v[link, 5] * h[5]
-        )
-        for k in range(3):
-            potential -= x.gravity[k] * (i[link, 1 + k] + i[link, 0] * w.origin[k])
-    return kinetic, potential
-
-
 def momentum(
     i: Floats, link: int, wx: float, wy: float, wz: float, vx: float, vy: float, vz: float
 ) -> tuple[float, float, float, float, float, float]:

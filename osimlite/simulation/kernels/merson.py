@@ -367,16 +367,18 @@ def run_several(
     peaks: Floats,
     watches: Ints,
     levels: Floats,
+    logs: Floats,
+    forces: Floats,
     endings: Ints,
     first: int,
     last: int,
 ) -> None:
-    """The runs `first` to `last` - 1, each on its own rows of everything; a single vector of numbers serves them all.
+    """The runs `first` to `last` - 1, each on its own rows; a single row of numbers or of a log serves them all.
 
     Args: as of `run`, one row for each run.
     """
-    nothing, no_forces = np.zeros((0, 0)), np.zeros((0, 0, 0))
     for k in range(first, last):
-        records = Records(times, reports[k], nothing, no_forces, events[k], peaks[k], watches, levels)
+        log = k if len(logs) > 1 else 0
+        records = Records(times, reports[k], logs[log], forces[log], events[k], peaks[k], watches, levels)
         vector = vectors[k] if len(vectors) > 1 else vectors[0]
         endings[k] = run(s, vector, clocks[k], counts[k], states[k], control, records)
