@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from osimlite.schema.custom_joint import CustomJoint, TransformAxis
+from typing import TYPE_CHECKING
+
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
+
+if TYPE_CHECKING:
+    from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
 
 def axes_of(joint: CustomJoint) -> list[TransformAxis]:

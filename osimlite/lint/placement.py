@@ -9,13 +9,12 @@ stations has no known place. Constraints, which may move the model when it is as
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.lint.axes import axes_of
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component
-from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction, PolynomialFunction
 from osimlite.schema.joints import (
@@ -29,6 +28,10 @@ from osimlite.schema.joints import (
     UniversalJoint,
     WeldJoint,
 )
+from osimlite.schema.tree import is_a
+
+if TYPE_CHECKING:
+    from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
 Vector = tuple[float, float, float]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -126,8 +129,10 @@ def _motion(joint: Joint) -> Pose | None:
     if any(coordinate.prescribed for coordinate in joint.coordinates):
         return None
     values = [coordinate.default_value for coordinate in joint.coordinates]
-    if isinstance(joint, CustomJoint):
-        return _custom(joint, dict(zip([item.name for item in joint.coordinates], values, strict=True)))
+    if is_a(joint, "CustomJoint"):
+        return _custom(
+            cast("CustomJoint", joint), dict(zip([item.name for item in joint.coordinates], values, strict=True))
+        )
     if joint.motion_types is None or len(values) != len(joint.motion_types):
         return None
     match joint:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from osimlite.document.notes import Note
 from osimlite.document.source import Position, Source
@@ -98,6 +98,12 @@ class Subject:
         for known, items in self.by_class.items():
             if issubclass(known, cls):
                 yield from cast("list[T]", items)
+
+    def named(self, cls: str) -> Iterator[Any]:
+        """Every object of the class with this name or of one derived from it; the class need not be imported."""
+        for known, items in self.by_class.items():
+            if any(base.__name__ == cls for base in known.__mro__):
+                yield from items
 
     @cached_property
     def uses(self) -> list[Use]:

@@ -11,10 +11,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactMesh
-from osimlite.schema.controller_types import ControlSetController, PrescribedController
 from osimlite.schema.geometry import Mesh
-from osimlite.schema.prescribed import ExternalLoads
-from osimlite.schema.reporters import TableSource
 from osimlite.text import listed
 
 
@@ -135,19 +132,19 @@ def missing_data_file(subject: Subject, found: Found) -> None:
         return
     places = [str(subject.folder), ""]
     for cls, tag in (
-        (PrescribedController, "controls_file"),
-        (ControlSetController, "controls_file"),
-        (ExternalLoads, "datafile"),
-        (TableSource, "filename"),
+        ("PrescribedController", "controls_file"),
+        ("ControlSetController", "controls_file"),
+        ("ExternalLoads", "datafile"),
+        ("TableSource", "filename"),
     ):
-        for item in subject.each(cls):
+        for item in subject.named(cls):
             name = getattr(item, tag)
-            if name is None or (cls is not PrescribedController and name.lower() in ("", "unassigned")):
+            if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
                 continue
             if name and any(_is_file(place, name) for place in places):
                 continue
             twin = next((twin for place in places if (twin := _in_other_case(place, name)) is not None), None)
-            fate = "it has no controls" if cls is ControlSetController else "OpenSim refuses the model"
+            fate = "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
             found(f"the file '{name}' of {called(item)} is not there: {fate}", item, tag=tag, suggestion=twin)
 
 

@@ -8,7 +8,6 @@ from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
 from osimlite.text import listed, nearest
@@ -79,7 +78,7 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     </PinJoint>
     ```
     """
-    for custom in subject.each(CustomJoint):
+    for custom in subject.named("CustomJoint"):
         names, declared_names = names_on_axes(custom), [coordinate.name for coordinate in custom.coordinates]
         if axes_refused(custom) and all(name in declared_names for name in names):
             unused = [f"'{name}'" for name in declared_names if name not in names]
@@ -316,7 +315,7 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
     </CustomJoint>
     ```
     """
-    for joint in subject.each(CustomJoint):
+    for joint in subject.named("CustomJoint"):
         declared = [coordinate.name for coordinate in joint.coordinates]
         if axes_refused(joint):
             continue

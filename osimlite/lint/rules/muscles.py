@@ -7,7 +7,6 @@ import math
 from osimlite.lint.engine import WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
-from osimlite.schema.muscles import Muscle
 
 
 @rule("OSIM621", "doubtful-muscle", severity=WARNING)
@@ -55,7 +54,7 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
     </Millard2012EquilibriumMuscle>
     ```
     """
-    for muscle in subject.each(Muscle):
+    for muscle in subject.named("Muscle"):
         angle = muscle.pennation_angle_at_optimal
         if math.pi / 2 <= angle < math.inf:
             found(

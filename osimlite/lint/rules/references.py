@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.lint.axes import axes_refused
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
@@ -12,12 +12,14 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Object, Unknown, reference_specs
 from osimlite.schema.contact import ContactGeometry
-from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.fields import Reference
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.tree import Resolution, Use, is_a, normalised
 from osimlite.text import listed, nearest
+
+if TYPE_CHECKING:
+    from osimlite.schema.custom_joint import CustomJoint
 
 
 @rule("OSIM301", "unresolved-reference", severity=ERROR)
@@ -237,9 +239,9 @@ def _find(subject: Subject) -> Iterator[Broken]:
         if isinstance(value, str) and (resolution.failure == "empty" or _unassigned(use)):
             if use.reference.required and use.position is None:
                 yield Broken(use, text, "empty")
-        elif use.reference.rule == "own-joint-coordinate" and isinstance(use.owner, CustomJoint):
+        elif use.reference.rule == "own-joint-coordinate" and is_a(use.owner, "CustomJoint"):
             # Often OpenSim makes such a coordinate up, of which another rule speaks.
-            if axes_refused(use.owner):
+            if axes_refused(cast("CustomJoint", use.owner)):
                 yield _explained(subject, use, text, resolution)
         elif not _undecided(subject, use, text) and not _special(use, text):
             yield _explained(subject, use, text, resolution)

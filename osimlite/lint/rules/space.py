@@ -13,11 +13,10 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Component, Object
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
-from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.fields import Value
-from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import Body, Ground, StationDefinedFrame
 from osimlite.schema.markers import Station
+from osimlite.schema.tree import is_a
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
@@ -210,7 +209,7 @@ def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactG
     """The surfaces that each contact force sets against each other."""
     groups: dict[int, tuple[Component, list[ContactGeometry]]] = {}
     for use in subject.uses:
-        if isinstance(use.owner, (HuntCrossleyForce, SmoothSphereHalfSpaceForce)):
+        if is_a(use.owner, "HuntCrossleyForce") or is_a(use.owner, "SmoothSphereHalfSpaceForce"):
             target = subject.resolution(use).target
             if isinstance(target, ContactGeometry):
                 group = groups.setdefault(id(use.owner), (use.owner, []))[1]

@@ -11,7 +11,6 @@ from osimlite.lint.outputs import outputs_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, times
 from osimlite.schema.base import Component, Unknown
-from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.tree import Use, normalised
@@ -50,7 +49,7 @@ def control_function_count(subject: Subject, found: Found) -> None:
     </PrescribedController>
     ```
     """
-    for controller in subject.each(PrescribedController):
+    for controller in subject.named("PrescribedController"):
         functions, actuators = len(controller.ControlFunctions.objects), len(controller.socket_actuators)
         if controller.controls_file is None and functions != actuators:
             found(
