@@ -38,11 +38,13 @@ model.initSystem()
 
 def whole_processes(rounds: int, models: list[Path]) -> None:
     rows = []
+    script = Path(sys.executable).with_name("osimlite")
+    command = [str(script)] if script.exists() else [sys.executable, "-m", "osimlite"]
     for model in models:
         theirs = [sys.executable, "-c", THEIRS.format(model=str(model))]
-        ours = [sys.executable, "-m", "osimlite", "validate", "--no-cache", str(model)]
+        ours = [*command, "validate", "--no-cache", str(model)]
         rows.append(pair_commands(f"{model.stem}, first run", ours=ours, theirs=theirs, rounds=rounds))
-    ours = [sys.executable, "-m", "osimlite", "validate", str(models[0])]
+    ours = [*command, "validate", str(models[0])]
     rows.append(pair_commands(f"{models[0].stem}, unchanged", ours=ours, theirs=theirs, rounds=rounds))
     report("Whole processes: osimlite validate FILE", rows)
 

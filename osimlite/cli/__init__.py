@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -92,6 +93,8 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         asked = _plainly(words)
         if asked is not None:
+            # Importing makes many objects and drops none; several files are checked with the collector on.
+            gc.disable()
             from osimlite.cli._validating import run
 
             raise SystemExit(run(**asked))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -43,6 +44,8 @@ def run(
         raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{format}'")
     given = Config(checked_words(select), checked_words(ignore), mesh_paths=_absolute(mesh_path or []))
     files = list(_files(paths))
+    if len(files) > 1:
+        gc.enable()
     if diff:
         changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
         return int(any(changed))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 from osimlite.document.source import Source
@@ -28,7 +27,7 @@ def document(fragment: str) -> str:
     spans = [wrapped.spans[number] for number in tops]
     if any(span.end == span.tag_end and not wrapped.text[: span.end].endswith("/>") for span in spans):
         # Not closed: take it as it stands.
-        spans = [replace(spans[0], end=len(wrapped.text) - 4)]
+        spans = [spans[0]._replace(end=len(wrapped.text) - 4)]
     for span in spans:
         end = span.end
         element = wrapped.text[span.start : end]

@@ -45,7 +45,6 @@ def test_full(report):
           |
         3 | <gravity>0 -9806 0</gravity>
           |          ^^^^^^^^^
-          = in /
 
         m.osim:7:27: error OSIM301 unresolved-reference
           Marker 'asis': socket_parent_frame names '/grund', but there is no such
@@ -65,7 +64,7 @@ def test_full(report):
           = did you mean 'true'?
           = in /markerset/asis
 
-        Found 2 errors, 1 warning in 1 model.
+        Found 2 errors, 1 warning in 1 model. 1 is mended by --fix.
         """)
 
 
