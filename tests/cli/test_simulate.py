@@ -78,7 +78,7 @@ def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, argument
 
 def test_unsupported_force(walker, tmp_path):
     text = Path(walker).read_text()
-    motor = '<CoordinateActuator name="motor"><coordinate>RHip_rz</coordinate></CoordinateActuator>'
+    motor = '<ActivationCoordinateActuator name="motor"><coordinate>RHip_rz</coordinate></ActivationCoordinateActuator>'
     place = text.index("<objects>", text.index("<ForceSet")) + len("<objects>")
     (tmp_path / "m.osim").write_text(text[:place] + motor + text[place:])
     code, _, err = run("m.osim", folder=tmp_path)

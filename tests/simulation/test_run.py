@@ -131,11 +131,11 @@ def test_spinning_top_keeps_its_momentum():
 # ------------------------------------------------------------------------------------------------ failures
 def test_unsupported_force_is_named(walker, fixtures):
     model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
-    model.add(osimlite.CoordinateActuator(name="motor", coordinate="RHip_rz"))
-    with pytest.raises(UnsupportedError, match=r"'/forceset/motor' \(CoordinateActuator\)"):
+    model.add(osimlite.ActivationCoordinateActuator(name="motor", coordinate="RHip_rz"))
+    with pytest.raises(UnsupportedError, match=r"'/forceset/motor' \(ActivationCoordinateActuator\)"):
         osimlite.simulate(model)
     without = osimlite.simulate(model, to=0.1, skip_unsupported=True)
-    assert without.summary["skipped_forces"] == ["'/forceset/motor' (CoordinateActuator)"]
+    assert without.summary["skipped_forces"] == ["'/forceset/motor' (ActivationCoordinateActuator)"]
     assert np.array_equal(without.values, osimlite.simulate(walker, to=0.1).values)
     model.find("/forceset/motor").appliesForce = False
     assert osimlite.simulate(model, to=0.1).summary["skipped_forces"] == []
