@@ -10,7 +10,7 @@ from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyContactParameters
+from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyContactParameters, HuntCrossleyForce
 from osimlite.schema.joints import Joint
 from osimlite.schema.tree import Use
 
@@ -93,7 +93,7 @@ def friction_order(subject: Subject, found: Found) -> None:
             found(
                 f"static friction of {subject.called(material)}, {quantity(material.static_friction)}, is smaller than "
                 f"dynamic friction, {quantity(material.dynamic_friction)}"
-                + ("; less than half of it, so that friction drives slow sliding on" if _drives(material) else ""),
+                + ("; less than half of it, so that friction drives slow sliding on" if _drives(subject, material) else ""),
                 material,
                 tag="static_friction",
             )
@@ -417,9 +417,11 @@ def degrees_for_radians(subject: Subject, found: Found) -> None:
                 )
 
 
-def _drives(material: HuntCrossleyContactParameters) -> bool:
+def _drives(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
     """Whether friction at the smallest speeds acts along the sliding, even with the viscous part."""
-    return 2 * material.static_friction + material.viscous_friction < material.dynamic_friction
+    force = subject.owner(material)
+    viscous = material.viscous_friction * force.transition_velocity if isinstance(force, HuntCrossleyForce) else 0.0
+    return 2 * material.static_friction + viscous < material.dynamic_friction
 
 
 def _limited(subject: Subject, force: CoordinateLimitForce) -> tuple[Coordinate | None, str | None]:
