@@ -25,6 +25,8 @@ Failure = Literal["missing", "wrong-type", "empty", "illegal"]
 ILLEGAL_CHARACTERS = "\\*+ \t\n/"
 """Characters OpenSim refuses in the name of a component."""
 
+_NEVER_IN_PATHS = frozenset(ILLEGAL_CHARACTERS) - {"/"}
+
 
 class Resolution(NamedTuple):
     """What a reference leads to.
@@ -336,7 +338,7 @@ def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
 
 def _is_no_path(text: str) -> bool:
     """Whether OpenSim cannot even read the text as a path, which it does of every socket when it loads the file."""
-    if any(character in text for character in ILLEGAL_CHARACTERS[:-1]):
+    if not _NEVER_IN_PATHS.isdisjoint(text):
         return True
     return text.startswith("/") and normalised(text) is None
 
