@@ -93,7 +93,11 @@ def friction_order(subject: Subject, found: Found) -> None:
             found(
                 f"static friction of {subject.called(material)}, {quantity(material.static_friction)}, is smaller than "
                 f"dynamic friction, {quantity(material.dynamic_friction)}"
-                + ("; less than half of it, so that friction drives slow sliding on" if _drives(subject, material) else ""),
+                + (
+                    "; less than half of it, so that friction drives slow sliding on"
+                    if _drives(subject, material)
+                    else ""
+                ),
                 material,
                 tag="static_friction",
             )
