@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactSphere, HuntCrossleyForce, Model
+from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import (
     BodyActuator,
@@ -95,10 +95,14 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     with BulletEngine(mechanism, force_elements(model, mechanism)) as engine:
         for _ in range(STATES):
             q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
+            for place, info in enumerate(mechanism.coordinates):
+                if info.locked:
+                    q[place], u[place] = info.default_value, 0.0
             for name, value, speed in zip(names, q, u, strict=True):
                 coordinate = theirs.updCoordinateSet().get(name)
-                coordinate.setValue(state, value, False)
-                coordinate.setSpeedValue(state, speed)
+                if not coordinate.getLocked(state):
+                    coordinate.setValue(state, value, False)
+                    coordinate.setSpeedValue(state, speed)
             state.setTime(TIME)
             theirs.realizeAcceleration(state)
             expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]
@@ -194,6 +198,24 @@ def test_formula_between_points(model, tmp_path):
             )
         )
     compare(model, tmp_path)
+
+
+def test_forces_across_a_locked_coordinate(tmp_path):
+    model = carrier(JOINTS["pin, slider, universal"])
+    locked = next(item for item in model.components(Coordinate) if item.name == "q1_0")
+    locked.default_value, locked.locked = 0.4, True
+    model.add(
+        SpringGeneralizedForce(name="held", coordinate="q1_0", stiffness=3.0, viscosity=2.0),
+        ExpressionBasedCoordinateForce(name="formula", coordinate="q1_0", expression="3*q + qdot/q"),
+        CoordinateActuator(name="motor", coordinate="q1_0"),
+        PointToPointSpring(
+            name="within", socket_body1="/bodyset/b0", socket_body2="/bodyset/b1", point1=(1, 0, 0), stiffness=5.0
+        ),
+        *between(BushingForce, rotational_stiffness=(1.0, 2.0, 3.0), **DAMPING),
+        *along(PathSpring, resting_length=0.1, stiffness=40.0, dissipation=0.3),
+    )
+    drive(model, "motor")
+    compare(model, tmp_path, counted=None)
 
 
 PAIRS = (("/ground", "/bodyset/b2/f2"), ("/bodyset/b1/f1", "/bodyset/b0"), ("/bodyset/b0/f0", "/bodyset/b1/f1"))
