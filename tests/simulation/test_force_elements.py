@@ -9,10 +9,20 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, Coordinate, Model, PinJoint, SliderJoint
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    HuntCrossleyForce,
+    Model,
+    PinJoint,
+    SliderJoint,
+)
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import ActivationCoordinateActuator, BodyActuator, CoordinateActuator
+from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.controller_types import ControlSetController, PrescribedController
 from osimlite.schema.functions import Constant, Function, LinearFunction, PolynomialFunction, SimmSpline, Sine
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
@@ -206,3 +216,44 @@ def test_a_control_follows_the_time(how):
     t = np.array(trajectory.times)
     expected = 3.0 / (2.0 * 4.0) * (t - np.sin(4.0 * t) / 4.0)
     assert np.abs(trajectory.values[:, 0] - expected).max() < 2e-5 * (1.0 if "fixed_step" in how else 1e-4)
+
+
+def egg_over_floor(*more) -> Model:
+    """An ellipsoid that falls on its longer side, and whatever else touches by the same force."""
+    model = Model(name="egg")
+    body = model.add(Body(name="egg", mass=1.0, inertia=(0.02, 0.01, 0.02, 0, 0, 0)))
+    model.add(SliderJoint(name="fall", coordinates=[Coordinate(name="height", default_value=0.3)]).between(
+        model.ground, body, turned=(0, 0, 0.5 * math.pi), child_turned=(0, 0, 0.5 * math.pi)
+    ))  # fmt: skip
+    surfaces = [
+        ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * math.pi)),
+        ContactEllipsoid(name="shell", socket_frame=body, radii=(0.2, 0.1, 0.15)),
+        *more,
+    ]
+    model.add(*surfaces)
+    contact = HuntCrossleyForce(name="contact")
+    contact.contact_parameters.objects.append(
+        HuntCrossleyForce.ContactParameters(geometry=tuple(surfaces), stiffness=1e5, dissipation=1.0)
+    )
+    model.add(contact)
+    return model
+
+
+def test_an_ellipsoid_lands_when_its_lowest_point_is_down():
+    trajectory = osimlite.simulate(egg_over_floor(), 0.5, accuracy=1e-8)
+    first = trajectory.summary["contact_events"][0]
+    assert first["contact"] == "contact" and first["event"] == "begin"
+    assert first["time_s"] == pytest.approx(math.sqrt(2.0 * 0.2 / 9.80665), rel=1e-4)
+    assert trajectory.summary["largest_contact_forces"]["contact"]["force_N"] > 9.8
+
+
+def test_an_ellipsoid_touches_planes_only():
+    model = egg_over_floor(ContactSphere(name="stone", socket_frame="/ground", radius=0.1))
+    with pytest.raises(UnsupportedError, match=r"'/forceset/contact' \(HuntCrossleyForce with an ellipsoid against"):
+        osimlite.simulate(model, 0.1)
+
+
+def test_the_compiled_engine_refuses_an_ellipsoid():
+    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+    with pytest.raises(UnsupportedError, match="'/forceset/contact'"):
+        osimlite.simulate(egg_over_floor(), 0.1, engine="compiled")
