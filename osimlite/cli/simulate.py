@@ -28,7 +28,7 @@ _UNITS = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
 def simulate(
     file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
     to: Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")] = 2.0,
-    engine: Annotated[str, typer.Option(help="What computes the accelerations: 'bullet'.")] = "bullet",
+    engine: Annotated[str, typer.Option(help="What computes the accelerations: 'bullet' or 'compiled'.")] = "bullet",
     accuracy: Annotated[
         float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")
     ] = None,

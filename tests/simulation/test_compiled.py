@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import gzip
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -328,3 +330,16 @@ def test_window_and_route_are_refused(walker):
         Simulation(walker, "compiled", show=True)
     with pytest.raises(OsimliteError, match="no route 'mass-matrix'"):
         Simulation(walker, "compiled", route="mass-matrix")
+
+
+def test_without_numba_the_user_learns_what_to_install(fixtures):
+    program = (
+        "import sys; sys.modules['numba'] = None; from osimlite.cli import main; "
+        f"sys.argv = ['osimlite', 'simulate', {str(fixtures / 'walker' / 'DynamicWalkerModel.osim')!r}, "
+        "'--engine', 'compiled']; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "the compiled engine needs numba" in done.stderr
+    assert "pip install 'osimlite[fast]'" in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
