@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Object, Unknown
-from osimlite.schema.frames import Body, Ground
+from osimlite.schema.frames import Body, Ground, StationDefinedFrame
 from osimlite.schema.joints import Joint
 
 
@@ -79,8 +79,14 @@ def base_of(subject: Subject, frame: Component | None) -> Component | None:
     """The body or ground that a frame is fixed to, through any number of offset frames."""
     seen: set[int] = set()
     while frame is not None and not isinstance(frame, (Body, Ground)):
-        if id(frame) in seen or "socket_parent" not in type(frame).field_specs():
+        if id(frame) in seen:
             return None
         seen.add(id(frame))
-        frame = subject.target_of(frame, "socket_parent")
+        if isinstance(frame, StationDefinedFrame):
+            station = subject.target_of(frame, "socket_point_a")
+            frame = subject.target_of(station, "socket_parent_frame") if station is not None else None
+        elif "socket_parent" in type(frame).field_specs():
+            frame = subject.target_of(frame, "socket_parent")
+        else:
+            return None
     return frame

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 from osimlite.lint.axes import axes_of, axes_refused, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.skeleton import base_of, skeleton
@@ -10,6 +12,7 @@ from osimlite.lint.words import called, times
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
+from osimlite.schema.tree import is_a
 from osimlite.text import listed, nearest
 
 
@@ -333,6 +336,72 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
                     nth=nth,
                     suggestion=nearest(name, declared),
                     severity=None if declared else WARNING,
+                )
+
+
+@rule("OSIM412", "axis-without-coordinate", severity=ERROR)
+def axis_without_coordinate(subject: Subject, found: Found) -> None:
+    """An axis of a custom joint has a function and no coordinate for it.
+
+    ## What it does
+    Reports axes that name no coordinate though their function wants a variable. Constant and linear functions do
+    without.
+
+    ## Why is this bad
+    OpenSim crashes, without a message.
+
+    ## Example
+    ```xml
+    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    <CustomJoint name="ankle">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/foot</socket_child_frame>
+        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+        <SpatialTransform>
+            <TransformAxis name="rotation1">
+                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+            </TransformAxis>
+            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+            <TransformAxis name="translation1">
+                <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
+            </TransformAxis>
+        </SpatialTransform>
+    </CustomJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    <CustomJoint name="ankle">
+        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+        <socket_child_frame>/bodyset/foot</socket_child_frame>
+        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+        <SpatialTransform>
+            <TransformAxis name="rotation1">
+                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+            </TransformAxis>
+            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+            <TransformAxis name="translation1">
+                <coordinates>ankle_angle</coordinates>
+                <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
+            </TransformAxis>
+        </SpatialTransform>
+    </CustomJoint>
+    ```
+    """
+    for joint in subject.named("CustomJoint"):
+        for axis in axes_of(joint):
+            function = axis.function
+            while is_a(function, "MultiplierFunction") and getattr(function, "function", None) is not None:
+                function = cast("Any", function).function
+            if not axis.coordinates and type(function).__name__ not in ("Constant", "LinearFunction", "Unknown"):
+                found(
+                    f"{axis.name} of {called(joint)} names no coordinate for its {called(axis.function)}: "
+                    "OpenSim crashes",
+                    axis,
+                    tag="coordinates",
                 )
 
 

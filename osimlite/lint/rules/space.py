@@ -14,7 +14,7 @@ from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Component, Object
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
-from osimlite.schema.frames import Body, Ground, StationDefinedFrame
+from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.markers import Station
 from osimlite.schema.tree import is_a
 
@@ -25,10 +25,10 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports frames laid through stations of which two of the three that give the axes are in the same place, or which
-    are fixed to different bodies.
+    are fixed to different bodies; and offset frames that are fixed to themselves, or to each other in a circle.
 
     ## Why is this bad
-    OpenSim refuses the model.
+    OpenSim refuses the model; of a circle it never finds the end.
 
     ## Example
     ```xml
@@ -68,6 +68,14 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
     </ComponentSet>
     ```
     """
+    for offset in subject.each(PhysicalOffsetFrame):
+        seen: list[Component] = []
+        here: Component | None = offset
+        while isinstance(here, PhysicalOffsetFrame) and not any(known is here for known in seen):
+            seen.append(here)
+            here = subject.target_of(here, "socket_parent")
+        if here is offset:
+            found(f"{called(offset)} is fixed to itself: OpenSim never comes to an end", offset, tag="socket_parent")
     for frame in subject.each(StationDefinedFrame):
         points = [subject.target_of(frame, f"socket_{word}") for word in ("point_a", "point_b", "point_c")]
         tags = ["socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"]
@@ -75,7 +83,7 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
         places = [on_base(subject, subject.target_of(station, "socket_parent_frame")) for station in stations]
         if len(stations) < 4:
             continue
-        fixed_to = [place[0] if place is not None else None for place in places]
+        fixed_to = [base_of(subject, subject.target_of(station, "socket_parent_frame")) for station in stations]
         stray = next((n for n, base in enumerate(fixed_to) if base is not None and base is not fixed_to[0]), None)
         if fixed_to[0] is not None and stray is not None:
             found(
