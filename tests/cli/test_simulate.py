@@ -62,7 +62,7 @@ def test_fixed_step(walker, tmp_path):
         (["--set", "Pelvis_tx=3deg"], 2, "m, cm or mm"),
         (["--set", "RHip_rz=3cm"], 2, "deg or rad"),
         (["--set", "platform_rz=0"], 1, "is locked"),
-        (["--to", "-1"], 1, "positive time"),
+        (["--to", "-1"], 2, "positive time"),
         (["--fixed-step", "0.1"], 1, "shorter fixed step"),
         (["--fixed-step", "0.1", "--accuracy", "1e-3"], 2, "take one of them"),
         (["--engine", "bulet"], 2, "did you mean 'bullet'"),
