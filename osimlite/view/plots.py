@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from osimlite._require import require
-from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
+from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.view.motion import ContactForce, Motion, contact_forces, in_mechanism_order
@@ -53,10 +52,7 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
         raise OsimliteError("the motion has no moments; nothing can be drawn")
     known = mechanism if mechanism is not None else getattr(trajectory, "mechanism", None)
     base = Path(folder)
-    try:
-        base.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OsimliteError(f"cannot make this folder: {error.strerror}", file=str(base)) from None
+    make_folder(base)
     written = []
     for name, figure in _figures(trajectory, known):
         out = io.BytesIO()

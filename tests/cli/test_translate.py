@@ -101,7 +101,7 @@ def test_folders_of_meshes_are_named_by_options_and_the_environment(
         (("walker.osim", "--effort", "0"), "a limit of effort is a positive number, not 0"),
         (("gone.osim",), "gone.osim"),
         (("walker.osim", "--geometry", "gone"), "gone: --geometry names a folder that is not there"),
-        (("walker.osim", "-o", "walker.osim"), "cannot make this folder"),
+        (("walker.osim", "-o", "walker.osim"), "cannot make a folder here"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(walker: Path, arguments: tuple[str, ...], said: str) -> None:

@@ -279,7 +279,7 @@ def test_all_files_are_written_and_bullet_reads_them(tmp_path):
 
 def test_a_place_that_cannot_be_written_is_said_in_one_sentence(tmp_path):
     (tmp_path / "taken").write_text("")
-    with pytest.raises(OsimliteError, match="cannot make this folder"):
+    with pytest.raises(OsimliteError, match="cannot make a folder here"):
         to_urdf(dynamic_walker()).write(tmp_path / "taken")
 
 

@@ -127,7 +127,7 @@ def test_failures_are_said_in_a_sentence(tmp_path, monkeypatch):
     with pytest.raises(OsimliteError, match="no moments"):
         plot_simulation(empty, tmp_path)
     (tmp_path / "taken").write_text("")
-    with pytest.raises(OsimliteError, match="cannot make this folder"):
+    with pytest.raises(OsimliteError, match="cannot make a folder here"):
         plot_simulation(motion, tmp_path / "taken")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingDependency, match=r"osimlite\[plot\]"):
