@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from osimlite._require import require
+from osimlite.errors import OsimliteError
 from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
