@@ -31,6 +31,5 @@ def require(module: str, *, extra: str, purpose: str) -> ModuleType:
         ) from error
     except ImportError as error:
         raise MissingDependency(
-            f"{purpose} needs {package}, which is installed but cannot be loaded ({error}); "
-            f"reinstall it, or {cure}"
+            f"{purpose} needs {package}, which is installed but cannot be loaded ({error}); reinstall it, or {cure}"
         ) from error
