@@ -12,6 +12,7 @@ import pytest
 import osimlite
 from osimlite.cli import COMMANDS
 from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.models.source import make_model
 
 
 def blocks(text: str, language: str) -> list[str]:
@@ -27,6 +28,14 @@ def test_the_library_examples_run(repo: Path, tmp_path: Path, monkeypatch: pytes
     for block in found:
         exec(compile(block, "README.md", "exec"), {})
     assert (tmp_path / "states.sto").exists() and (tmp_path / "copy.osim").exists()
+
+
+def test_the_yaml_of_the_guide_is_a_model(repo: Path, tmp_path: Path) -> None:
+    pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+    (tmp_path / "model.yaml").write_text(blocks((repo / "docs" / "yaml.md").read_text(), "yaml")[0])
+    model = make_model(str(tmp_path / "model.yaml"))
+    assert osimlite.validate(model).ok
+    assert [c.path for c in model.components(osimlite.Coordinate)] == ["/jointset/hinge/angle"]
 
 
 def test_every_command_named_exists_and_every_command_is_named(repo: Path) -> None:
