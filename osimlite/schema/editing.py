@@ -7,7 +7,7 @@ from typing import Any
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.model import Model
-from osimlite.schema.tree import ILLEGAL_CHARACTERS, Use
+from osimlite.schema.tree import ILLEGAL_CHARACTERS, Tree, Use
 from osimlite.text import listed
 
 
@@ -54,7 +54,7 @@ def remove(model: Model, component: Component) -> None:
             for use in tree.uses()
             if id(use.holder) not in doomed
             and use.reference.rule not in _NAME_NOTHING
-            and id(tree.resolve(use).target) in doomed
+            and _is_at_or_below(_target_path(tree, use), path)
         }
     )
     if users:
@@ -76,6 +76,16 @@ def _path_in(model: Model, component: Object) -> str:
     if path is None:
         raise ModelError(f"'{component.name}' is not in the model")
     return path
+
+
+def _target_path(tree: Tree, use: Use) -> str | None:
+    target = tree.resolve(use).target
+    return None if target is None else tree.path_of(target)
+
+
+def _is_at_or_below(path: str | None, top: str) -> bool:
+    """By path and not by walking: the parts that OpenSim makes for itself can be named, and no property holds them."""
+    return path is not None and (path == top or path.startswith(top + "/"))
 
 
 def _assign(use: Use, text: str) -> None:

@@ -102,3 +102,14 @@ def test_a_copy_of_a_model_stands_alone() -> None:
     twin.rename(twin["/bodyset/Pelvis"], "hips")
     assert model["/bodyset/Pelvis"].name == "Pelvis"
     assert twin != model
+
+
+def test_a_part_that_opensim_makes_for_itself_keeps_its_owner() -> None:
+    model = Model(name="m")
+    body = model.add(Body(name="b", mass=1.0))
+    point = osimlite.PathPoint(name="p", socket_parent_frame=body)
+    path = osimlite.GeometryPath(path_point_set=osimlite.PathPointSet(objects=[point]))
+    spring = model.add(osimlite.PathSpring(name="s", geometry_path=path))
+    model.add(osimlite.MeyerFregly2016Force(name="f", socket_station="/forceset/s/path/p/station"))
+    with pytest.raises(ModelError, match="/forceset/f names it"):
+        model.remove(spring)
