@@ -24,6 +24,7 @@ COMMANDS = (
     "simulate",
     "kinematics",
     "inverse-dynamics",
+    "doctor",
     "demo",
 )
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""

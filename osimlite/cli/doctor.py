@@ -1,0 +1,147 @@
+"""``osimlite doctor``: what is installed, what each extra adds, and where meshes are looked for."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PURPOSES = {
+    "": "read, write, check: build, validate, format, upgrade, diff, info",
+    "sim": "translate, simulate, kinematics, inverse-dynamics",
+    "fast": "simulate --engine compiled",
+    "plot": "simulate --plot, --animate",
+    "yaml": "models as YAML",
+    "frame": "trajectory.to_frame()",
+    "oracle": "comparisons with OpenSim itself, in tests and benchmarks",
+}
+"""What each extra is for; "" is the plain installation. `all` and `dev` gather the others and the tools of tests."""
+
+MESHES = (".vtp", ".stl", ".obj")
+"""Endings of mesh files."""
+
+
+class Package(NamedTuple):
+    """A package that an extra asks for.
+
+    Attributes:
+        name: on the package index.
+        version: installed; "" if it is not.
+        trouble: why it cannot be imported, though it is installed; else "".
+    """
+
+    name: str
+    version: str
+    trouble: str
+
+
+def doctor(
+    model: Annotated[
+        Path | None,
+        typer.Argument(help="A model file, or a folder: its settings and mesh folders are shown.", show_default=False),
+    ] = None,
+) -> None:
+    """Show what is installed, what each extra adds and how to get it, and where mesh files are looked for.
+
+    Exits with 1 if an installed package cannot be loaded.
+
+    Example: osimlite doctor gait2392.osim
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    from osimlite import __version__
+    from osimlite.errors import MissingFileError
+
+    if model is not None and not model.exists():
+        raise MissingFileError("there is no such file or folder", file=str(model))
+    console = Console(highlight=False)
+    console.print(f"osimlite {__version__}, Python {sys.version.split()[0]}, {sys.platform}")
+    console.print(f"installed in {Path(__file__).parents[2]}\n", soft_wrap=True)
+
+    wanted = requirements()
+    with console.status("loading each package ..."):
+        found = {name: examine(name) for names in wanted.values() for name in names}
+    table = Table(box=None, pad_edge=False)
+    for heading in ("extra", "for", "packages"):
+        table.add_column(heading, overflow="fold")
+    for extra, names in wanted.items():
+        packages = [found[name] for name in names]
+        missing = any(not package.version for package in packages)
+        words = ", ".join(f"{item.name} {item.version or '[red]missing[/red]'}" for item in packages)
+        cure = f"\n[bold]pip install 'osimlite\\[{extra}]'[/bold]" if extra and missing else ""
+        table.add_row(extra or "(none)", PURPOSES[extra], words + cure)
+    console.print(table)
+
+    console.print()
+    _show_places(console, model)
+    console.print("\nshell completion: osimlite --install-completion")
+    broken = [package for package in found.values() if package.trouble]
+    for package in broken:
+        console.print(f"[red]{package.name} {package.version} cannot be loaded[/red]: {package.trouble}")
+    if broken:
+        raise typer.Exit(1)
+
+
+def requirements() -> dict[str, list[str]]:
+    """Names of the packages that each extra asks for, "" first."""
+    wanted: dict[str, list[str]] = {extra: [] for extra in PURPOSES}
+    for line in metadata.requires("osimlite") or []:
+        name = re.split(r"[\s\[<>=!~;(]", line, maxsplit=1)[0]
+        extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", line)
+        if (of := extra[1] if extra else "") in wanted:
+            wanted[of].append(name)
+    return wanted
+
+
+def examine(name: str) -> Package:
+    """Look for a package and import it, in a process of its own: some print, some end the process that loads them."""
+    try:
+        version = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return Package(name, "", "")
+    owned = metadata.packages_distributions().items()
+    modules = sorted(module for module, owners in owned if name.lower() in (owner.lower() for owner in owners))
+    # Some bring more than the module that bears their name; a few have none of it (PIL of pillow, yaml of pyyaml).
+    named = name.lower().replace("-", "_")
+    main = named if named in modules else next(module for module in modules if not module.startswith("_"))
+    done = subprocess.run([sys.executable, "-c", f"import {main}"], capture_output=True, text=True, check=False)
+    if done.returncode == 0:
+        return Package(name, version, "")
+    words = done.stderr.strip().splitlines() or [f"its process ended with {done.returncode}"]
+    return Package(name, version, words[-1])
+
+
+def _show_places(console: Console, model: Path | None) -> None:
+    """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
+    from osimlite.lint.settings import settings_for
+    from osimlite.translate.mesh_files import GEOMETRY_VARIABLE, geometry_folders
+
+    folder = Path.cwd() if model is None else model.resolve() if model.is_dir() else model.resolve().parent
+    settings = settings_for(folder)
+    where = settings.file or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
+    console.print(f"settings: {where}", soft_wrap=True)
+    console.print("mesh folders, in the order of the search:")
+    for place in geometry_folders(folder, [Path(path) for path in settings.mesh_paths]):
+        console.print(f"  {place}: {_meshes(place)}", soft_wrap=True)
+    if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
+        console.print(
+            "Bones of OpenSim's models lie in the folder Geometry of its installation; name that in the environment "
+            f"variable {GEOMETRY_VARIABLE}, or as mesh-paths in the settings."
+        )
+
+
+def _meshes(place: Path) -> str:
+    if not place.is_dir():
+        return "[yellow]not there[/yellow]"
+    count = sum(path.suffix.lower() in MESHES for path in place.iterdir())
+    return f"{count} mesh files" if count else "no mesh files"
