@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from osimlite.forces.hunt_crossley import simbody_pair_order
 
 if TYPE_CHECKING:
-    from osimlite.simulation.elements import ContactPair, PairContact
+    from osimlite.simulation.contact_elements import ContactPair, PairContact
     from osimlite.simulation.field import Writer
 
 

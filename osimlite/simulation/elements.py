@@ -9,23 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from math import inf, isfinite
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
-
-import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.coordinate_limit import limit_constants
-from osimlite.forces.hunt_crossley import combine_materials
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.multibody.schema_functions import numeric
-from osimlite.multibody.spatial import rotation_xyz
 from osimlite.schema.base import Unknown
-from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.forces import CoordinateLimitForce, Force, HuntCrossleyForce
-from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.model import Model
 from osimlite.text import listed
 
@@ -60,113 +53,6 @@ class ForceElement(Protocol):
             values: what the code kept in the element's places at one state; None where nothing was kept.
             origins: origin of each body in ground, m; ground's own last.
         """
-
-
-@dataclass(frozen=True, slots=True)
-class ContactSurface:
-    """A half space, a sphere or an ellipsoid, fixed to a body (index, -1 for ground).
-
-    Attributes:
-        frame: name of the frame that holds it in the model.
-        center: of the sphere, or a point on the plane, in the body frame (m).
-        radius: of the sphere or the largest of the ellipsoid (m), infinite for a half space.
-        normal: unit vector out of the half space, in the body frame.
-        material: the law's K (Pa), c (s/m), us, ud (1), uv (s/m).
-        radii: half axes of an ellipsoid (m), None for the others.
-        axes: their directions in the body frame, as the columns of a matrix.
-    """
-
-    name: str
-    body: int
-    frame: str
-    center: Triple
-    radius: float
-    normal: Triple
-    material: tuple[float, float, float, float, float]
-    radii: Triple | None = None
-    axes: tuple[Triple, Triple, Triple] | None = None
-
-    @property
-    def is_half_space(self) -> bool:
-        """Whether it is a half space."""
-        return self.radius == inf
-
-
-@dataclass(frozen=True, slots=True)
-class ContactPair:
-    """Two surfaces (places in the element) that may touch; of a half space and a sphere, the half space is first.
-
-    k, a, c, us, ud, uv are the effective parameters of the law.
-    """
-
-    first: int
-    second: int
-    effective: tuple[float, float, float, float, float, float]
-
-
-@dataclass(frozen=True)
-class PairContact:
-    """Contact of all surfaces of one force on different bodies, in pairs.
-
-    Attributes:
-        vt: transition velocity, m/s.
-        early_return: reproduce Simbody's defect, see `osimlite.forces.hunt_crossley.contact_forces`.
-        records: the surfaces in the order of OpenSim's record.
-    """
-
-    path: str
-    name: str
-    surfaces: tuple[ContactSurface, ...]
-    pairs: tuple[ContactPair, ...]
-    vt: float
-    early_return: bool = False
-
-    def write(self, writer: Writer) -> None:
-        """Write the contacts."""
-        from osimlite.simulation.contact_code import write_contacts
-
-        write_contacts(self, writer)
-
-    def pair_name(self, place: int) -> str:
-        """What to call a pair: the force, and the surfaces if it has more than one pair."""
-        if len(self.pairs) == 1:
-            return self.name
-        pair = self.pairs[place]
-        return f"{self.name} ({self.surfaces[pair.second].name}, {self.surfaces[pair.first].name})"
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Force and torque on the frame of each surface."""
-        labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
-        return tuple(f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels)
-
-    def record(self, values: Sequence[Any], origins: Sequence[Triple]) -> list[float]:
-        """Total force on the body of each surface, and its torque about the body's origin, in ground."""
-        loads: dict[int, list[float]] = {}
-        for pair, value in zip(self.pairs, values, strict=True):
-            if value is None:
-                continue
-            fx, fy, fz, px, py, pz = value[:6]
-            for surface, sign in ((self.surfaces[pair.first], -1.0), (self.surfaces[pair.second], 1.0)):
-                load = loads.setdefault(surface.body, [0.0] * 6)
-                ox, oy, oz = origins[surface.body]
-                x, y, z = px - ox, py - oy, pz - oz
-                for axis, part in enumerate((fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)):
-                    load[axis] += sign * part
-        row: list[float] = []
-        for surface in self.surfaces:
-            row += loads.get(surface.body, [0.0] * 6)
-        return row
-
-
-@dataclass(frozen=True)
-class HuntCrossley(PairContact):
-    """One HuntCrossleyForce on half spaces and spheres."""
-
-
-@dataclass(frozen=True)
-class EllipsoidContact(PairContact):
-    """One HuntCrossleyForce with ellipsoids among its surfaces, each of which may touch half spaces only."""
 
 
 @dataclass(frozen=True)
@@ -272,10 +158,12 @@ class ElementBuilder:
 
     def element(self, force: Any) -> ForceElement:
         """The element of a force; UnsupportedError, with its path and class for a message, if there is none."""
-        if isinstance(force, HuntCrossleyForce):
-            return self._hunt_crossley(force)
         if isinstance(force, CoordinateLimitForce):
             return self._coordinate_limit(force)
+        if isinstance(force, HuntCrossleyForce):
+            from osimlite.simulation.contact_elements import hunt_crossley
+
+            return hunt_crossley(self, force)
         from osimlite.simulation.more_elements import MAKERS
 
         maker = MAKERS.get(type(force))
@@ -320,93 +208,6 @@ class ElementBuilder:
             return numeric(function, 1, f"'{what}' of '{self.path(force)}'")
         except UnsupportedError:
             raise self.unsupported(force, f" with the {kind_of(function)} '{what}'") from None
-
-    def _hunt_crossley(self, force: HuntCrossleyForce) -> PairContact:
-        surfaces = []
-        for parameters in force.contact_parameters.objects:
-            material = (
-                parameters.stiffness,
-                parameters.dissipation,
-                parameters.static_friction,
-                parameters.dynamic_friction,
-                parameters.viscous_friction,
-            )
-            for use in self._uses(parameters):
-                found = self.tree.resolve(use)
-                if found.target is None:
-                    text = use.value if isinstance(use.value, str) else use.value.name
-                    raise ModelError(
-                        f"the force '{self.path(force)}' names the contact geometry '{text}', which the model "
-                        "does not have; run 'osimlite validate'"
-                    )
-                surfaces.append(self.surface(force, found.target, material))
-        self.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
-        pairs = []
-        for first, second in combinations(range(len(surfaces)), 2):
-            a, b = surfaces[first], surfaces[second]
-            if a.body == b.body or (a.is_half_space and b.is_half_space):
-                continue
-            if b.is_half_space:
-                first, second, a, b = second, first, b, a
-            if not a.is_half_space and (a.radii or b.radii):
-                raise self.unsupported(force, f" with an ellipsoid against a round surface, '{a.name}' and '{b.name}'")
-            try:
-                pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
-            except ValueError as error:
-                raise ModelError(f"the force '{self.path(force)}': {error}") from None
-        has_ellipsoid = any(surface.radii for surface in surfaces)
-        if has_ellipsoid and self.early_return and len(pairs) > 1:
-            raise self.unsupported(force, " with an ellipsoid, and Simbody's early return")
-        kind = EllipsoidContact if has_ellipsoid else HuntCrossley
-        return kind(
-            self.path(force),
-            force.name,
-            tuple(surfaces),
-            tuple(pairs),
-            force.transition_velocity,
-            self.early_return and len(pairs) > 1,
-        )
-
-    def _uses(self, parameters: Any) -> Iterator[Any]:
-        from osimlite.schema.tree import Use
-
-        spec = type(parameters).field_specs()["geometry"]
-        for position, word in enumerate(parameters.geometry):
-            yield Use(parameters, self.tree.owner_of(parameters), spec, word, position)
-
-    def surface(self, force: Any, geometry: Any, material: tuple[float, float, float, float, float]) -> ContactSurface:
-        """A contact geometry as the surface of a contact.
-
-        Raises:
-            UnsupportedError: it is no half space, sphere or ellipsoid, or not fixed to a body.
-        """
-        if not isinstance(geometry, ContactHalfSpace | ContactSphere | ContactEllipsoid):
-            raise self.unsupported(force, f" on the {kind_of(geometry)} '{self.path(geometry)}'")
-        frame = self._frame(geometry)
-        body, placed = self.mechanism.placement(self.path(frame))
-        center = placed[:3, :3] @ np.array(geometry.location) + placed[:3, 3]
-        # The half space is x > 0 of the geometry's own frame.
-        normal = -(placed[:3, :3] @ rotation_xyz(np.array(geometry.orientation)))[:, 0]
-        if isinstance(geometry, ContactEllipsoid):
-            axes = placed[:3, :3] @ rotation_xyz(np.array(geometry.orientation))
-            self.check(geometry, (*center, *axes.ravel(), *geometry.radii))
-            if not min(geometry.radii) > 0.0:
-                raise ModelError(f"the radii of '{self.path(geometry)}' are not all positive; give such")
-            place, still = triple(center), (0.0, 0.0, 0.0)
-            rows = triple(axes[0]), triple(axes[1]), triple(axes[2])
-            longest, radii = max(geometry.radii), triple(geometry.radii)
-            return ContactSurface(geometry.name, body, frame.name, place, longest, still, material, radii, rows)
-        radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
-        self.check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
-        return ContactSurface(geometry.name, body, frame.name, triple(center), radius, triple(normal), material)
-
-    def _frame(self, geometry: ContactGeometry) -> PhysicalFrame:
-        frame = self.tree.target(geometry, "socket_frame", geometry.socket_frame)
-        if not isinstance(frame, PhysicalFrame):
-            raise UnsupportedError(
-                f"the contact geometry '{self.path(geometry)}' on the {kind_of(frame)} '{self.path(frame)}'"
-            )
-        return frame
 
     def _coordinate_limit(self, force: CoordinateLimitForce) -> CoordinateLimit:
         coordinate = self.tree.target(force, "coordinate", force.coordinate)

@@ -29,7 +29,8 @@ from osimlite.forces import (
 from osimlite.multibody.functions import Constant, Function
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.chain import Chain, Column
-from osimlite.simulation.elements import ForceElement, PairContact, Triple
+from osimlite.simulation.contact_elements import PairContact
+from osimlite.simulation.elements import ForceElement, Triple
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
 from osimlite.translate.robot import Robot, RobotJoint
 

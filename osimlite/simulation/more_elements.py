@@ -1,4 +1,4 @@
-"""Which class of force has which element, but for those of :mod:`osimlite.simulation.elements` itself."""
+"""Which class of force has which element, but for those that every walker has."""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
-from osimlite.simulation.elements import ContactSurface, ElementBuilder, Triple, kind_of
+from osimlite.simulation.contact_elements import ContactSurface, surface_of
+from osimlite.simulation.elements import ElementBuilder, Triple, kind_of
 from osimlite.simulation.field import Writer
 from osimlite.simulation.script import Scalar
 
@@ -46,7 +47,7 @@ class SmoothContact:
                 raise ModelError(
                     f"the '{field}' of '{builder.path(force)}' is a {kind_of(geometry)}; name a {wanted.__name__}"
                 )
-            surfaces.append(builder.surface(force, geometry, NO_MATERIAL))
+            surfaces.append(surface_of(builder, force, geometry, NO_MATERIAL))
         cf = force.constant_contact_force
         hertz = force.stiffness, cf, force.hertz_smoothing
         friction = force.static_friction, force.dynamic_friction, force.viscous_friction

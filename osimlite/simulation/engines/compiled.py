@@ -23,7 +23,8 @@ from osimlite.errors import OsimliteError, SimulationError
 from osimlite.forces.coordinate_limit import limit_energy, limit_force
 from osimlite.forces.hunt_crossley import contact_energy
 from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.simulation.elements import CoordinateLimit, Forces, HuntCrossley
+from osimlite.simulation.contact_elements import HuntCrossley
+from osimlite.simulation.elements import CoordinateLimit, Forces
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.integrators import Observer, RungeKuttaMerson, SemiImplicitEuler, Stepper
 from osimlite.simulation.kernels import dynamics, merson

@@ -14,7 +14,8 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
-from osimlite.simulation.elements import CoordinateLimit, Forces, HuntCrossley
+from osimlite.simulation.contact_elements import HuntCrossley
+from osimlite.simulation.elements import CoordinateLimit, Forces
 from osimlite.simulation.kernels.arrays import (
     BALL,
     BALL_BACK,
