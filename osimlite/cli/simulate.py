@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
 
 LIVE_STEP = 1e-3
 """Step of what the window shows if none is given, s."""
-
-_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|cm|mm|m)?(?:/s)?")
-_UNITS = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 def simulate(
@@ -84,7 +80,7 @@ def simulate(
     with Simulation(model, engine, skip_unsupported=skip_unsupported, show=gui) as simulation:
         initial = quantities(start or [], simulation.mechanism, "--set")
         speeds = quantities(start_speed or [], simulation.mechanism, "--set-speed")
-        with _progress(console, "simulating", to) as progress:
+        with progress_bar(console, "simulating", to) as progress:
             trajectory = simulation.run(
                 to,
                 accuracy=DEFAULT_ACCURACY if accuracy is None else accuracy,
@@ -106,19 +102,19 @@ def quantities(words: Sequence[str], mechanism: Mechanism, option: str) -> dict[
         ModelError: there is no such coordinate.
     """
     from osimlite.errors import OsimliteError
+    from osimlite.quantity import quantity
 
     found = {}
     for word in words:
         name, equals, text = (part.strip() for part in word.partition("="))
-        match = _QUANTITY.fullmatch(text)
-        if not equals or match is None:
+        given = quantity(text)
+        if not equals or given is None:
             raise OsimliteError(f"{option} takes COORDINATE=VALUE with a number such as 0.5 or 30deg, got '{word}'")
-        number, unit = match.groups()
         kind = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
-        if unit is not None and kind != "coupled" and (unit in ("deg", "rad")) != (kind == "rotational"):
+        if given.unit is not None and kind != "coupled" and given.is_angle != (kind == "rotational"):
             wanted = "deg or rad" if kind == "rotational" else "m, cm or mm"
             raise OsimliteError(f"coordinate '{name}' is {kind}: give '{text}' in {wanted}")
-        found[name] = float(number) * _UNITS.get(unit or "rad", 1.0)
+        found[name] = given.value
     return found
 
 
@@ -151,7 +147,7 @@ def _write(
         if animate:
             from osimlite.view.animation import animate as draw
 
-            with _progress(console, "drawing", None) as progress:
+            with progress_bar(console, "drawing", None) as progress:
                 written.append(draw(model, trajectory, beside / "animation.gif", progress=progress))
         for path in written:
             path.replace(folder / path.name)
@@ -163,38 +159,6 @@ def _write(
         raise
     beside.rmdir()
     return [folder / path.name for path in written]
-
-
-@contextmanager
-def _progress(console: Console, title: str, total: float | None) -> Iterator[Callable[..., None]]:
-    """A progress bar that shows up on a terminal once the work has taken a second."""
-    import time
-
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    started = time.perf_counter()
-    bar = Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn(),
-        console=console, transient=True,
-    )  # fmt: skip
-    task = bar.add_task(title, total=total)
-    is_shown = False
-
-    def advance(done: float, of: float | None = None) -> None:
-        nonlocal is_shown
-        if not console.is_terminal:
-            return
-        if not is_shown and time.perf_counter() - started > 1.0:
-            bar.start()
-            is_shown = True
-        if is_shown:
-            bar.update(task, completed=done, total=total if of is None else of)
-
-    try:
-        yield advance
-    finally:
-        if is_shown:
-            bar.stop()
 
 
 def _table(trajectory: Trajectory, files: Sequence[Path]) -> Any:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
+from osimlite._load import errors_placed, module_named, module_of_file
 from osimlite.document.data import read_data
-from osimlite.errors import MissingFileError, OsimliteError
+from osimlite.errors import OsimliteError
 from osimlite.models import BUILT_IN
 from osimlite.schema.model import Model
 from osimlite.text import did_you_mean, listed
+
+DATA = (".yaml", ".yml", ".json")
+"""How the names of data files end."""
 
 _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
@@ -32,18 +33,29 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     Raises:
         OsimliteError: there is no such source, it has no such parameter, or it does not return a Model.
     """
-    if source.endswith((".yaml", ".yml", ".json")):
+    if source.endswith(DATA):
         if parameters:
             raise OsimliteError(f"'{source}' is data and takes no parameters; edit the file, or build from Python")
         return read_data(source)
     function = _function(source)
     arguments = _arguments(function, parameters or {}, source)
     file = inspect.getsourcefile(function)
-    with _errors_placed(str(file)):
+    with errors_placed(str(file)):
         model = function(**arguments)
     if not isinstance(model, Model):
         raise OsimliteError(f"'{source}' returned a {type(model).__name__}, not an osimlite.Model")
     return model
+
+
+def parameters_of(source: str) -> dict[str, Any]:
+    """Names and defaults of the parameters of a model function; a data file has none.
+
+    Raises:
+        OsimliteError: there is no such source.
+    """
+    if source.endswith(DATA):
+        return {}
+    return {name: parameter.default for name, parameter in inspect.signature(_function(source)).parameters.items()}
 
 
 def describe(name: str) -> str:
@@ -60,9 +72,9 @@ def _function(source: str) -> Callable[..., Any]:
     if not place:
         place, name = target, ""
     if place.endswith(".py"):
-        module = _module_of_file(Path(place))
+        module = module_of_file(Path(place))
     elif ":" in target:
-        module = _module_named(place)
+        module = module_named(place)
     else:
         known = did_you_mean(source, BUILT_IN) or f"; the built-in models are {listed(BUILT_IN)}"
         raise OsimliteError(f"'{source}' is no built-in model, Python file, module:function or data file{known}")
@@ -72,34 +84,6 @@ def _function(source: str) -> Callable[..., Any]:
             raise OsimliteError(f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}")
         return found  # type: ignore[no-any-return]
     return _only_function(module, place)
-
-
-def _module_of_file(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise MissingFileError("cannot read the file: no such file", file=str(path))
-    # A name of our own, so that a model in json.py does not take the place of a module that others import.
-    name = f"_osimlite_source_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.path.insert(0, str(path.resolve().parent))
-    sys.modules[name] = module
-    try:
-        with _errors_placed(str(path)):
-            spec.loader.exec_module(module)
-    finally:
-        sys.path.pop(0)
-    return module
-
-
-def _module_named(name: str) -> ModuleType:
-    # `python -m osimlite` finds modules in the current folder; so must the command of that name.
-    if "" not in sys.path:
-        sys.path.insert(0, "")
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise OsimliteError(f"cannot import '{name}': {error}") from None
 
 
 def _functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
@@ -166,27 +150,3 @@ def _value(name: str, text: str, parameter: inspect.Parameter) -> Any:
             return text
         noun = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
         raise OsimliteError(f"parameter '{name}' must be {noun}, got '{text}'") from None
-
-
-@contextmanager
-def _errors_placed(file: str) -> Iterator[None]:
-    """Tell of any error in the user's own code with the file and the line of it."""
-    try:
-        yield
-    except OsimliteError as error:
-        if error.file is None:
-            error.file, error.line = file, _line_in(error, file)
-        raise
-    except Exception as error:
-        raise OsimliteError(f"{type(error).__name__}: {error}", file=file, line=_line_in(error, file)) from error
-
-
-def _line_in(error: BaseException, file: str) -> int | None:
-    """The last line of `file` on the way to the error."""
-    line = getattr(error, "lineno", None) if isinstance(error, SyntaxError) else None
-    trace = error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == file:
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
