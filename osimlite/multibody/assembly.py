@@ -7,7 +7,7 @@ and clamped ones stay in their range. Here Newton's method leads to the constrai
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,14 +30,16 @@ _TOLERANCE = 1e-10
 """What a constraint may be off (m or rad): what OpenSim's default assembly accuracy allows."""
 
 
-def assembled(mechanism: Mechanism, q: Array, time: float) -> Array:
+def assembled(mechanism: Mechanism, q: Array, time: float, kept: Collection[int] = ()) -> Array:
     """The coordinate values (n,) nearest to `q` (n,) that fulfil the constraints at `time` (s).
+
+    The coordinates with indices `kept` keep their values, as locked ones do.
 
     Raises:
         SimulationError: there are none, or they are too far to be found.
     """
     infos = mechanism.coordinates
-    held = {place: float(q[place]) for place, info in enumerate(infos) if info.locked}
+    held = {place: float(q[place]) for place, info in enumerate(infos) if info.locked or place in kept}
     while True:
         found = _nearest(mechanism, q, time, held)
         outside = {
@@ -52,14 +54,29 @@ def assembled(mechanism: Mechanism, q: Array, time: float) -> Array:
         held[worst] = outside[worst]
 
 
-def projected(state: Kinematics) -> Array:
-    """The generalized speeds (n,) nearest to those of `state` that fulfil the constraints."""
+def projected(state: Kinematics, kept: Collection[int] = ()) -> Array:
+    """The generalized speeds (n,) nearest to those of `state` that fulfil the constraints.
+
+    As in Simbody, the change of a speed that is greater than 1 counts relative to it.
+
+    Raises:
+        SimulationError: there are none in which the speeds with indices `kept` are as they were.
+    """
     constraints = state.mechanism.constraints
     if not constraints:
         return state.u
     rows, wanted = stacked([item.velocity_equations(state) for item in constraints])
-    change, _ = solutions(rows, wanted - rows @ state.u)
-    u: Array = state.u + change
+    scales = np.maximum(np.abs(state.u), 1.0)
+    scales[list(kept)] = 0.0
+    missing = wanted - rows @ state.u
+    change, _ = solutions(rows * scales, missing)
+    u: Array = state.u + scales * change
+    if kept and np.abs(rows @ u - wanted).max(initial=0.0) > 1e-9 * (1.0 + np.abs(missing).max(initial=0.0)):
+        names = [state.mechanism.coordinates[place].name for place in kept]
+        raise SimulationError(
+            f"the constraints of '{state.mechanism.name}' do not allow the speeds given for {listed(names)}; "
+            "leave some of them out"
+        )
     return u
 
 

@@ -80,6 +80,11 @@ class PointConstraint(Holonomic):
     second: StationPlacement
     name: str = "point constraint"
 
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """The two bodies."""
+        return self.first.body, self.second.body
+
     def bond(self, state: Kinematics) -> Bond:
         """The vector between the stations vanishes."""
         return station(state, self.second).minus(station(state, self.first)).bond()
@@ -93,6 +98,11 @@ class DistanceConstraint(Holonomic):
     second: StationPlacement
     distance: float
     name: str = "distance constraint"
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """The two bodies."""
+        return self.first.body, self.second.body
 
     def bond(self, state: Kinematics) -> Bond:
         """The length of the vector between the stations is the distance."""
@@ -127,6 +137,11 @@ class PointOnLineConstraint(Holonomic):
     follower: StationPlacement
     name: str = "point on line constraint"
 
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """The two bodies."""
+        return self.line.body, self.follower.body
+
     def bond(self, state: Kinematics) -> Bond:
         """Two directions across the line see no distance of the station from it."""
         arm = station(state, self.follower).minus(station(state, self.line))
@@ -143,6 +158,11 @@ class WeldConstraint(Holonomic):
     first: FramePlacement
     second: FramePlacement
     name: str = "weld constraint"
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """The two bodies."""
+        return self.first.body, self.second.body
 
     def bond(self, state: Kinematics) -> Bond:
         """The origins coincide, and each axis of one frame is square to the next axis of the other."""
@@ -173,6 +193,11 @@ class RollingConstraint(Constraint):
     normal: Array
     height: float
     name: str = "rolling constraint"
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """Surface and roller."""
+        return self.surface, self.roller
 
     def position_errors(self, state: Kinematics) -> Array:
         """The height and the turn about the normal."""

@@ -7,17 +7,21 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from osimlite.multibody.functions import Function
-from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.kinematics import CoordinateState, Kinematics
 from osimlite.multibody.spatial import Array
 
 
 class Constraint(Protocol):
     """Equations that the coordinates, the generalized speeds and their derivatives fulfil."""
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """Indices of the bodies that it speaks of; if there are none, states without bodies will do for it."""
 
     @property
     def name(self) -> str:
@@ -72,22 +76,23 @@ class Lock:
     whichever angular velocities that takes.
     """
 
+    bodies: ClassVar[tuple[int, ...]] = ()
     coordinate: int
     name: str = "lock"
 
-    def position_errors(self, state: Kinematics) -> Array:
+    def position_errors(self, state: CoordinateState) -> Array:
         """Nothing: every value is right, as long as it stays."""
         return np.zeros(0)
 
-    def velocity_equations(self, state: Kinematics) -> tuple[Array, Array]:
+    def velocity_equations(self, state: CoordinateState) -> tuple[Array, Array]:
         """The rate of the coordinate is zero."""
         return self._row(state), np.zeros(1)
 
-    def acceleration_equations(self, state: Kinematics) -> tuple[Array, Array]:
+    def acceleration_equations(self, state: CoordinateState) -> tuple[Array, Array]:
         """The second derivative of the coordinate is zero."""
         return self._row(state), -state.mechanism.rate_bias(state.q, state.u)[[self.coordinate]]
 
-    def _row(self, state: Kinematics) -> Array:
+    def _row(self, state: CoordinateState) -> Array:
         return state.mechanism.rate_matrix(state.q)[[self.coordinate]]
 
 
@@ -95,11 +100,12 @@ class Lock:
 class Prescribed(Holonomic):
     """Makes one coordinate follow a function of time (s)."""
 
+    bodies: ClassVar[tuple[int, ...]] = ()
     coordinate: int
     function: Function
     name: str = "prescribed coordinate"
 
-    def bond(self, state: Kinematics) -> Bond:
+    def bond(self, state: CoordinateState) -> Bond:
         """The coordinate minus the function."""
         value, first, second = self.function.evaluate(np.array((state.time,)))
         mechanism, own = state.mechanism, [self.coordinate]
@@ -115,12 +121,13 @@ class Prescribed(Holonomic):
 class Coupler(Holonomic):
     """Makes one coordinate a function of others."""
 
+    bodies: ClassVar[tuple[int, ...]] = ()
     dependent: int
     independent: tuple[int, ...]
     function: Function
     name: str = "coupler"
 
-    def bond(self, state: Kinematics) -> Bond:
+    def bond(self, state: CoordinateState) -> Bond:
         """The function minus the dependent coordinate."""
         mechanism, others = state.mechanism, list(self.independent)
         value, gradient, hessian = self.function.evaluate(state.q[others])

@@ -7,8 +7,9 @@ stack the angular part over the linear part of the body's origin.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,6 +17,35 @@ from osimlite.multibody.spatial import Array, carried, cross, skew, transform, t
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
+
+
+class CoordinateState(Protocol):
+    """Values and speeds of the coordinates of a mechanism at a time; what its bodies do is not asked for."""
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Whose state."""
+
+    @property
+    def q(self) -> Array:
+        """Coordinate values (n,)."""
+
+    @property
+    def u(self) -> Array:
+        """Generalized speeds (n,)."""
+
+    @property
+    def time(self) -> float:
+        """What prescribed motions go by (s)."""
+
+
+class Coordinates(NamedTuple):
+    """A state of which nobody asks what the bodies do."""
+
+    mechanism: Mechanism
+    q: Array
+    u: Array
+    time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,14 +105,20 @@ class Kinematics:
         return result
 
 
-def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> Kinematics:
-    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,) and `time` (s)."""
+def kinematics(
+    mechanism: Mechanism, q: Array, u: Array, time: float = 0.0, *, bodies: Iterable[int] | None = None
+) -> Kinematics:
+    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,) and `time` (s).
+
+    With `bodies`, which must follow those that carry them, the rows of all others mean nothing.
+    """
     count, size = len(mechanism.bodies), len(q)
     rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
     # The columns of RelativeMotion, for each body in ground.
     blocks = np.zeros((count + 1, 6, size + 2))
     rotations[-1] = np.eye(3)
-    for index, body in enumerate(mechanism.bodies):
+    for index in range(count) if bodies is None else bodies:
+        body = mechanism.bodies[index]
         parent, own = body.parent, list(body.mobilizer.coordinates)
         motion = body.mobilizer.relative(q[own], u[own])
         arm = rotations[parent] @ motion.translation

@@ -9,7 +9,7 @@ scapulothoracic joints, whose rotational speeds are the angular velocity of the 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -129,10 +129,11 @@ class Mechanism:
         q = self.assemble({}, time)
         return q, self.project_speeds(q, {}, time)
 
-    def assemble(self, q: Values, time: float = 0.0) -> Array:
+    def assemble(self, q: Values, time: float = 0.0, *, kept: Collection[int] = ()) -> Array:
         """The values (n,) nearest to `q` that fulfil the constraints, by the rules of OpenSim's assembly.
 
-        Locked coordinates keep their values, clamped ones their ranges; those that are `yielding` do not count.
+        Locked coordinates, and those whose places are in `kept`, keep their values, clamped ones their ranges; those
+        that are `yielding` do not count.
 
         Raises:
             SimulationError: no pose near the given one fulfils the constraints.
@@ -140,11 +141,17 @@ class Mechanism:
         values = self.values(q)
         if all(isinstance(item, Lock) for item in self.constraints):
             return values
-        return assembled(self, values, time)
+        return assembled(self, values, time, kept)
 
-    def project_speeds(self, q: Values, u: Values, time: float = 0.0) -> Array:
-        """The speeds (n,) nearest to `u` that fulfil the constraints."""
-        return projected(self.at(q, self.speeds(u), time))
+    def project_speeds(self, q: Values, u: Values, time: float = 0.0, *, kept: Collection[int] = ()) -> Array:
+        """The speeds (n,) nearest to `u` that fulfil the constraints, by the rules of OpenSim's integrator.
+
+        The change of a speed above 1 counts relative to it; speeds of the coordinates in `kept` do not change.
+
+        Raises:
+            SimulationError: the constraints do not allow the speeds that are kept.
+        """
+        return projected(self.at(q, self.speeds(u), time), kept)
 
     def values(self, q: Values) -> Array:
         """Coordinate values as an array (n,)."""

@@ -96,5 +96,6 @@ def test_energy_of_a_real_model(corpus, opensim_derivatives):
         q[mechanism.coordinate_index(f"knee_angle_{side}")] = 0.6
         u[mechanism.coordinate_index(f"knee_angle_{side}")] = 3.0
     q = mechanism.assemble(q)
-    change = _energy_change(mechanism, q, mechanism.project_speeds(q, u), 50, 1e-3)
+    knees = [mechanism.coordinate_index(f"knee_angle_{side}") for side in "rl"]
+    change = _energy_change(mechanism, q, mechanism.project_speeds(q, u, kept=knees), 50, 1e-3)
     assert (change > 1e-6) if opensim_derivatives else (change < 1e-9)
