@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -66,6 +66,7 @@ class Runs:
         reports: states at the report times (W, r, 2n); not a number after the end of a run.
         events: of each run its events in the order of time: time (s), name, whether it begins or rises.
         peaks: largest force (N) of each contact at the end of a step, and its time (s) (W, P, 2).
+        event_states: of each run the states at its events (as many as events, 2n), if they were asked for.
     """
 
     times: Floats
@@ -75,6 +76,7 @@ class Runs:
     reports: Floats
     events: list[list[tuple[float, str, bool]]]
     peaks: Floats
+    event_states: list[Floats] = field(default_factory=list)
 
 
 def run_many(
@@ -87,6 +89,7 @@ def run_many(
     report_times: Sequence[float] = (),
     watches: Sequence[Watch] = (),
     most_events: int = 0,
+    event_states: bool = False,
     most_tries: int = NO_LIMIT,
     threads: int | None = None,
 ) -> Runs:
@@ -101,6 +104,7 @@ def run_many(
         report_times: increasing, s.
         watches: what else is an event, besides contacts that begin and end.
         most_events: room for the events of a run; those beyond it are lost.
+        event_states: keep the states at the events.
         most_tries: steps that a run may try.
         threads: how many work; by default one for each core.
 
@@ -124,7 +128,8 @@ def run_many(
     moments = np.array(report_times, dtype=np.float64)
     clocks = np.tile((0.0, INITIAL_STEP), (count, 1))
     counts, endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
-    reports, events = np.full((count, len(moments), size), np.nan), np.zeros((count, most_events, 3))
+    reports = np.full((count, len(moments), size), np.nan)
+    events = np.zeros((count, most_events, 3 + size * event_states))
     peaks, control = np.zeros((count, pairs, 2)), engine.control(to, accuracy, most_tries)
     run_several, no_log, no_forces = compiled(merson.run_several), np.zeros((1, 0, 0)), np.zeros((1, 0, pairs, 3))
 
@@ -137,11 +142,10 @@ def run_many(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))
     names = [*engine.contacts, *(watch.name for watch in watches)]
-    named = [
-        [(t, names[int(number)], begins > 0.0) for t, number, begins in rows[: min(most_events, total)].tolist()]
-        for rows, total in zip(events, counts[:, merson.EVENTS], strict=True)
-    ]
-    return Runs(clocks[:, 0].copy(), starts, endings, counts[:, :3].copy(), reports, named, peaks)
+    kept = [rows[:total] for rows, total in zip(events, counts[:, merson.EVENTS], strict=True)]
+    named = [[(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()] for rows in kept]
+    at_events = [rows[:, 3:] for rows in kept] if event_states else []
+    return Runs(clocks[:, 0].copy(), starts, endings, counts[:, :3].copy(), reports, named, peaks, at_events)
 
 
 def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:

@@ -115,3 +115,13 @@ def test_wrong_words_are_refused(engine, starts):
         run_many(engine, starts, watches=[Watch("x", coordinate="platform_rz")])
     with pytest.raises(ModelError, match="no coordinate"):
         run_many(engine, starts, watches=[Watch("x", coordinate="nothing")])
+
+
+def test_states_at_events_are_those_of_the_motion(engine, starts):
+    runs = run_many(engine, starts, 2.0, accuracy=1e-6, most_events=60, event_states=True)
+    for start, events, states in zip(starts, runs.events, runs.event_states, strict=True):
+        assert states.shape == (len(events), 14)
+        times = sorted({t for t, _, _ in events})
+        known = run_many(engine, start[None], 2.0, accuracy=1e-6, report_times=times).reports[0]
+        for (t, _, _), state in zip(events, states, strict=True):
+            assert state == pytest.approx(known[times.index(t)], abs=1e-12)

@@ -55,7 +55,8 @@ class Records(NamedTuple):
         states: at these times (r, 2n).
         log: of each step the time, y, f (k, 1 + 4n).
         forces: of each step the force on surface 2 of each pair (k, P, 3).
-        events: time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0 (e, 3).
+        events: time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if
+            there is room the state (e, 3 or 3 + 2n).
         peaks: largest force of each pair at the end of a step, and its time (P, 2).
         watches: kind, degree of freedom or link, and -1 or 1 if falling or rising through the level ends the run, 0 if
             neither (w, 3).
@@ -333,7 +334,9 @@ def note_events(
         if number >= pairs and records.watches[number - pairs, 2] == (1 if rises else -1):
             t = high
             stop = min(stop, t)
-        insert(records.events, first, counts, t, number, rises)
+        row = insert(records.events, first, counts, t, number, rises)
+        if row < len(records.events) and records.events.shape[1] > 3:
+            cubic(t0, y0, f0, t1, y1, f1, t, records.events[row, 3:])
     # What lies behind the end of the run has not happened.
     while counts[EVENTS] > first and counts[EVENTS] <= len(records.events):
         if records.events[counts[EVENTS] - 1, 0] <= stop:
@@ -342,16 +345,17 @@ def note_events(
     return stop
 
 
-def insert(events: Floats, first: int, counts: Ints, t: float, number: int, rises: bool) -> None:
-    """Put an event among those of its step, by time."""
-    row = counts[EVENTS]
+def insert(events: Floats, first: int, counts: Ints, t: float, number: int, rises: bool) -> int:
+    """Put an event among those of its step, by time; returns its row, which may lie beyond the room."""
+    row = int(counts[EVENTS])
     counts[EVENTS] += 1
     if row >= len(events):
-        return
+        return row
     while row > first and events[row - 1, 0] > t:
         events[row] = events[row - 1]
         row -= 1
     events[row, 0], events[row, 1], events[row, 2] = t, number, 1.0 if rises else 0.0
+    return row
 
 
 def run_several(
