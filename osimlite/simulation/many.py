@@ -19,6 +19,7 @@ from osimlite.simulation.engines.compiled import NO_LIMIT, CompiledEngine, compi
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP
 from osimlite.simulation.kernels import merson
 from osimlite.simulation.kernels.arrays import Floats, Ints
+from osimlite.text import did_you_mean
 
 AT_ONCE = 8
 """So many runs a thread takes at a time."""
@@ -38,6 +39,7 @@ class Watch(NamedTuple):
     Attributes:
         name: what the event is called.
         coordinate: name or path of the coordinate that is watched, or
+        contact: name of the contact (of the engine's `contacts`) that is, which is above its level while it pushes, or
         body: name or path of the body (or frame) of which a point is watched, with
         station: the point in it (m), and
         direction: along which in ground its position counts.
@@ -52,6 +54,7 @@ class Watch(NamedTuple):
     direction: tuple[float, float, float] = (0.0, 1.0, 0.0)
     level: float = 0.0
     stops: int = 0
+    contact: str = ""
 
 
 @dataclass(frozen=True)
@@ -152,14 +155,19 @@ def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Fl
     kinds, levels = np.zeros((len(watches), 3), dtype=np.int64), np.zeros((len(watches), 7))
     mechanism = engine.mechanism
     for row, watch in enumerate(watches):
-        if bool(watch.coordinate) == bool(watch.body):
-            raise OsimliteError(f"the watch '{watch.name}' names a coordinate or a body; give it one of them")
+        if bool(watch.coordinate) + bool(watch.body) + bool(watch.contact) != 1:
+            raise OsimliteError(f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them")
         if watch.coordinate:
             place = mechanism.coordinate_index(watch.coordinate)
             if place not in engine.order:
                 raise OsimliteError(f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked")
             kinds[row] = merson.COORDINATE, engine.order.index(place), watch.stops
             levels[row, 6] = watch.level
+        elif watch.contact:
+            if watch.contact not in engine.contacts:
+                near = did_you_mean(watch.contact, engine.contacts)
+                raise OsimliteError(f"the model has no contact '{watch.contact}'{near}")
+            kinds[row] = merson.TOUCH, engine.contacts.index(watch.contact), watch.stops
         else:
             body, frame = mechanism.placement(watch.body)
             link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]

@@ -109,10 +109,12 @@ def test_wrong_words_are_refused(engine, starts):
         run_many(engine, starts[:, 1:])
     with pytest.raises(OsimliteError, match="for each of the 20 runs"):
         run_many(engine, starts, numbers=np.zeros((3, 5)))
-    with pytest.raises(OsimliteError, match="'x' names a coordinate or a body"):
+    with pytest.raises(OsimliteError, match="'x' is on a coordinate, a body or a contact"):
         run_many(engine, starts, watches=[Watch("x")])
     with pytest.raises(OsimliteError, match="locked"):
         run_many(engine, starts, watches=[Watch("x", coordinate="platform_rz")])
+    with pytest.raises(OsimliteError, match="no contact 'RHipForc'; did you mean 'RHipForce'"):
+        run_many(engine, starts, watches=[Watch("x", contact="RHipForc")])
     with pytest.raises(ModelError, match="no coordinate"):
         run_many(engine, starts, watches=[Watch("x", coordinate="nothing")])
 
@@ -125,3 +127,14 @@ def test_states_at_events_are_those_of_the_motion(engine, starts):
         known = run_many(engine, start[None], 2.0, accuracy=1e-6, report_times=times).reports[0]
         for (t, _, _), state in zip(events, states, strict=True):
             assert state == pytest.approx(known[times.index(t)], abs=1e-12)
+
+
+def test_a_touch_ends_a_run(engine, starts):
+    watch = Watch("down", contact="RHipForce", stops=1)
+    runs = run_many(engine, starts, 5.0, watches=[watch], most_events=90)
+    ends = [ENDINGS[int(ending)] for ending in runs.endings]
+    assert ends.count("stopped") > 10
+    for end, t, events in zip(ends, runs.times, runs.events, strict=True):
+        begins = [moment for moment, name, _ in events if name == "RHipForce"]
+        assert begins == (pytest.approx([t], abs=2e-9) if end == "stopped" else [])
+        assert [event for event in events if event[1] == "down"] == ([(t, "down", True)] if begins else [])

@@ -25,8 +25,8 @@ TIME_OF_EVENT = 1e-9
 TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS = 0, 1, 2, 3, 4, 5
 """Places of the counts."""
 
-COORDINATE, HEIGHT = 0, 1
-"""Kinds of watches: on the value of a coordinate, on how far a point lies along a direction."""
+COORDINATE, HEIGHT, TOUCH = 0, 1, 2
+"""Kinds of watches: on the value of a coordinate, on how far a point lies along a direction, on a contact."""
 
 
 class Control(NamedTuple):
@@ -58,8 +58,8 @@ class Records(NamedTuple):
         events: time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if
             there is room the state (e, 3 or 3 + 2n).
         peaks: largest force of each pair at the end of a step, and its time (P, 2).
-        watches: kind, degree of freedom or link, and -1 or 1 if falling or rising through the level ends the run, 0 if
-            neither (w, 3).
+        watches: kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level ends the
+            run, 0 if neither (w, 3).
         levels: of each watch the station in the link, the direction in ground, and the level (w, 7).
     """
 
@@ -289,6 +289,8 @@ def levels_at(s: Structure, x: Numbers, w: Work, y: Floats, records: Records, le
         kind, index, a = records.watches[number, 0], records.watches[number, 1], records.levels[number]
         if kind == COORDINATE:
             levels[pairs + number] = y[index] - a[6]
+        elif kind == TOUCH:
+            levels[pairs + number] = levels[index]
         else:
             px, py, pz = station(w, index, a[0], a[1], a[2])
             levels[pairs + number] = px * a[3] + py * a[4] + pz * a[5] - a[6]
@@ -321,7 +323,7 @@ def note_events(
         while high - low > TIME_OF_EVENT:
             middle = 0.5 * (low + high)
             cubic(t0, y0, f0, t1, y1, f1, middle, stages[0])
-            if number < pairs:
+            if number < pairs or records.watches[number - pairs, 0] == TOUCH:
                 contacts_at(s, x, w, stages[0], stages[1])
             else:
                 place(s, x, w, stages[0][: len(s.above)])
