@@ -22,7 +22,7 @@ ABSENT: Any = object()
 
 _PLAIN_FLAGS = {"true": True, "false": False}
 
-_PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "infinity": math.inf, "+inf": math.inf, "+infinity": math.inf}
 _SPECIAL |= {"-inf": -math.inf, "-infinity": -math.inf}
 
@@ -47,7 +47,8 @@ def real(word: str) -> float:
     """One number as OpenSim reads it; Unclean if only a part of the word, or nothing, is a number."""
     try:
         value = float(word)
-        if -math.inf < value < math.inf and "_" not in word:
+        # Python also takes an underscore between digits, and the digits of other scripts.
+        if -math.inf < value < math.inf and "_" not in word and word.isascii():
             return value
     except ValueError:
         pass
@@ -62,7 +63,7 @@ def real(word: str) -> float:
 
 def whole(word: str) -> int:
     """One whole number; nothing may follow it."""
-    if re.fullmatch(r"[+-]?\d+", word) is None:
+    if re.fullmatch(r"[+-]?[0-9]+", word) is None:
         raise Unclean("unreadable", word)
     return int(word)
 
@@ -87,9 +88,15 @@ def legacy_flag(word: str) -> bool:
 
 def text(raw: str) -> str:
     """A text: white space trimmed, inner runs of it collapsed to one space."""
-    return " ".join(raw.split())
+    return " ".join(split(raw))
 
 
+def split(raw: str) -> list[str]:
+    """The words of a text. What separates them is ASCII white space: a no-break space is a letter for OpenSim."""
+    return raw.split() if raw.isascii() else _OTHER.findall(raw)
+
+
+_OTHER = re.compile(r"[^ \t\n\r\f\v]+")
 _WORDS: dict[str, Callable[[str], Any]] = {"double": real, "int": whole, "bool": flag, "string": str}
 
 
@@ -117,13 +124,13 @@ def _one(read: Callable[[str], Any], optional: bool) -> Callable[[str], Any]:
         if read is real:
             try:
                 value = float(raw)
-                if isfinite(value) and "_" not in raw:
+                if isfinite(value) and "_" not in raw and raw.isascii():
                     return value
             except ValueError:
                 pass
         elif raw in _PLAIN_FLAGS and read is not whole:
             return _PLAIN_FLAGS[raw]
-        words = raw.split()
+        words = split(raw)
         if not words:
             if optional:
                 return None
@@ -137,10 +144,10 @@ def _one(read: Callable[[str], Any], optional: bool) -> Callable[[str], Any]:
 
 def _exactly(size: int) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
-        words = raw.split()
+        words = split(raw)
         try:
             values = tuple(map(float, words))
-            if len(values) == size and isfinite(sum(values)) and "_" not in raw:
+            if len(values) == size and isfinite(sum(values)) and "_" not in raw and raw.isascii():
                 return values
         except ValueError:
             pass
@@ -165,11 +172,11 @@ def _exactly(size: int) -> Callable[[str], Any]:
 
 def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
-        words = raw.split()
+        words = split(raw)
         if read is real and least <= len(words) and (most is None or len(words) <= most):
             try:
                 numbers = tuple(map(float, words))
-                if isfinite(sum(numbers)) and "_" not in raw:
+                if isfinite(sum(numbers)) and "_" not in raw and raw.isascii():
                     return numbers
             except ValueError:
                 pass

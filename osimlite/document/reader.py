@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,10 +14,11 @@ from typing import TYPE_CHECKING, cast
 from lxml import etree
 
 from osimlite.document.comments import all_generated
-from osimlite.document.foreign import STAND_IN, is_element, without_colons
+from osimlite.document.foreign import is_element, without_colons
 from osimlite.document.notes import Note
 from osimlite.document.objects import Included, ObjectReader, layout_of, remember, size
 from osimlite.document.source import Source
+from osimlite.document.syntax import place_of, plain_words
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.schema.base import Include, Object, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
@@ -177,8 +179,9 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
             file=source.file, line=line, column=column,
         )  # fmt: skip
     data = without_colons(data)
-    # OpenSim accepts blank lines before the XML declaration.
-    body = data.lstrip()
+    # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark before them.
+    unmarked = data.removeprefix(BOM_UTF8)
+    body = data if unmarked.startswith(BOM_UTF8) else unmarked.lstrip()
     blank = data[: len(data) - len(body)].count(b"\n")
     parser = etree.XMLParser(
         encoding="utf-8",
@@ -192,29 +195,17 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
     try:
         root = etree.fromstring(body, parser)
     except etree.XMLSyntaxError as error:
-        line, column = error.position
         if not body:
             raise NotWellFormedError("the file is empty", file=source.file, line=1, column=1) from None
-        message = _plain_words(str(error.msg or "the text is not XML"))
-        if "<" not in source.text:
-            message = "there is no element in it"
-        raise NotWellFormedError(
-            f"not well-formed XML: {message}", file=source.file, line=max(line, 1) + blank, column=max(column, 1)
-        ) from None
+        message = str(error.msg or "the text is not XML")
+        line, column, _ = place_of(source, error.position[0] + blank, error.position[1], message)
+        words = plain_words(message) if "<" in source.text else "there is no element in it"
+        raise NotWellFormedError(f"not well-formed XML: {words}", file=source.file, line=line, column=column) from None
     if root is None:
         raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
     return root
-
-
-def _plain_words(message: str) -> str:
-    """The parser's message without its place, and readable."""
-    message = " ".join(re.sub(r", line \d+, column \d+$", "", message).replace(STAND_IN, "::").split())
-    mismatch = re.fullmatch(r"Opening and ending tag mismatch: (\S+) line (\d+) and (\S+)", message)
-    if mismatch:
-        return f"<{mismatch[1]}> of line {mismatch[2]} is not closed before </{mismatch[3]}>"
-    return message
 
 
 def version_of(source: Source, root: etree._Element) -> int:

@@ -136,7 +136,7 @@ class Tree:
 
     def lookup(self, reference: Reference, text: str, owner: Component) -> Resolution:
         """Follow `text` as the value of a property of `owner` with this kind of reference."""
-        return _RULES[reference.rule](self, text.strip(), owner, reference.target)
+        return _RULES[reference.rule](self, text.strip(" \t\n\r\f\v"), owner, reference.target)
 
     def target(self, owner: Component, name: str, value: str | Component) -> Component:
         """The component that property `name` of `owner` leads to, for code that needs it to be there.

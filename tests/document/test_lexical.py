@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.document.lexical import ABSENT, Unclean, converter, formatter, real, seventeen, shortest
+from osimlite.document.lexical import ABSENT, Unclean, converter, formatter, real, seventeen, shortest, split
 from osimlite.schema.fields import Value
 
 SINGLE = Value("double")
@@ -77,6 +77,18 @@ def test_vectors_that_are_dropped(text: str, trouble: str, value: object) -> Non
 
 def test_white_space_of_any_kind_separates() -> None:
     assert converter(VEC3)("\n\t0\n-0.2175\t 0\r\n") == (0.0, -0.2175, 0.0)
+
+
+def test_only_ascii_counts_as_digits_and_white_space() -> None:
+    # A no-break space and full-width digits come from word processors; OpenSim keeps the default.
+    for raw in ("0\u00a0-5 0", "0 -\uff15 0", "\u200b0 -5 0", "0 \u22125 0"):
+        with pytest.raises(Unclean) as caught:
+            converter(VEC3)(raw)
+        assert caught.value.value is ABSENT
+    with pytest.raises(Unclean):
+        converter(SINGLE)("\uff15")
+    assert converter(Value("string"))("a\u00a0b  c") == "a\u00a0b c"
+    assert split("x\u00a0 y") == ["x\u00a0", "y"]
 
 
 def test_a_range_takes_two() -> None:
