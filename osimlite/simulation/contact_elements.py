@@ -19,6 +19,7 @@ from osimlite.simulation.elements import ElementBuilder, Triple, kind_of, triple
 
 if TYPE_CHECKING:
     from osimlite.simulation.field import Writer
+    from osimlite.simulation.triangle_mesh import TriangleMesh
 
 Material = tuple[float, float, float, float, float]
 """Stiffness, dissipation, and coefficients of static, dynamic and viscous friction of a surface, as in the model."""
@@ -26,16 +27,18 @@ Material = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class ContactSurface:
-    """A half space, a sphere or an ellipsoid, fixed to a body (index, -1 for ground).
+    """A half space, a sphere, an ellipsoid or a mesh, fixed to a body (index, -1 for ground).
 
     Attributes:
         frame: name of the frame that holds it in the model.
         center: of the sphere, or a point on the plane, in the body frame (m).
-        radius: of the sphere or the largest of the ellipsoid (m), infinite for a half space.
+        radius: of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for a half
+            space.
         normal: unit vector out of the half space, in the body frame.
         material: the law's K (Pa), c (s/m), us, ud (1), uv (s/m).
         radii: half axes of an ellipsoid (m), None for the others.
         axes: their directions in the body frame, as the columns of a matrix.
+        mesh: the triangles of a mesh, in the body frame.
     """
 
     name: str
@@ -47,6 +50,7 @@ class ContactSurface:
     material: Material
     radii: Triple | None = None
     axes: tuple[Triple, Triple, Triple] | None = None
+    mesh: TriangleMesh | None = None
 
     @property
     def is_half_space(self) -> bool:
@@ -96,6 +100,10 @@ class PairContact:
         pair = self.pairs[place]
         return f"{self.name} ({self.surfaces[pair.second].name}, {self.surfaces[pair.first].name})"
 
+    def torque(self, value: Sequence[Any]) -> Triple:
+        """The torque (N·m) on surface 2 of a contact besides that of the force at its point."""
+        return 0.0, 0.0, 0.0
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Force and torque on the frame of each surface."""
@@ -109,11 +117,13 @@ class PairContact:
             if value is None:
                 continue
             fx, fy, fz, px, py, pz = value[:6]
+            tx, ty, tz = self.torque(value)
             for surface, sign in ((self.surfaces[pair.first], -1.0), (self.surfaces[pair.second], 1.0)):
                 load = loads.setdefault(surface.body, [0.0] * 6)
                 ox, oy, oz = origins[surface.body]
                 x, y, z = px - ox, py - oy, pz - oz
-                for axis, part in enumerate((fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)):
+                torque = tx + y * fz - z * fy, ty + z * fx - x * fz, tz + x * fy - y * fx
+                for axis, part in enumerate((fx, fy, fz, *torque)):
                     load[axis] += sign * part
         row: list[float] = []
         for surface in self.surfaces:

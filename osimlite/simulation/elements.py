@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from osimlite.errors import ModelError, UnsupportedError
@@ -103,7 +104,12 @@ class Forces:
 
 
 def force_elements(
-    model: Model, mechanism: Mechanism, *, skip_unsupported: bool = False, simbody_early_return: bool = False
+    model: Model,
+    mechanism: Mechanism,
+    *,
+    skip_unsupported: bool = False,
+    simbody_early_return: bool = False,
+    folder: str | Path | None = None,
 ) -> Forces:
     """Gather the forces of a model.
 
@@ -114,12 +120,13 @@ def force_elements(
         mechanism: of the same model.
         skip_unsupported: leave out what cannot be computed instead of raising.
         simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
+        folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
 
     Raises:
         UnsupportedError: some forces cannot be computed; the message names them.
         ModelError: a force names what does not exist, or a parameter has no meaning.
     """
-    builder = ElementBuilder(model, mechanism, simbody_early_return)
+    builder = ElementBuilder(model, mechanism, simbody_early_return, Path(folder or "."))
     elements: list[ForceElement] = []
     skipped: list[str] = []
     for component in builder.forces():
@@ -141,13 +148,22 @@ class ElementBuilder:
     Attributes:
         tree: of the model.
         mechanism: of the model.
+        folder: of the model's file.
     """
 
-    def __init__(self, model: Model, mechanism: Mechanism, early_return: bool) -> None:
+    def __init__(self, model: Model, mechanism: Mechanism, early_return: bool, folder: Path) -> None:
         self.model = model
         self.tree = model.tree()
         self.mechanism = mechanism
         self.early_return = early_return
+        self.folder = folder
+
+    @property
+    def mesh_folders(self) -> tuple[Path, ...]:
+        """Where mesh files are looked for."""
+        from osimlite.translate.mesh_files import geometry_folders
+
+        return geometry_folders(self.folder)
 
     def forces(self) -> Iterator[Any]:
         """Yield everything that applies a force, known or not."""

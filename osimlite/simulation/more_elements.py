@@ -12,7 +12,7 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -33,6 +33,7 @@ from osimlite.simulation.actuator_elements import (
 )
 from osimlite.simulation.bushing_elements import Bushing
 from osimlite.simulation.elements import ElementBuilder, ForceElement
+from osimlite.simulation.mesh_contact import elastic_foundation
 from osimlite.simulation.path_elements import PATH_MAKERS
 from osimlite.simulation.smooth_contact_element import SmoothContact
 from osimlite.simulation.spring_elements import CoordinateFormula, CoordinateSpring, PointSpring
@@ -46,6 +47,7 @@ MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
     PrescribedForce: Prescribed.of,
     TorqueActuator: TorqueDrive.of,
     BushingForce: Bushing.linear,
+    ElasticFoundationForce: elastic_foundation,
     ExpressionBasedBushingForce: Bushing.by_formulas,
     ExpressionBasedCoordinateForce: CoordinateFormula.of,
     ExpressionBasedPointToPointForce: PointSpring.of_formula,

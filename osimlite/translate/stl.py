@@ -8,9 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.errors import OsimliteError
+from osimlite.multibody.spatial import Array
 
 _HEAD = b"binary STL".ljust(80)
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_Triangles = np.ndarray[tuple[int], np.dtype[np.void]]
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CORNER = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re.IGNORECASE)
 
@@ -27,16 +29,10 @@ def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.
         OsimliteError: it is not an STL file, is cut off, or has no triangle.
     """
     mirrored = any(sign < 0.0 for sign in signs)
-    count = int.from_bytes(content[80:84], "little")
-    if len(content) >= 84 and count and len(content) == 84 + 50 * count and not mirrored:
+    binary = _from_binary(content)
+    if binary is not None and len(content) == 84 + 50 * len(binary) and not mirrored:
         return content
-    # Some programs begin binary files with the word that text files begin with, so the length decides.
-    if len(content) >= 84 and count and len(content) >= 84 + 50 * count:
-        triangles = np.frombuffer(content, _TRIANGLE, count, 84).copy()
-    elif content.lstrip()[:5].lower() == b"solid":
-        triangles = _from_text(content, name)
-    else:
-        raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
+    triangles = binary if binary is not None else _from_text(content, name)
     if mirrored:
         triangles["corners"] *= np.array(signs, dtype="<f4")
         triangles["normal"] *= np.array(signs, dtype="<f4")
@@ -45,12 +41,33 @@ def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.
     return _HEAD + len(triangles).to_bytes(4, "little") + triangles.tobytes()
 
 
-def _from_text(content: bytes, name: str) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+def stl_corners(content: bytes, name: str) -> Array:
+    """The corners (t, 3, 3) of the triangles in a text or binary STL file; errors as those of :func:`binary_stl`."""
+    binary = _from_binary(content)
+    return _text_corners(content, name) if binary is None else binary["corners"].astype(np.float64)
+
+
+def _from_binary(content: bytes) -> _Triangles | None:
+    """The triangles of a binary file; None if it is no such file."""
+    count = int.from_bytes(content[80:84], "little")
+    # Some programs begin binary files with the word that text files begin with, so the length decides.
+    if len(content) >= 84 and count and len(content) >= 84 + 50 * count:
+        return np.frombuffer(content, _TRIANGLE, count, 84).copy()
+    return None
+
+
+def _text_corners(content: bytes, name: str) -> Array:
+    if content.lstrip()[:5].lower() != b"solid":
+        raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
     numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)
     corners_said = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
     if not len(numbers) or len(numbers) % 3 or len(numbers) != corners_said or b"endsolid" not in content.lower():
         raise OsimliteError("its triangles are damaged or cut off; save it again", file=name)
-    corners = numbers.reshape(-1, 3, 3)
+    return numbers.reshape(-1, 3, 3)
+
+
+def _from_text(content: bytes, name: str) -> _Triangles:
+    corners = _text_corners(content, name)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     triangles = np.zeros(len(corners), _TRIANGLE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,20 @@ from numpy.typing import NDArray
 from osimlite.multibody.spatial import Array
 
 Indices = NDArray[np.int64]
+
+
+class Polygons(NamedTuple):
+    """Polygons of any number of corners.
+
+    Attributes:
+        points: (n, 3).
+        corners: of all polygons, one after the other (places of points), counter-clockwise seen from outside.
+        ends: where each polygon ends in `corners`, increasing.
+    """
+
+    points: Array
+    corners: Indices
+    ends: Indices
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,8 @@ import binascii
 import lzma
 import re
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from lxml import etree
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from osimlite.errors import OsimliteError
 from osimlite.multibody.spatial import Array
-from osimlite.translate.surface import Indices, Surface, strip_triangles, triangulated
+from osimlite.translate.surface import Indices, Polygons, Surface, strip_triangles, triangulated
 
 _DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
     "vtkZLibDataCompressor": zlib.decompress,
@@ -49,16 +50,32 @@ def read_vtp(content: bytes, name: str) -> Surface:
     Raises:
         OsimliteError: it is not such a file, is damaged, or is compressed in a way that osimlite does not know.
     """
+    with _named(name):
+        return _File(content).surface()
+
+
+def vtp_polygons(content: bytes, name: str) -> Polygons:
+    """The polygons in a ``.vtp`` file, with all digits of text that says it has single precision, as Simbody has them.
+
+    Arguments and errors as those of :func:`read_vtp`.
+    """
+    with _named(name):
+        return _File(content, all_digits=True).polygons()[0]
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
     try:
         # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the way.
         with np.errstate(all="ignore"):
-            return _File(content).surface()
+            yield
     except _Unreadable as problem:
         raise OsimliteError(f"{problem}; save it again as PolyData (.vtp) or as .obj", file=name) from None
 
 
 class _File:
-    def __init__(self, content: bytes) -> None:
+    def __init__(self, content: bytes, *, all_digits: bool = False) -> None:
+        self.all_digits = all_digits
         # What is appended may be no XML at all, so it is cut out before the rest is read.
         self.appended = b""
         mark = content.find(b"<AppendedData")
@@ -86,27 +103,38 @@ class _File:
         self.offsets = [*sorted(offsets), len(self.appended)]
 
     def surface(self) -> Surface:
-        points, triangles, normals = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros((0, 3))]
-        count, all_normals = 0, True
+        polygons, normals = self.polygons()
+        return Surface(polygons.points, triangulated(*polygons), normals)
+
+    def polygons(self) -> tuple[Polygons, Array | None]:
+        """All polygons, those of strips among them, and the normals at the points if there are any."""
+        points, corners, normals = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+        sizes, count, all_normals = [np.zeros(0, dtype=np.int64)], 0, True
         for piece in self.root.iterfind("PolyData/Piece"):
             own = self._vectors(piece.find("Points/DataArray"))
             points.append(own)
-            triangles += [part + count for part in self._triangles(piece, own)]
+            for around, lengths in self._polygons(piece, len(own)):
+                corners.append(around + count)
+                sizes.append(lengths)
             at_points = self._normals(piece, len(own))
             all_normals = all_normals and at_points is not None
             normals += [] if at_points is None else [at_points]
             count += len(own)
-        found = np.concatenate(triangles)
-        if not len(found):
+        ends = np.concatenate(sizes).cumsum()
+        if not len(ends):
             raise _Unreadable("it has no polygons")
-        return Surface(np.concatenate(points), found, np.concatenate(normals) if all_normals else None)
+        found = Polygons(np.concatenate(points), np.concatenate(corners), ends)
+        return found, np.concatenate(normals) if all_normals else None
 
-    def _triangles(self, piece: etree._Element, points: Array) -> list[Indices]:
-        corners, ends = self._cells(piece, "Polys", len(points))
-        parts = [triangulated(points, corners, ends)] if len(ends) else []
-        corners, ends = self._cells(piece, "Strips", len(points))
-        strips = np.split(corners, ends[:-1]) if len(ends) else []
-        return parts + [strip_triangles(strip) for strip in strips if len(strip) >= 3]
+    def _polygons(self, piece: etree._Element, count: int) -> Iterator[tuple[Indices, Indices]]:
+        """Corners, one after the other, and numbers of corners: of polygons, then of the triangles of every strip."""
+        corners, ends = self._cells(piece, "Polys", count)
+        yield corners, np.diff(ends, prepend=0)
+        corners, ends = self._cells(piece, "Strips", count)
+        for strip in np.split(corners, ends[:-1]) if len(ends) else []:
+            if len(strip) >= 3:
+                triangles = strip_triangles(strip)
+                yield triangles.ravel(), np.full(len(triangles), 3)
 
     def _cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
         """Corners of all cells of a kind, one after the other, and where each cell ends."""
@@ -151,7 +179,8 @@ class _File:
         try:
             match form:
                 case "ascii":
-                    return np.array((array.text or "").split(), dtype=dtype)
+                    exact = self.all_digits and dtype.kind == "f"
+                    return np.array((array.text or "").split(), dtype=np.float64 if exact else dtype)
                 case "binary":
                     data = self._payload(_base64((array.text or "").encode()))
                 case "appended":

@@ -1,0 +1,242 @@
+"""Closed surfaces of triangles for contact, cut into triangles as Simbody does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.errors import ModelError, OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.translate.mesh_files import find_file
+from osimlite.translate.obj import obj_polygons
+from osimlite.translate.stl import stl_corners
+from osimlite.translate.surface import Indices, Polygons
+from osimlite.translate.vtp import vtp_polygons
+
+_SAME_POINT = 8.7e-7
+"""STL files have no common points; corners nearer than this in every direction are one, as for Simbody (m)."""
+
+_AS_NEAR = 1.0 + 1e-10
+"""Squared distances within this factor are one; where triangles meet, the angle decides which is nearest."""
+
+_STEPS = np.array(list(product((0, -1, 1), repeat=3)))
+"""To a cell of a grid and its neighbours."""
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """A closed surface.
+
+    Attributes:
+        points: (n, 3), m.
+        triangles: (t, 3) places of points, counter-clockwise seen from outside.
+    """
+
+    points: Array
+    triangles: Indices
+
+    @classmethod
+    def read(cls, name: str, folders: Sequence[Path]) -> TriangleMesh:
+        """The surface in a file (.vtp, .stl, .stla or .obj) in one of some folders.
+
+        Raises:
+            ModelError: there is no such file, it is of another kind, or it is not a closed surface.
+            OsimliteError: the file cannot be read.
+        """
+        path = find_file(name, folders)
+        if path is None:
+            raise ModelError(f"the mesh file '{name}' is not there; put it beside the model's file")
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise OsimliteError(f"cannot read the file: {error.strerror}", file=str(path)) from None
+        match path.suffix.lower():
+            case ".vtp":
+                return cls.of_polygons(vtp_polygons(content, str(path)), str(path))
+            case ".obj":
+                return cls.of_polygons(obj_polygons(content, str(path)), str(path))
+            case ".stl" | ".stla":
+                return cls.of_corners(stl_corners(content, str(path)), str(path))
+            case kind:
+                raise ModelError(f"osimlite, like OpenSim, does not read {kind} files; save it as .obj", file=str(path))
+
+    @classmethod
+    def of_corners(cls, corners: Array, file: str) -> TriangleMesh:
+        """The surface of triangles (t, 3, 3), whose corners are common where they are in one place."""
+        different, which = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        points: list[Array] = []
+        cells: dict[tuple[int, ...], int] = {}
+        place_of = np.empty(len(different), dtype=np.int64)
+        for number, point in enumerate(different):
+            cell = np.floor(point / _SAME_POINT).astype(np.int64)
+            around = (cells.get(tuple((cell + step).tolist()), -1) for step in _STEPS)
+            same = (k for k in around if k >= 0 and np.abs(points[k] - point).max() <= _SAME_POINT)
+            place_of[number] = place = next(same, len(points))
+            if place == len(points):
+                points.append(point)
+                cells[tuple(cell.tolist())] = place
+        return cls._closed(np.array(points), place_of[which].reshape(-1, 3), file)
+
+    @classmethod
+    def of_polygons(cls, polygons: Polygons, file: str) -> TriangleMesh:
+        """The surface of polygons: four corners make two triangles, more make a fan about their mean."""
+        points, triangles = polygons.points.tolist(), []
+        for around in np.split(polygons.corners, polygons.ends[:-1]):
+            match around.tolist():
+                case [a, b, c]:
+                    triangles.append((a, b, c))
+                case [a, b, c, d]:
+                    triangles += [(a, b, c), (c, d, a)]
+                case [_, _, _, *_] as many:
+                    triangles += [(a, b, len(points)) for a, b in zip(many, [*many[1:], many[0]], strict=True)]
+                    points.append(polygons.points[around].mean(axis=0).tolist())
+        return cls._closed(np.array(points), np.array(triangles, dtype=np.int64).reshape(-1, 3), file)
+
+    @classmethod
+    def _closed(cls, points: Array, triangles: Indices, file: str) -> TriangleMesh:
+        edges = np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+        codes, back = (edges @ np.array(pair) for pair in ((len(points), 1), (1, len(points))))
+        counts = np.unique(codes, return_counts=True)[1]
+        open_edges = np.count_nonzero(~np.isin(codes, back)) + np.count_nonzero(counts > 1)
+        if open_edges:
+            raise ModelError(
+                f"the mesh is not a closed surface: {open_edges} edges do not have one triangle on either side that "
+                "turn the same way; close it in a mesh program",
+                file=file,
+            )
+        found = cls(points, triangles)
+        if not np.all(found.areas > 0.0):
+            flat = np.count_nonzero(~(found.areas > 0.0))
+            raise ModelError(f"the mesh has {flat} triangles without area; remove them in a mesh program", file=file)
+        corners = found.corners
+        volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+        return found if volume > 0.0 else cls(points, triangles[:, ::-1])
+
+    def moved(self, frame: Array) -> TriangleMesh:
+        """The surface in another frame, in which its own is `frame` (4, 4)."""
+        return TriangleMesh(self.points @ frame[:3, :3].T + frame[:3, 3], self.triangles)
+
+    @cached_property
+    def corners(self) -> Array:
+        """Corners (t, 3, 3) of the triangles."""
+        return np.asarray(self.points[self.triangles])
+
+    @cached_property
+    def centroids(self) -> Array:
+        """Middles (t, 3) of the triangles."""
+        return np.asarray(self.corners.mean(axis=1))
+
+    @cached_property
+    def _doubled(self) -> Array:
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.asarray(np.cross(b - a, c - a))
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas (t,) of the triangles, m^2."""
+        return np.asarray(0.5 * np.linalg.norm(self._doubled, axis=1))
+
+    @cached_property
+    def normals(self) -> Array:
+        """Outward unit vectors (t, 3) of the triangles."""
+        return np.asarray(self._doubled / (2.0 * self.areas[:, None]))
+
+    @cached_property
+    def center(self) -> Array:
+        """Middle (3,) of the box around the surface."""
+        return np.asarray(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)))
+
+    @cached_property
+    def radius(self) -> float:
+        """Of the ball about `center` that holds the surface, m."""
+        return float(np.linalg.norm(self.points - self.center, axis=1).max())
+
+    @cached_property
+    def _reaches(self) -> Array:
+        """Distance (t,) from the middle of each triangle to its farthest corner."""
+        return np.asarray(np.linalg.norm(self.corners - self.centroids[:, None], axis=2).max(axis=1))
+
+    @cached_property
+    def is_one_piece(self) -> bool:
+        """Whether every triangle can be reached from every other across edges."""
+        label = np.arange(len(self.points))
+        while True:
+            least = label[self.triangles].min(axis=1)
+            new = label.copy()
+            np.minimum.at(new, self.triangles, least[:, None])
+            if np.array_equal(new, label):
+                return len(np.unique(label[self.triangles])) == 1
+            label = new
+
+    def nearest(self, places: Array) -> tuple[Array, Flags]:
+        """The nearest points (m, 3) of the surface to some places (m, 3), and which of those are inside it."""
+        apart = np.linalg.norm(places[:, None] - self.centroids, axis=2)
+        least = (apart + self._reaches).min(axis=1)
+        which, triangles = np.nonzero(apart - self._reaches <= least[:, None])
+        found = _nearest_on_triangles(self.corners[triangles], places[which])
+        ways = found - places[which]
+        squares = np.einsum("ij,ij->i", ways, ways)
+        bound = np.full(len(places), np.inf)
+        np.minimum.at(bound, which, squares)
+        # Where triangles meet, the one that is seen most from the front tells the inside from the outside.
+        height = np.einsum("ij,ij->i", ways, self.normals[triangles])
+        near = np.flatnonzero(squares <= _AS_NEAR * bound[which])
+        order = near[np.lexsort((-np.abs(height[near]), which[near]))]
+        best = order[np.unique(which[order], return_index=True)[1]]
+        return found[best], height[best] > 0.0
+
+    def crosses(self, other: TriangleMesh) -> bool:
+        """Whether a triangle of one surface cuts one of the other."""
+        return _edges_cross(self, other) or _edges_cross(other, self)
+
+
+def _nearest_on_triangles(corners: Array, places: Array) -> Array:
+    """The nearest point (k, 3) of each triangle (k, 3, 3) to a place (k, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normal = np.cross(b - a, c - a)
+    height = _dots(places - a, normal) / _dots(normal, normal)
+    on_plane = places - height[:, None] * normal
+    inside = np.ones(len(places), dtype=bool)
+    best, least = on_plane.copy(), np.full(len(places), np.inf)
+    for start, end in ((a, b), (b, c), (c, a)):
+        along = end - start
+        inside &= _dots(np.cross(along, on_plane - start), normal) >= 0.0
+        part = np.clip(_dots(places - start, along) / _dots(along, along), 0.0, 1.0)
+        point = start + part[:, None] * along
+        distance = _dots(point - places, point - places)
+        best = np.where((distance < least)[:, None], point, best)
+        least = np.minimum(distance, least)
+    return np.where(inside[:, None], on_plane, best)
+
+
+def _edges_cross(one: TriangleMesh, two: TriangleMesh) -> bool:
+    """Whether an edge of one surface goes through a triangle of another."""
+    edges = np.concatenate([one.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    edges = edges[edges[:, 0] < edges[:, 1]]
+    start, end = one.points[edges[:, 0]], one.points[edges[:, 1]]
+    near = np.ones((len(edges), len(two.triangles)), dtype=bool)
+    for axis in range(3):
+        low, high = two.corners[:, :, axis].min(axis=1), two.corners[:, :, axis].max(axis=1)
+        near &= np.minimum(start[:, axis], end[:, axis])[:, None] <= high
+        near &= np.maximum(start[:, axis], end[:, axis])[:, None] >= low
+    edge, triangle = np.nonzero(near)
+    a, b, c = np.moveaxis(two.corners[triangle], 1, 0)
+    p, q = start[edge], end[edge]
+    # The ends lie on either side of the plane, and the line passes all sides on the same hand.
+    normal = two.normals[triangle]
+    divided = _dots(p - a, normal) * _dots(q - a, normal) <= 0.0
+    hands = [_dots(q - p, np.cross(u - p, v - p)) for u, v in ((a, b), (b, c), (c, a))]
+    same = np.all([hand >= 0.0 for hand in hands], axis=0) | np.all([hand <= 0.0 for hand in hands], axis=0)
+    return bool(np.any(divided & same))
+
+
+def _dots(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("ij,ij->i", a, b))
