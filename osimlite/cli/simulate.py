@@ -68,8 +68,10 @@ def simulate(
 
     if accuracy is not None and (fixed_step is not None or gui):
         raise OsimliteError("--accuracy does not go with fixed steps (--fixed-step, --gui); take one of them")
-    if plot or animate:
+    if plot:
         require("matplotlib", extra="plot", purpose="drawing")
+    if animate:
+        require("PIL", extra="plot", purpose="drawing")
     model = read(file)
     from osimlite.simulation.engines import engine_factory
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
@@ -90,7 +92,7 @@ def simulate(
                 initial_speeds=speeds,
                 progress=progress,
             )
-    files = _write(console, model, trajectory, output, plot=plot, animate=animate)
+    files = _write(console, file, model, trajectory, output, plot=plot, animate=animate)
     console.print(_table(trajectory, files))
 
 
@@ -123,7 +125,7 @@ PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy
 
 
 def _write(
-    console: Console, model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool
+    console: Console, file: Path, model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool
 ) -> list[Path]:
     """Write everything beside its place first, so that a failure leaves nothing behind."""
     import shutil

@@ -14,6 +14,7 @@ from osimlite.multibody.spatial import Array, rotation_about, transform
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, FrameGeometry, Geometry, Mesh, Sphere
 from osimlite.schema.model import Model
+from osimlite.schema.tree import Tree
 from osimlite.translate import meshes
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.mesh_files import MeshFiles, MeshProblem
@@ -68,7 +69,7 @@ class _Collector:
 
     def _add(self, geometry: Geometry, path: str) -> None:
         note = self.fidelity.add
-        frame = self._frame(geometry)
+        frame = frame_of(self.tree, geometry)
         if frame is None or frame not in self.mechanism.frames:
             note("visual", path, "a shape in a frame that is not fixed to a body", "left out")
             return
@@ -87,14 +88,6 @@ class _Collector:
         owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
         visual = Visual(shape, where @ placed, (*appearance.color, appearance.opacity), path)
         self.found.by_body.setdefault(owner, []).append(visual)
-
-    def _frame(self, geometry: Geometry) -> str | None:
-        """Path of the frame a shape is in: the one its socket names, else the component above that is a frame."""
-        socket = geometry.socket_frame
-        if socket and not (isinstance(socket, str) and socket.strip() == ".."):
-            return self.tree.path_of(self.tree.target(geometry, "socket_frame", socket))
-        above = self.tree.parent_of(geometry)
-        return self.tree.path_of(above) if isinstance(above, Frame) else None
 
     def _shape(self, geometry: Geometry, path: str) -> tuple[Shape, Array] | None:
         """The shape, and its frame in the frame of the geometry."""
@@ -135,6 +128,19 @@ class _Collector:
 
     def _mesh_file(self, name: str, key: tuple[float, ...], content: str) -> str:
         return self.mesh_files.add((name, *key), name, ".obj", content.encode())
+
+
+def frame_of(tree: Tree, geometry: Geometry) -> str | None:
+    """Path of the frame a shape is in: the one its socket names, else the component above that is a frame.
+
+    Raises:
+        ModelError: the socket leads nowhere.
+    """
+    socket = geometry.socket_frame
+    if socket and not (isinstance(socket, str) and socket.strip() == ".."):
+        return tree.path_of(tree.target(geometry, "socket_frame", socket))
+    above = tree.parent_of(geometry)
+    return tree.path_of(above) if isinstance(above, Frame) else None
 
 
 def mesh_shape(

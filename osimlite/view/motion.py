@@ -36,11 +36,15 @@ class Motion(Protocol):
 
 
 class ContactForce(NamedTuple):
-    """Force (n, 3) in ground of the force element `element` on the frame `frame`, N."""
+    """Force (n, 3) in ground of the force element `element` on the frame `frame`, N.
+
+    `torques` (n, 3), N·m, are about the origin of the frame's body, or None if they are not on record.
+    """
 
     element: str
     frame: str
     vectors: Array
+    torques: Array | None = None
 
 
 def contact_forces(motion: Motion) -> list[ContactForce]:
@@ -50,9 +54,13 @@ def contact_forces(motion: Motion) -> list[ContactForce]:
         if label.endswith(".force.X"):
             place = label.removesuffix(".force.X")
             element, _, frame = place.partition(".")
-            vectors = np.column_stack([np.asarray(motion.forces[f"{place}.force.{axis}"]) for axis in "XYZ"])
-            found.append(ContactForce(element, frame, vectors))
+            torques = _columns(motion, f"{place}.torque") if f"{place}.torque.X" in motion.forces else None
+            found.append(ContactForce(element, frame, _columns(motion, f"{place}.force"), torques))
     return found
+
+
+def _columns(motion: Motion, label: str) -> Array:
+    return np.column_stack([np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"])
 
 
 def at_times(motion: Motion, columns: Array, times: Array) -> Array:

@@ -1,76 +1,143 @@
-"""A model as outlines in a plane: what there is to draw, and where it is at a pose."""
+"""What there is to see of a model: surfaces, lines and frames, each fixed to bodies; the same for every kind of view.
+
+Nothing here draws. The page in the browser, pictures and films are made of a :class:`Scene` and of coordinate values.
+Bodies are numbered as in the mechanism, -1 is ground.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from math import cos, pi, sin
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from osimlite.errors import OsimliteError
+from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array, offset
-from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
-from osimlite.schema.forces import HuntCrossleyForce
-from osimlite.schema.model import Model
-from osimlite.schema.tree import Tree, Use
-from osimlite.translate.shapes import Ball, Box, MeshFile, Tube, Visual
-from osimlite.translate.visuals import collect_visuals
+from osimlite.multibody.spatial import Array
+from osimlite.translate.surface import Surface
 
-Plane = Literal["xy", "yz", "xz"]
+Color = tuple[float, float, float]
+Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "frames"]
 
-_AXES: Mapping[str, tuple[Array, Array]] = {
-    "xy": (np.array((1.0, 0.0, 0.0)), np.array((0.0, 1.0, 0.0))),
-    "yz": (np.array((0.0, 0.0, -1.0)), np.array((0.0, 1.0, 0.0))),
-    "xz": (np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, -1.0))),
-}
-"""To the right and up in each plane. The viewer looks along their cross product, from its positive side:
-along -Z, -X (so that Z points to the left) and -Y (so that Z points down)."""
+LAYERS: tuple[Layer, ...] = ("geometry", "contact", "wrap", "markers", "paths", "springs", "frames")
+"""What can be shown or hidden as a whole."""
 
+SCENERY = 12.0
+"""How many times larger than the usual shape one may be and still be wanted whole in a picture; a long floor is not."""
 
-_CIRCLE = np.array([(cos(2.0 * pi * k / 64), sin(2.0 * pi * k / 64)) for k in range(64)])
-
-
-class Placed(NamedTuple):
-    """Something at a fixed place in a body (index, -1 for ground)."""
-
-    body: int
-    matrix: Array
+_FEW = 600
+"""So many points of a surface are no effort to follow."""
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
-    """Points (k, 3) of a body's frame whose hull, grown by `radius` (m), is the shape.
+class Item:
+    """A surface in one colour, fixed to a body.
 
-    A ball is its centre and a radius, other shapes are their corners. `color` is red, green, blue, opacity.
+    Attributes:
+        path: absolute path of the component it shows.
+        layer: what it belongs to.
+        body: that carries it.
+        surface: its place among the surfaces of the scene.
+        matrix: (4, 4), of the surface in the body's frame; it may stretch and mirror.
+        color: red, green, blue, 0 to 1.
+        opacity: 0 to 1.
+        visible: whether the model wants it shown.
+    """
+
+    path: str
+    layer: Layer
+    body: int
+    surface: int
+    matrix: Array
+    color: Color
+    opacity: float = 1.0
+    visible: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class LinePoint:
+    """A corner of a line.
+
+    Attributes:
+        body: that carries it.
+        location: (3,), in the body's frame, m; where the point moves there, the place of the frame it moves in.
+        turn: (3, 3), of that frame in the body's.
+        laws: functions of one coordinate each that give its x, y, z in that frame, or none.
+        coordinates: the places of their coordinates.
+        condition: a coordinate and the range of its values within which the corner is part of the line, or None.
     """
 
     body: int
-    points: Array
-    color: tuple[float, float, float, float]
-    radius: float = 0.0
+    location: Array
+    turn: Array = field(default_factory=lambda: np.eye(3))
+    laws: tuple[Function, ...] = ()
+    coordinates: tuple[int, ...] = ()
+    condition: tuple[int, float, float] | None = None
+
+    def is_there(self, q: Array) -> bool:
+        """Whether the line has this corner at coordinate values q (n,)."""
+        return self.condition is None or self.condition[1] <= q[self.condition[0]] <= self.condition[2]
+
+    def station(self, q: Array) -> Array:
+        """Where it is (3,) in the body's frame at coordinate values q (n,)."""
+        if not self.laws:
+            return self.location
+        values = [law.evaluate(q[[place]])[0] for law, place in zip(self.laws, self.coordinates, strict=True)]
+        found: Array = self.location + self.turn @ np.array(values)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
-class Disc:
-    """A contact sphere: centre (3,) in its body's frame and radius (m); `frame` is the name of its own frame."""
+class Line:
+    """Straight lines from corner to corner: the path of a muscle, a spring, a stick for a body without shape.
 
-    name: str
-    frame: str
+    Attributes:
+        path: absolute path of the component it shows.
+        layer: what it belongs to.
+        points: two or more.
+        color: red, green, blue, 0 to 1.
+        radius: how thick to draw it, m.
+        visible: whether the model wants it shown.
+    """
+
+    path: str
+    layer: Layer
+    points: tuple[LinePoint, ...]
+    color: Color
+    radius: float = 0.004
+    visible: bool = True
+
+    def corners(self, q: Array, bodies: Bodies) -> Array:
+        """The corners (k, 3) in ground at coordinate values q (n,)."""
+        there = [point for point in self.points if point.is_there(q)]
+        return np.array([bodies.points(p.body, p.station(q)[None, :])[0] for p in there]).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """The three axes of a frame: its path, the body that carries it, its frame (4, 4) there, their length (m)."""
+
+    path: str
     body: int
-    center: Array
-    radius: float
+    matrix: Array
+    length: float = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
-    """Where the force of one element is shown: on the sphere that feels it, towards the half space it meets."""
+class Pushed:
+    """Where the force of a contact element is shown: its name, the body and the label in its record, and a point.
+
+    `near` (3,) is a point of the body near which the force acts, in the body's frame.
+    """
 
     element: str
-    sphere: Disc
-    ground: Placed | None
+    path: str
+    body: int
+    labels: tuple[str, ...]
+    near: Array
+    surface: str = ""
 
 
 class Bodies(NamedTuple):
@@ -83,139 +150,116 @@ class Bodies(NamedTuple):
         """Points (k, 3) of a body's frame, in ground."""
         return cast("Array", points @ self.rotations[body].T + self.origins[body])
 
-    def vector(self, body: int, vector: Array) -> Array:
-        """A direction (3,) of a body's frame, in ground."""
-        return cast("Array", self.rotations[body] @ vector)
+    def matrix(self, body: int, placed: Array) -> Array:
+        """What is placed (4, 4) in a body, in ground; it may stretch."""
+        result = placed.copy()
+        result[:3, :3] = self.rotations[body] @ placed[:3, :3]
+        result[:3, 3] = self.points(body, placed[None, :3, 3])[0]
+        return result
 
 
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """The shapes, contact surfaces and joints of a model, seen along the normal of a plane."""
+    """What there is to see of a model.
 
-    def __init__(self, model: Model, mechanism: Mechanism, plane: Plane = "xy") -> None:
-        if plane not in _AXES:
-            raise OsimliteError(f"a picture shows the plane 'xy', 'yz' or 'xz', not '{plane}'")
-        self.mechanism = mechanism
-        self.right, self.up = _AXES[plane]
-        self.towards = np.cross(self.right, self.up)
-        index = {body.path: place for place, body in enumerate(mechanism.bodies)} | {"/ground": -1}
-        visuals = collect_visuals(model, mechanism)
-        self.outlines = [
-            Outline(index[path], points, visual.color, visual.shape.radius if isinstance(visual.shape, Ball) else 0.0)
-            for path, shapes in visuals.by_body.items()
-            for visual in shapes
-            for points in (_points(visual, visuals.files),)
-            if points is not None
-        ]
-        self.discs: dict[str, Disc] = {}
-        self.planes: dict[str, Placed] = {}
-        self._contact_surfaces(model)
-        self.pushes = list(self._pushes(model))
+    Attributes:
+        mechanism: moves it.
+        surfaces: that the items are made of.
+        items: all surfaces in their places.
+        lines: all paths, springs and sticks.
+        axes: all frames.
+        pushed: where contact forces are shown.
+        shown: the layers that the model wants to be shown at first.
+        half_spaces: paths of the half spaces, whose items show a part of them.
+        remarks: what cannot be shown, as (component's path, sentence).
+    """
+
+    mechanism: Mechanism
+    surfaces: Sequence[Surface]
+    items: Sequence[Item]
+    lines: Sequence[Line]
+    axes: Sequence[Axes]
+    pushed: Sequence[Pushed] = ()
+    shown: frozenset[Layer] = frozenset(LAYERS)
+    half_spaces: frozenset[str] = frozenset()
+    remarks: Sequence[tuple[str, str]] = ()
 
     def at(self, q: Array) -> Bodies:
         """Where all bodies are at coordinate values q (n,)."""
         state = self.mechanism.at(q)
         return Bodies(state.rotations, state.origins)
 
-    def flat(self, points: Array) -> Array:
-        """Points (k, 3) in ground as they appear in the plane (k, 2)."""
-        return np.column_stack((points @ self.right, points @ self.up))
+    @cached_property
+    def up(self) -> Array:
+        """Unit vector (3,) against gravity; ground's Y axis if there is none."""
+        g = self.mechanism.gravity
+        size = float(np.linalg.norm(g))
+        return -g / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
 
-    def silhouette(self, bodies: Bodies, outline: Outline) -> Array:
-        """Corners (m, 2) of a shape as it appears in the plane, counter-clockwise."""
-        flat = self.flat(bodies.points(outline.body, outline.points))
-        return flat[0] + outline.radius * _CIRCLE if outline.radius > 0.0 else hull(flat)
+    def drawn(self) -> Iterator[Item]:
+        """The items that the model wants to be shown."""
+        return (item for item in self.items if item.visible and item.layer in self.shown)
 
-    def depth(self, point: Array) -> float:
-        """How near a point (3,) in ground is to the viewer."""
-        return float(point @ self.towards)
+    @cached_property
+    def large(self) -> frozenset[int]:
+        """Places of the items that are scenery: half spaces, and shapes far larger than most."""
+        sizes = np.array([float(np.linalg.norm(np.ptp(corners, axis=0))) for corners in map(self.corners, self.items)])
+        usual = np.array([item.visible and item.layer == "geometry" for item in self.items], dtype=bool)
+        limit = SCENERY * float(np.median(sizes[usual])) if usual.any() else np.inf
+        return frozenset(k for k, item in enumerate(self.items) if item.path in self.half_spaces or sizes[k] > limit)
 
-    def sticks(self, bodies: Bodies) -> list[tuple[int, Array]]:
-        """For every body, lines (k, 2, 3) in ground from its own joint to the joints of the bodies it carries.
+    def corners(self, item: Item) -> Array:
+        """Points (k, 3) around an item, in the body's frame: its own if they are few, else corners of a box."""
+        points = self.surfaces[item.surface].points
+        if len(points) > _FEW:
+            points = _box_corners(points.min(axis=0), points.max(axis=0))
+        placed: Array = points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+        return placed
 
-        A body that carries nothing gets a line to its mass centre.
-        """
-        everyone = self.mechanism.bodies
-        joints = []
-        for index, body in enumerate(everyone):
-            own = body.mobilizer.parent_frame if body.mobilizer.reversed else body.mobilizer.child_frame
-            joints.append(bodies.points(index, own[None, :3, 3])[0])
-        lines: list[tuple[int, Array]] = []
-        for index, body in enumerate(everyone):
-            ends = [joints[k] for k, other in enumerate(everyone) if other.parent == index]
-            center = bodies.points(index, body.mass_properties.center[None, :])[0]
-            lines.append((index, np.array([(joints[index], end) for end in ends or [center]])))
-        return lines
+    def extent(self, bodies: Bodies, q: Array) -> Iterator[tuple[int, Array]]:
+        """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
+        for place, item in enumerate(self.items):
+            if item.visible and item.layer in self.shown and place not in self.large:
+                yield item.body, bodies.points(item.body, self.corners(item))
+        for line in self.lines:
+            if line.visible and line.layer in self.shown:
+                single = {point.body for point in line.points}
+                yield (single.pop() if len(single) == 1 else -2), line.corners(q, bodies)
 
-    def _contact_surfaces(self, model: Model) -> None:
-        tree = model.tree()
-        for surface in tree.components:
-            if not isinstance(surface, ContactGeometry):
-                continue
-            path = tree.path_of(surface) or ""
-            frame = tree.path_of(tree.target(surface, "socket_frame", surface.socket_frame))
-            body, where = self.mechanism.placement(frame or "")
-            matrix = where @ offset(surface.location, surface.orientation)
-            if isinstance(surface, ContactSphere):
-                self.discs[path] = Disc(
-                    surface.name, (frame or "").rsplit("/", 1)[-1], body, matrix[:3, 3], surface.radius
-                )
-            elif isinstance(surface, ContactHalfSpace):
-                self.planes[path] = Placed(body, matrix)
+    def box(self, q: Array) -> tuple[Array, Array]:
+        """The least and greatest coordinates (3,), (3,) in ground of what is drawn and no scenery."""
+        bodies = self.at(q)
+        found: list[Array] = [points for _, points in self.extent(bodies, q) if len(points)]
+        points = np.concatenate(found or [bodies.origins])
+        low, high = points.min(axis=0), points.max(axis=0)
+        little = 0.05 * max(1.0, float(np.abs(points).max())) if float((high - low).max()) < 1e-6 else 0.0
+        return low - little, high + little
 
-    def _pushes(self, model: Model) -> Iterator[Push]:
-        tree = model.tree()
-        for use in tree.uses():
-            if not isinstance(use.owner, HuntCrossleyForce) or use.spec.name != "geometry":
-                continue
-            path = self._surface(tree, use)
-            if path in self.discs:
-                others = [self._surface(tree, other) for other in tree.uses() if other.holder is use.holder]
-                ground = next((self.planes[other] for other in others if other in self.planes), None)
-                yield Push(use.owner.name, self.discs[path], ground)
-
-    @staticmethod
-    def _surface(tree: Tree, use: Use) -> str:
-        target = tree.resolve(use).target
-        return "" if target is None else tree.path_of(target) or ""
+    def floor(self, q: Array) -> float:
+        """Height of the floor over ground's origin: 0, or under what is drawn if that reaches lower."""
+        low, high = self.box(q)
+        lowest, size = float((_box_corners(low, high) @ self.up).min()), float(np.linalg.norm(high - low))
+        return 0.0 if lowest >= -0.05 * size else lowest
 
 
-def hull(points: Array) -> Array:
-    """Corners (m, 2) of the convex hull of points (k, 2), counter-clockwise (Andrew's monotone chain)."""
-    ordered = sorted({(float(x), float(y)) for x, y in points})
-    if len(ordered) < 3:
-        return np.array(ordered)
-
-    def half(chain: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        result: list[tuple[float, float]] = []
-        for point in chain:
-            while len(result) > 1 and _left_of(result[-2], result[-1], point) <= 0.0:
-                result.pop()
-            result.append(point)
-        return result[:-1]
-
-    return np.array(half(ordered) + half(ordered[::-1]))
+def _box_corners(low: Array, high: Array) -> Array:
+    return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
-def _left_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+def sticks(mechanism: Mechanism, bodies: Iterable[int]) -> Iterator[tuple[int, Array, Array]]:
+    """Lines for bodies without shape, each as body and two points (3,) in its frame.
 
-
-def _points(visual: Visual, files: Mapping[str, bytes]) -> Array | None:
-    """Points (k, 3) in the body's frame whose hull is the shape (of a ball, its centre); None for a file but OBJ."""
-    match visual.shape:
-        case Box(size):
-            corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-            points = corners * size
-        case Ball():
-            points = np.zeros((1, 3))
-        case Tube(radius, length):
-            around = [2.0 * pi * k / 48 for k in range(48)]
-            points = np.array([(radius * cos(a), radius * sin(a), z * length / 2) for a in around for z in (-1, 1)])
-        case MeshFile(file, scale):
-            lines = [line.split() for line in files.get(file, b"").decode(errors="ignore").splitlines()]
-            vertices = [[float(word) for word in words[1:4]] for words in lines if words and words[0] == "v"]
-            if not file.endswith(".obj") or not vertices:
-                return None
-            points = np.array(vertices) * scale
-    turned: Array = points @ visual.origin[:3, :3].T + visual.origin[:3, 3]
-    return turned
+    They run from the body's own joint to the joints of what it carries, or to its mass centre if it carries nothing.
+    """
+    everyone = mechanism.bodies
+    for index in bodies:
+        own = everyone[index].mobilizer
+        start = (own.parent_frame if own.reversed else own.child_frame)[:3, 3]
+        ends = [
+            (joint.child_frame if joint.reversed else joint.parent_frame)[:3, 3]
+            for other in everyone
+            for joint in (other.mobilizer,)
+            if other.parent == index
+        ]
+        for end in ends or [everyone[index].mass_properties.center]:
+            yield index, start, end

@@ -1,102 +1,149 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
-from osimlite.schema.geometry import Cylinder
-from osimlite.view.scene import Scene, hull
-
-coordinates = st.floats(-10.0, 10.0)
-
-
-@given(st.lists(st.tuples(coordinates, coordinates), min_size=3, max_size=30))
-def test_a_hull_is_convex_and_holds_all_points(points):
-    corners = hull(np.array(points))
-    assert {tuple(corner) for corner in corners.tolist()} <= set(points)
-    if len(corners) < 3:
-        return
-    edges = np.roll(corners, -1, axis=0) - corners
-    for point in np.array(points):
-        inside = edges[:, 0] * (point - corners)[:, 1] - edges[:, 1] * (point - corners)[:, 0]
-        assert inside.min() > -1e-9
+from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus
+from osimlite.view import surfaces
+from osimlite.view.collect import build_scene
 
 
-def test_a_hull_has_no_points_inside():
-    square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)]
-    assert {tuple(corner) for corner in hull(np.array([*square, (1.0, 1.0), (1.0, 0.0)])).tolist()} == set(square)
-
-
-def scene(plane="xy"):
-    model = dynamic_walker()
+def scene_of(model, folders=()):
     mechanism = build_mechanism(model)
-    return Scene(model, mechanism, plane), mechanism
+    return build_scene(model, mechanism, folders), mechanism
 
 
-def seen(plane, body):
-    """Silhouette (k, 2) of the shape of a body at the default pose with leg and platform upright, and its origin."""
-    picture, mechanism = scene(plane)
-    pose = picture.at(mechanism.values({"platform_rz": 0.0, "RHip_rz": 0.0}))
-    (outline,) = [item for item in picture.outlines if mechanism.bodies[item.body].name == body]
-    return picture.silhouette(pose, outline), picture.flat(pose.origins[outline.body][None, :])[0]
-
-
-@pytest.mark.parametrize("plane", ["xy", "yz", "xz"])
-def test_a_ball_is_round_from_every_side(plane):
-    corners, center = seen(plane, "Pelvis")
-    assert len(corners) == 64
-    assert np.abs(np.linalg.norm(corners - center, axis=1) - 0.2).max() < 1e-12
-
-
-@pytest.mark.parametrize(("plane", "size"), [("xy", (0.08, 0.4)), ("yz", (0.08, 0.4)), ("xz", (0.08, 0.08))])
-def test_an_ellipsoid_has_its_size_from_every_side(plane, size):
-    flat, _ = seen(plane, "RightThigh")
-    assert np.ptp(flat, axis=0) == pytest.approx(size, abs=2e-3)
-
-
-def test_the_viewer_stands_where_the_plane_says():
-    for plane, right, up, towards in (
-        ("xy", (1, 0, 0), (0, 1, 0), (0, 0, 1)),
-        ("yz", (0, 0, -1), (0, 1, 0), (1, 0, 0)),
-        ("xz", (1, 0, 0), (0, 0, -1), (0, 1, 0)),
-    ):
-        picture, _ = scene(plane)
-        assert (picture.right == right).all() and (picture.up == up).all() and (picture.towards == towards).all()
-    with pytest.raises(OsimliteError, match="not 'zx'"):
-        scene("zx")
-
-
-def test_contacts_are_found_with_what_they_meet():
-    picture, mechanism = scene()
-    assert len(picture.discs) == 6 and len(picture.planes) == 1 and len(picture.pushes) == 6
-    foot = next(push for push in picture.pushes if push.element == "LFootForce")
-    assert (foot.sphere.name, foot.sphere.frame, foot.sphere.radius) == ("LFootContact", "LeftShank", 0.05)
-    assert foot.sphere.center.tolist() == [0.0, -0.2175, 0.0]
-    assert foot.ground is not None and mechanism.bodies[foot.ground.body].name == "Platform"
-    assert np.abs(-foot.ground.matrix[:3, 0] - (0.0, 1.0, 0.0)).max() < 1e-3
-
-
-def test_a_cylinder_stands_along_y():
+def with_shape(shape, folders=()):
+    """The pelvis with one shape: the scene, and the shape's points in the frame of the body."""
     model = dynamic_walker()
     pelvis = model.body_set.objects[1]
     del pelvis.attached_geometry[:]
-    pelvis.attach(Cylinder(radius=0.1, half_height=0.3))
-    mechanism = build_mechanism(model)
-    (outline,) = [item for item in Scene(model, mechanism).outlines if mechanism.bodies[item.body].name == "Pelvis"]
-    assert np.ptp(outline.points, axis=0) == pytest.approx((0.2, 0.6, 0.2), abs=1e-9)
+    pelvis.attach(shape)
+    scene, mechanism = scene_of(model, folders)
+    found = [item for item in scene.items if item.path.startswith("/bodyset/Pelvis/")]
+    if not found:
+        return scene, None
+    (item,) = found
+    assert mechanism.bodies[item.body].name == "Pelvis"
+    return scene, scene.surfaces[item.surface].points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+
+
+@pytest.mark.parametrize(
+    ("make", "volume"),
+    [
+        (surfaces.ball, 4.0 / 3.0 * np.pi),
+        (surfaces.bead, 4.0 / 3.0 * np.pi),
+        (surfaces.tube, np.pi),
+        (surfaces.spike, np.pi / 3.0),
+        (lambda: surfaces.ring(0.3), 2.0 * np.pi**2 * 0.09),
+        (surfaces.cube, 1.0),
+    ],
+)
+def test_unit_shapes_are_closed_and_turned_outwards(make, volume):
+    shape = make()
+    a, b, c = (shape.points[shape.triangles[:, place]] for place in range(3))
+    areas = np.cross(b - a, c - a)
+    enclosed = np.einsum("ij,ij->", a, areas) / 6.0
+    assert volume * (0.7 if make is surfaces.bead else 0.95) < enclosed <= volume * (1.0 + 1e-12)
+    assert np.linalg.norm(areas.sum(axis=0)) < 1e-12
+    assert (np.einsum("ij,ij->i", areas, shape.normals[shape.triangles].sum(axis=1)) > -1e-12).all()
+    assert np.linalg.norm(shape.normals, axis=1) == pytest.approx(1.0)
+
+
+def test_a_cylinder_stands_along_y():
+    _, points = with_shape(Cylinder(radius=0.1, half_height=0.3))
+    assert np.ptp(points, axis=0) == pytest.approx((0.2, 0.6, 0.2), abs=1e-9)
+
+
+def test_shapes_have_their_size_times_their_scale():
+    _, points = with_shape(Brick(half_lengths=(0.1, 0.2, 0.3), scale_factors=(1.0, 2.0, 3.0)))
+    assert np.ptp(points, axis=0) == pytest.approx((0.2, 0.8, 1.8))
+    _, points = with_shape(Sphere(radius=0.5, scale_factors=(1.0, 1.0, -2.0)))
+    assert np.ptp(points, axis=0) == pytest.approx((1.0, 1.0, 2.0))
+
+
+def test_meshes_are_read_from_files_of_every_kind(repo: Path):
+    folder = repo / "fixtures" / "meshes"
+    kinds = set()
+    for path in sorted(folder.rglob("*")):
+        if path.suffix.lower() in (".vtp", ".stl", ".obj"):
+            try:
+                surface = surfaces.read_surface(path)
+            except OsimliteError:
+                continue
+            kinds.add(path.suffix.lower())
+            assert surface.triangles.max() < len(surface.points)
+            assert np.linalg.norm(surfaces.normals_of(surface), axis=1).max() < 1.0 + 1e-5
+    assert ".vtp" in kinds
+
+
+def test_a_mesh_is_found_scaled_and_shared(tmp_path: Path):
+    (tmp_path / "corner.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n")
+    scene, points = with_shape(Mesh(mesh_file="corner.obj", scale_factors=(2.0, 1.0, -1.0)), [tmp_path])
+    assert points.min(axis=0).tolist() == [0.0, 0.0, -1.0] and points.max(axis=0).tolist() == [2.0, 1.0, 0.0]
+    assert not scene.remarks
+
+
+def test_what_cannot_be_drawn_is_said_and_the_body_becomes_a_stick():
+    scene, points = with_shape(Mesh(mesh_file="nowhere.vtp"))
+    assert points is None
+    ((path, said),) = scene.remarks
+    assert path == "/bodyset/Pelvis/Pelvis_geom_1" and "nowhere.vtp" in said and "--geometry" in said
+    assert [line.path for line in scene.lines] == ["/bodyset/Pelvis"] * 2
+    scene, points = with_shape(Torus())
+    assert points is None and "Torus" in scene.remarks[0][1]
+
+
+def test_a_hidden_shape_is_kept_but_not_drawn():
+    shape = Sphere(radius=0.1)
+    shape.appearance.visible = False
+    scene, _ = with_shape(shape)
+    assert [item.visible for item in scene.items if "Pelvis_geom" in item.path] == [False]
+    assert not [item for item in scene.drawn() if "Pelvis_geom" in item.path]
+
+
+def test_a_line_is_a_line():
+    scene, _ = with_shape(LineGeometry(start_point=(0.0, 0.0, 0.0), end_point=(1.0, 2.0, 3.0)))
+    line = next(line for line in scene.lines if "Pelvis_geom" in line.path)
+    assert line.points[1].location.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_contact_surfaces_are_where_the_forces_find_them():
+    scene, mechanism = scene_of(dynamic_walker())
+    spheres = [item for item in scene.items if item.layer == "contact" and item.path not in scene.half_spaces]
+    assert len(spheres) == 6 and len(scene.half_spaces) == 1 and len(scene.pushed) == 6
+    foot = next(push for push in scene.pushed if push.element == "LFootForce")
+    assert foot.labels[:2] == ("LeftShank", "LeftShank") and foot.near.tolist() == [0.0, -0.2175, 0.0]
+    drawn = next(item for item in spheres if item.path == foot.surface)
+    assert drawn.matrix[:3, 3].tolist() == [0.0, -0.2175, 0.0] and drawn.matrix[0, 0] == 0.05
+    (ground,) = [item for item in scene.items if item.path in scene.half_spaces]
+    assert mechanism.bodies[ground.body].name == "Platform"
+    normal = -ground.matrix[:3, 0] / np.linalg.norm(ground.matrix[:3, 0])
+    assert np.abs(normal - (0.0, 1.0, 0.0)).max() < 1e-3
+
+
+def test_scenery_does_not_count_for_the_size_of_a_model():
+    scene, mechanism = scene_of(dynamic_walker())
+    low, high = scene.box(mechanism.default_state()[0])
+    assert {scene.items[place].path.rsplit("/", 1)[1] for place in scene.large} >= {"PlatformContact"}
+    assert (high - low).max() < 2.0
 
 
 def test_sticks_join_the_joints():
-    picture, mechanism = scene()
-    pose = picture.at(mechanism.values({}))
-    lines = {mechanism.bodies[body].name: ends for body, ends in picture.sticks(pose)}
-    thigh = lines["RightThigh"][0]
+    model = dynamic_walker()
+    for body in model.body_set.objects:
+        del body.attached_geometry[:]
+    scene, mechanism = scene_of(model)
+    q = mechanism.values({})
+    pose = scene.at(q)
+    lines = {line.path.rsplit("/", 1)[1]: line.corners(q, pose) for line in scene.lines}
+    thigh, shank = lines["RightThigh"], lines["RightShank"]
     assert np.linalg.norm(thigh[1] - thigh[0]) == pytest.approx(0.4)
     # The last body of a limb ends at its mass centre.
-    shank = lines["RightShank"][0]
     assert np.linalg.norm(shank[1] - shank[0]) == pytest.approx(0.2175)
     assert shank[0] == pytest.approx(thigh[1])

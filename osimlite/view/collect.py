@@ -1,0 +1,345 @@
+"""The scene of a model: what its geometry, contact surfaces, wrap objects, markers, paths and springs look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import ModelError, OsimliteError, UnsupportedError
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.schema_functions import numeric
+from osimlite.multibody.spatial import Array, offset, rotation_about, transform
+from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
+from osimlite.schema.base import Component, field_specs
+from osimlite.schema.forces import Force, HuntCrossleyForce
+from osimlite.schema.frames import PhysicalFrame, TwoFrameLinker
+from osimlite.schema.markers import Marker
+from osimlite.schema.model import Model
+from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint
+from osimlite.schema.tree import Use
+from osimlite.translate.mesh_files import find_file
+from osimlite.translate.surface import Surface
+from osimlite.translate.visuals import frame_of
+from osimlite.view import surfaces
+from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
+
+WIDTH_OF_HALF_SPACE = 2.5
+"""How much of a half space is drawn: edges of the square as a multiple of the model's size."""
+
+CONTACT_OPACITY, HALF_SPACE_OPACITY, WRAP_OPACITY = 0.5, 0.2, 0.5
+"""How much of their opacity contact and wrap surfaces keep, which files show as wireframes: bodies shine through."""
+
+SPRING: Color = (0.0, 0.62, 0.45)
+"""Colour of springs between points, which a file gives none."""
+
+STICK: Color = (0.149, 0.196, 0.247)
+"""Colour of sticks."""
+
+_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
+"""From a cylinder along Z to one along Y."""
+
+_ENDLESS = 1.0
+"""How long a contact cylinder is drawn, which has no ends, m."""
+
+_MARKER_RADIUS = 0.008
+
+
+def build_scene(model: Model, mechanism: Mechanism, folders: Sequence[Path] = ()) -> Scene:
+    """Everything that can be drawn of a model; what cannot is a remark.
+
+    Args:
+        model: what to draw.
+        mechanism: of the same model.
+        folders: where its mesh files are looked for.
+    """
+    return _Collector(model, mechanism, folders).scene()
+
+
+class _Collector:
+    def __init__(self, model: Model, mechanism: Mechanism, folders: Sequence[Path]) -> None:
+        self.model, self.mechanism, self.folders = model, mechanism, folders
+        self.tree = model.tree()
+        self.surfaces: list[Surface] = []
+        self.places: dict[int, int] = {}
+        self.meshes: dict[Path, Surface] = {}
+        self.items: list[Item] = []
+        self.lines: list[Line] = []
+        self.axes: list[Axes] = []
+        self.pushed: list[Pushed] = []
+        self.remarks: list[tuple[str, str]] = []
+        self.drawn: set[int] = set()
+        self.half_spaces: list[int] = []
+
+    def scene(self) -> Scene:
+        for component in self.tree.components:
+            path = self.tree.path_of(component) or ""
+            with self._remarked(path):
+                self._component(component, path)
+        bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
+        for body, start, end in sticks(self.mechanism, bare):
+            ends = LinePoint(body, start), LinePoint(body, end)
+            self.lines.append(Line(self.mechanism.bodies[body].path, "geometry", ends, STICK, 0.008))
+        hints = self.model.model_visual_preferences.model_display_hints
+        wanted: dict[Layer, bool] = {
+            "geometry": True,
+            "contact": hints.show_contact_geometry,
+            "wrap": hints.show_wrap_geometry,
+            "markers": hints.show_markers,
+            "paths": hints.show_path_geometry,
+            "springs": hints.show_path_geometry,
+            "frames": hints.show_frames,
+        }
+        scene = Scene(
+            self.mechanism,
+            self.surfaces,
+            self.items,
+            self.lines,
+            self.axes,
+            self.pushed,
+            frozenset(layer for layer, shown in wanted.items() if shown),
+            frozenset(self.items[place].path for place in self.half_spaces),
+            self.remarks,
+        )
+        return self._with_half_spaces(scene)
+
+    # ------------------------------------------------------------------------------------- kinds of components
+    def _component(self, component: Component, path: str) -> None:
+        match component:
+            case geometry.FrameGeometry():
+                pass
+            case geometry.Geometry():
+                self._geometry(component, path)
+            case contact.ContactGeometry():
+                self._contact(component, path)
+            case wrapping.WrapObject():
+                self._wrap(component, path)
+            case Marker():
+                body, point = self.mechanism.stations[path]
+                color = self.model.model_visual_preferences.model_display_hints.marker_color
+                self._add(path, "markers", body, surfaces.ball(), _stretched((_MARKER_RADIUS,) * 3, point), color)
+            case GeometryPath():
+                self._path(component, path)
+            case Force():
+                self._force(component, path)
+            case PhysicalFrame() if path in self.mechanism.frames:
+                self.axes.append(Axes(path, *self.mechanism.frames[path]))
+
+    def _geometry(self, shape: geometry.Geometry, path: str) -> None:
+        frame = frame_of(self.tree, shape)
+        if frame is None or frame not in self.mechanism.frames:
+            raise UnsupportedError("is in a frame that is not fixed to a body")
+        look, scale = shape.appearance, np.array(shape.scale_factors, dtype=float)
+        visible = look.visible and look.surface_properties.representation != 0
+        body, placed = self.mechanism.frames[frame]
+        match shape:
+            case geometry.Brick():
+                own, size = surfaces.cube(), _stretched(2.0 * np.array(shape.half_lengths))
+            case geometry.Sphere():
+                own, size = surfaces.ball(), _stretched((shape.radius,) * 3)
+            case geometry.Ellipsoid():
+                own, size = surfaces.ball(), _stretched(shape.radii)
+            case geometry.Cylinder():
+                length = 2.0 * shape.half_height
+                own, size = surfaces.tube(), _TO_Z @ _stretched((shape.radius, shape.radius, length))
+            case geometry.Mesh():
+                own, size = self._mesh(shape.mesh_file), np.eye(4)
+            case geometry.LineGeometry():
+                ends = np.array((shape.start_point, shape.end_point), dtype=float) * scale
+                self._line(path, "geometry", body, placed, ends, look.color, visible)
+                return
+            case _:
+                raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
+        self._add(path, "geometry", body, own, placed @ _stretched(scale) @ size, look.color, look.opacity, visible)
+
+    def _contact(self, surface: contact.ContactGeometry, path: str) -> None:
+        body, placed = self._place(surface, "socket_frame")
+        here = placed @ offset(surface.location, surface.orientation)
+        look = surface.appearance
+        opacity = CONTACT_OPACITY * look.opacity
+        visible = look.visible and look.surface_properties.representation != 0
+        match surface:
+            case contact.ContactSphere():
+                own, size = surfaces.ball(), _stretched((surface.radius,) * 3)
+            case contact.ContactEllipsoid():
+                own, size = surfaces.ball(), _stretched(surface.radii)
+            case contact.ContactCylinder():
+                own, size = surfaces.tube(), _stretched((surface.radius, surface.radius, _ENDLESS))
+            case contact.ContactTorus() if surface.torus_radius > 0.0:
+                own = surfaces.ring(surface.tube_radius / surface.torus_radius)
+                size = _stretched((surface.torus_radius,) * 3)
+            case contact.ContactMesh():
+                own, size = self._mesh(surface.filename), np.eye(4)
+            case contact.ContactHalfSpace():
+                self.half_spaces.append(len(self.items))
+                own, size, opacity = surfaces.sheet(), np.eye(4), HALF_SPACE_OPACITY * look.opacity
+            case _:
+                raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")
+        self._add(path, "contact", body, own, here @ size, look.color, opacity, visible)
+
+    def _wrap(self, surface: wrapping.WrapObject, path: str) -> None:
+        frame = self.tree.parent_of(surface)
+        while frame is not None and not isinstance(frame, PhysicalFrame):
+            frame = self.tree.parent_of(frame)
+        if frame is None:
+            raise UnsupportedError("is in no frame")
+        body, placed = self.mechanism.frames[self.tree.path_of(frame) or ""]
+        here = placed @ offset(surface.translation, surface.xyz_body_rotation)
+        match surface:
+            case wrapping.WrapSphere():
+                own, size = surfaces.ball(), _stretched((surface.radius,) * 3)
+            case wrapping.WrapEllipsoid():
+                own, size = surfaces.ball(), _stretched(surface.dimensions)
+            case wrapping.WrapCylinder():
+                own, size = surfaces.tube(), _stretched((surface.radius, surface.radius, surface.length))
+            case wrapping.WrapTorus() if surface.outer_radius + surface.inner_radius > 0.0:
+                middle = 0.5 * (surface.outer_radius + surface.inner_radius)
+                own = surfaces.ring(0.5 * (surface.outer_radius - surface.inner_radius) / middle)
+                size = _stretched((middle,) * 3)
+            case _:
+                raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")
+        look = surface.appearance
+        visible = look.visible and look.surface_properties.representation != 0 and surface.active
+        self._add(path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible)
+
+    def _path(self, path: GeometryPath, name: str) -> None:
+        points = tuple(self._path_point(point) for point in path.path_point_set.objects)
+        if len(points) < 2:
+            raise ModelError("has fewer than two points")
+        look = path.appearance
+        owner = self.tree.parent_of(path)
+        of = (self.tree.path_of(owner) if isinstance(owner, Force) else None) or name
+        visible = look.visible and getattr(owner, "appliesForce", True)
+        self.lines.append(Line(of, "paths", points, look.color, 0.0035, visible))
+
+    def _path_point(self, point: AbstractPathPoint) -> LinePoint:
+        body, placed = self._place(point, "socket_parent_frame")
+        turn, origin = placed[:3, :3], placed[:3, 3]
+        if isinstance(point, MovingPathPoint):
+            laws, places = [], []
+            for axis in "xyz":
+                function = getattr(point, f"{axis}_location")
+                if function is None:
+                    raise ModelError(f"has a point without {axis}_location")
+                laws.append(numeric(function, 1, f"{axis}_location of a point"))
+                places.append(self._coordinate(point, f"socket_{axis}_coordinate"))
+            return LinePoint(body, origin, turn, tuple(laws), tuple(places))
+        if not isinstance(point, PathPoint):
+            raise UnsupportedError(f"has a point of class {type(point).__name__}, which osimlite does not draw")
+        condition = None
+        if isinstance(point, ConditionalPathPoint):
+            condition = self._coordinate(point, "socket_coordinate"), *point.range
+        return LinePoint(body, turn @ np.array(point.location, dtype=float) + origin, condition=condition)
+
+    def _force(self, force: Force, path: str) -> None:
+        """The line of a force between two points, and where the force of a contact is shown."""
+        match force:
+            case springs.PointToPointSpring():
+                self._between(path, force, ("socket_body1", force.point1), ("socket_body2", force.point2))
+            case springs.ExpressionBasedPointToPointForce():
+                self._between(path, force, ("body1", force.point1), ("body2", force.point2))
+            case actuators.PointToPointActuator():
+                self._between(path, force, ("bodyA", force.pointA), ("bodyB", force.pointB))
+            case TwoFrameLinker():
+                self._between(path, force, ("socket_frame1", (0, 0, 0)), ("socket_frame2", (0, 0, 0)))
+            case HuntCrossleyForce() | contact_forces.ElasticFoundationForce():
+                spec = field_specs(type(force).ContactParameters)["geometry"]
+                for parameters in force.contact_parameters.objects:
+                    for place, word in enumerate(parameters.geometry):
+                        found = self.tree.resolve(Use(parameters, force, spec, word, place)).target
+                        self._push(force.name, path, found, None)
+            case contact_forces.SmoothSphereHalfSpaceForce():
+                sphere = self.tree.target(force, "socket_sphere", force.socket_sphere)
+                self._push(force.name, path, sphere, "Sphere")
+
+    def _between(self, path: str, force: Any, *ends: tuple[str, Any]) -> None:
+        points = []
+        for name, point in ends:
+            body, placed = self._place(force, name)
+            points.append(LinePoint(body, placed[:3, :3] @ np.array(point, dtype=float) + placed[:3, 3]))
+        self.lines.append(Line(path, "springs", tuple(points), SPRING, 0.005, bool(force.appliesForce)))
+
+    def _push(self, element: str, path: str, surface: Component | None, label: str | None) -> None:
+        if not isinstance(surface, contact.ContactGeometry) or isinstance(surface, contact.ContactHalfSpace):
+            return
+        frame = self.tree.target(surface, "socket_frame", surface.socket_frame)
+        body, placed = self.mechanism.placement(self.tree.path_of(frame) or "")
+        base = self.mechanism.bodies[body].name if body >= 0 else "ground"
+        labels = (label,) if label else (frame.name, base, surface.name)
+        near = (placed @ offset(surface.location, surface.orientation))[:3, 3]
+        self.pushed.append(Pushed(element, path, body, labels, near, self.tree.path_of(surface) or ""))
+
+    # ----------------------------------------------------------------------------------------------- helpers
+    @contextmanager
+    def _remarked(self, path: str) -> Iterator[None]:
+        """Turns what goes wrong with one component into a remark."""
+        try:
+            yield
+        except OsimliteError as error:
+            self.remarks.append((path, f"not drawn: {error.message}"))
+
+    def _add(
+        self,
+        path: str,
+        layer: Layer,
+        body: int,
+        surface: Surface,
+        matrix: Array,
+        color: Color,
+        opacity: float = 1.0,
+        visible: bool = True,
+    ) -> None:
+        if not np.isfinite(matrix).all():
+            raise ModelError("has a size or a place that is no number")
+        if id(surface) not in self.places:
+            self.places[id(surface)] = len(self.surfaces)
+            self.surfaces.append(surface)
+        opacity = min(max(float(opacity), 0.0), 1.0)
+        self.items.append(Item(path, layer, body, self.places[id(surface)], matrix, color, opacity, visible))
+        if layer == "geometry" and visible:
+            self.drawn.add(body)
+
+    def _line(
+        self, path: str, layer: Layer, body: int, placed: Array, ends: Array, color: Color, visible: bool
+    ) -> None:
+        points = tuple(LinePoint(body, placed[:3, :3] @ end + placed[:3, 3]) for end in ends)
+        self.lines.append(Line(path, layer, points, color, 0.003, visible))
+
+    def _mesh(self, name: str) -> Surface:
+        """The mesh in a file; the same for the same file."""
+        found = find_file(name, self.folders)
+        if found is None:
+            raise ModelError(f"the mesh file {name} is in none of the folders searched; name one by --geometry")
+        if found not in self.meshes:
+            self.meshes[found] = surfaces.read_surface(found)
+        return self.meshes[found]
+
+    def _place(self, owner: Component, socket: str) -> tuple[int, Array]:
+        frame = self.tree.target(owner, socket, getattr(owner, socket))
+        return self.mechanism.placement(self.tree.path_of(frame) or "")
+
+    def _coordinate(self, owner: Component, socket: str) -> int:
+        found = self.tree.target(owner, socket, getattr(owner, socket))
+        return self.mechanism.coordinate_index(self.tree.path_of(found) or "")
+
+    def _with_half_spaces(self, scene: Scene) -> Scene:
+        """The same scene with its half spaces made as wide as the model asks for."""
+        if self.half_spaces:
+            low, high = scene.box(scene.mechanism.values({}))
+            width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(high - low)))
+            for place in self.half_spaces:
+                matrix = self.items[place].matrix
+                # A little inside, so that a floor drawn at the same place is seen, and not spots of both.
+                matrix[:3, 3] += 0.002 * width * matrix[:3, 0]
+                matrix[:3, :3] *= width
+        return scene
+
+
+def _stretched(size: Any, where: Any = (0.0, 0.0, 0.0)) -> Array:
+    """A matrix (4, 4) that stretches along the axes and then moves."""
+    matrix = np.diag((*np.asarray(size, dtype=float).tolist(), 1.0))
+    matrix[:3, 3] = where
+    return matrix

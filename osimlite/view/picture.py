@@ -1,0 +1,275 @@
+"""Pictures of a scene at a pose, drawn in software: for files, for films, and where there is no browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.translate.surface import Surface
+from osimlite.view import surfaces
+from osimlite.view.canvas import Canvas
+from osimlite.view.scene import Bodies, Color, Scene
+
+SKY, INK, FLOOR, EARTH, FORCE, TOUCHING = (
+    (0.965, 0.973, 0.984),
+    (0.149, 0.196, 0.247),
+    (0.80, 0.83, 0.87),
+    (0.91, 0.89, 0.85),
+    (0.835, 0.369, 0.0),
+    (0.969, 0.71, 0.22),
+)
+"""Colours of background, words, floor lines, what is below ground, force arrows (Okabe and Ito's vermilion), and
+loaded contact surfaces."""
+
+_KEY, _FILL = (np.array(v) / np.linalg.norm(v) for v in ((-0.45, 0.75, 0.6), (0.7, 0.1, 0.7)))
+"""Where light comes from, as seen by the viewer: to the right, up, towards the viewer."""
+
+_AMBIENT, _FROM_KEY, _FROM_FILL = 0.42, 0.46, 0.22
+
+_FROM_THE_EDGE = 0.02
+"""Sine of the angle below which a surface counts as seen from its edge."""
+
+_FINE = 2
+"""Pixels are drawn this many times finer than shown, so that edges are smooth."""
+
+
+class Camera(NamedTuple):
+    """Looks at a model from infinitely far away.
+
+    Attributes:
+        right: unit vector (3,) in ground that points to the right in the picture.
+        up: unit vector (3,) that points up in it.
+        center: the point (3,) of ground in the middle, m.
+        half: half the width and half the height of what is seen, m.
+    """
+
+    right: Array
+    up: Array
+    center: Array
+    half: tuple[float, float]
+
+    @property
+    def towards(self) -> Array:
+        """Unit vector (3,) towards the viewer."""
+        return np.cross(self.right, self.up)
+
+    def places(self, points: Array, width: int, height: int) -> Array:
+        """Pixels to the right and down, and depth (m), of points (..., 3) in a picture of that many pixels."""
+        away = points - self.center
+        x = (away @ self.right / self.half[0] + 1.0) * (0.5 * width)
+        y = (1.0 - away @ self.up / self.half[1]) * (0.5 * height)
+        return np.stack((x, y, away @ self.towards), axis=-1)
+
+    @classmethod
+    def around(cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12) -> Camera:
+        """The camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
+        back = direction / np.linalg.norm(direction)
+        right = np.cross(up, back)
+        if np.linalg.norm(right) < 1e-9:
+            right = np.cross(np.roll(up, 1), back)
+        right = right / np.linalg.norm(right)
+        upward = np.cross(back, right)
+        flat = points @ np.array((right, upward)).T
+        middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+        wide, high = np.maximum(margin * 0.5 * np.ptp(flat, axis=0), 1e-3).tolist()
+        half = max(wide, high * aspect), max(high, wide / aspect)
+        depth = float((points @ back).mean())
+        return cls(right, upward, middle[0] * right + middle[1] * upward + depth * back, half)
+
+
+class Arrow(NamedTuple):
+    """A force to show: where it acts (3,) in ground, and the vector (3,), already as long as it is drawn, m."""
+
+    point: Array
+    vector: Array
+
+
+@dataclass(frozen=True)
+class Style:
+    """What else is in a picture: a floor of square meshes, and surfaces (paths) shown as loaded."""
+
+    floor: float | None = None
+    loaded: frozenset[str] = frozenset()
+
+
+def draw(
+    scene: Scene,
+    q: Array,
+    camera: Camera,
+    size: tuple[int, int],
+    arrows: Sequence[Arrow] = (),
+    style: Style | None = None,
+) -> Any:
+    """A picture (pillow image) of a scene.
+
+    Args:
+        scene: what is to be seen.
+        q: coordinate values (n,).
+        camera: from where.
+        size: width and height in pixels.
+        arrows: forces.
+        style: what else.
+
+    Raises:
+        MissingDependency: pillow is not installed.
+        OsimliteError: the picture has no size.
+    """
+    image = require("PIL.Image", extra="view", purpose="a picture")
+    if min(size) < 16 or max(size) > 8000:
+        raise OsimliteError(f"a picture is 16 to 8000 pixels wide and high, not {size[0]} × {size[1]}")
+    width, height = _FINE * size[0], _FINE * size[1]
+    canvas = Canvas(width, height, np.array(SKY))
+    heap = _Heap(camera, width, height)
+    _fill(heap, scene, q, scene.at(q), arrows, style or Style())
+    heap.onto(canvas)
+    return image.fromarray(canvas.pixels(_FINE))
+
+
+def _fill(heap: _Heap, scene: Scene, q: Array, bodies: Bodies, arrows: Iterable[Arrow], style: Style) -> None:
+    if style.floor is not None:
+        _lay_floor(heap, scene, style.floor)
+    for item in scene.drawn():
+        if item.path in scene.half_spaces:
+            _cut_open(heap, bodies.matrix(item.body, item.matrix))
+        loaded = item.path in style.loaded
+        color, opacity = (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
+        heap.put(scene.surfaces[item.surface], bodies.matrix(item.body, item.matrix), color, opacity)
+    for line in scene.lines:
+        if line.visible and line.layer in scene.shown:
+            corners = line.corners(q, bodies)
+            for start, end in pairwise(corners):
+                heap.put(surfaces.tube(8), _between(start, end, line.radius), line.color)
+            for corner in corners:
+                heap.put(surfaces.bead(), _sized(corner, line.radius), line.color)
+    if "frames" in scene.shown:
+        for axes in scene.axes:
+            placed = bodies.matrix(axes.body, axes.matrix)
+            for axis in range(3):
+                end = placed[:3, 3] + axes.length * placed[:3, axis]
+                heap.put(surfaces.tube(8), _between(placed[:3, 3], end, 0.002), tuple(np.eye(3)[axis].tolist()))
+    thick = 0.012 * heap.camera.half[1]
+    for arrow in arrows:
+        length = float(np.linalg.norm(arrow.vector))
+        if length < 2.0 * thick:
+            continue
+        tip, end = arrow.point + arrow.vector, arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length)
+        heap.put(surfaces.tube(), _between(arrow.point, end, thick), FORCE, front=True)
+        head = _between(end, tip, 2.6 * thick)
+        head[:3, 3] = end
+        heap.put(surfaces.spike(), head, FORCE, front=True)
+
+
+def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
+    """A square mesh at a height over ground's origin, its lines half a metre apart."""
+    up, half = scene.up, max(heap.camera.half)
+    across = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
+    across /= np.linalg.norm(across)
+    along = np.cross(across, up)
+    step = 0.5 if half < 4.0 else 10.0 ** np.ceil(np.log10(half / 8.0))
+    reach = step * np.ceil(1.2 * half / step)
+    middle = heap.camera.center
+    first, second = (step * np.round(middle @ axis / step) for axis in (across, along))
+    for k in np.arange(-reach, reach + 0.5 * step, step):
+        one = (first - reach, second + k), (first + reach, second + k)
+        other = (first + k, second - reach), (first + k, second + reach)
+        for ends in (one, other):
+            start, end = (x * across + z * along + height * up for x, z in ends)
+            heap.put(surfaces.tube(4), _between(start, end, 0.0012 * half), FLOOR, lit=False)
+
+
+def _cut_open(heap: _Heap, placed: Array) -> None:
+    """A half space seen from its edge: its line, and what is below it, behind everything else."""
+    camera, inward = heap.camera, placed[:3, 0] / np.linalg.norm(placed[:3, 0])
+    if abs(float(inward @ camera.towards)) > _FROM_THE_EDGE:
+        return
+    along = np.cross(inward, camera.towards)
+    along /= np.linalg.norm(along)
+    far = 4.0 * max(camera.half)
+    start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
+    heap.put(
+        surfaces.tube(4), _between(start - far * along, start + far * along, 0.004 * camera.half[1]), INK, lit=False
+    )
+    below = np.eye(4)
+    below[:3, :3] = np.column_stack((camera.towards, far * inward, 2.0 * far * along))
+    below[:3, 3] = start + 0.5 * far * inward - 1e3 * camera.towards
+    heap.put(surfaces.sheet(), below, EARTH, lit=False)
+
+
+class _Heap:
+    """Triangles as they appear to a camera, lit, until all are drawn at once."""
+
+    def __init__(self, camera: Camera, width: int, height: int) -> None:
+        self.camera, self.width, self.height = camera, width, height
+        self._solid: list[tuple[Array, Array]] = []
+        self._glassy: list[tuple[Array, Array, Array]] = []
+        self._axes = np.array((camera.right, camera.up, camera.towards))
+
+    def put(
+        self,
+        surface: Surface,
+        matrix: Array,
+        color: Color | tuple[float, ...],
+        opacity: float = 1.0,
+        *,
+        lit: bool = True,
+        front: bool = False,
+    ) -> None:
+        """Add a surface placed in ground by `matrix` (4, 4); `front`: in front of all that is further than 1 km."""
+        points = surface.points @ matrix[:3, :3].T + matrix[:3, 3]
+        places = self.camera.places(points, self.width, self.height)
+        if front:
+            places[:, 2] += 1e3
+        shades = np.tile(np.array(color, dtype=float), (len(points), 1))
+        if lit:
+            # Normals follow the cofactors, which also serve what is stretched or flat.
+            turn = matrix[:3, :3]
+            cofactors = np.array([np.cross(turn[1], turn[2]), np.cross(turn[2], turn[0]), np.cross(turn[0], turn[1])])
+            normals = surfaces.normals_of(surface) @ cofactors.T @ self._axes.T
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+            normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+            normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
+            light = _AMBIENT + _FROM_KEY * (normals @ _KEY).clip(0.0) + _FROM_FILL * (normals @ _FILL).clip(0.0)
+            shades *= light[:, None]
+        corners, colors = places[surface.triangles], shades[surface.triangles]
+        if opacity >= 1.0:
+            self._solid.append((corners, colors))
+        elif opacity > 0.0:
+            # Of what shines through, the far side is not drawn, unless that is all there is of a sheet.
+            if len(corners) > 2:
+                (ax, ay), (bx, by), (cx, cy) = (corners[:, place, :2].T for place in range(3))
+                seen = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
+                corners, colors = corners[seen], colors[seen]
+            self._glassy.append((corners, colors, np.full(len(corners), opacity)))
+
+    def onto(self, canvas: Canvas) -> None:
+        """Draw everything."""
+        if self._solid:
+            canvas.solid(*(np.concatenate(column) for column in zip(*self._solid, strict=True)))
+        if self._glassy:
+            canvas.glassy(*(np.concatenate(column) for column in zip(*self._glassy, strict=True)))
+
+
+def _between(start: Array, end: Array, radius: float) -> Array:
+    """The matrix (4, 4) that puts a unit cylinder along Z between two points."""
+    along = end - start
+    length = float(np.linalg.norm(along))
+    z = along / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x /= np.linalg.norm(x)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack((radius * x, radius * np.cross(z, x), length * z))
+    matrix[:3, 3] = 0.5 * (start + end)
+    return matrix
+
+
+def _sized(center: Array, radius: float) -> Array:
+    matrix = np.diag((radius, radius, radius, 1.0))
+    matrix[:3, 3] = center
+    return matrix

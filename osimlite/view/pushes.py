@@ -1,0 +1,73 @@
+"""The contact forces of a motion, where they act."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+from osimlite.view.motion import Motion, at_times, contact_forces
+from osimlite.view.scene import Bodies, Pushed, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A contact force at n moments, on a body of the scene.
+
+    Attributes:
+        on: the element, and the body.
+        forces: (n, 3) in ground, N.
+        torques: (n, 3) in ground about the body's origin, N·m, or None if they are not on record.
+    """
+
+    on: Pushed
+    forces: Array
+    torques: Array | None
+
+    def point(self, number: int, bodies: Bodies) -> Array:
+        """Where the force acts (3,) in ground: the point of its line of action nearest to the contact surface's middle.
+
+        A force F with the moment M about the origin acts along the line through F × M / F².
+        """
+        near: Array = bodies.points(self.on.body, self.on.near[None, :])[0]
+        force = self.forces[number]
+        square = float(force @ force)
+        if self.torques is None or square == 0.0:
+            return near
+        on_line: Array = bodies.origins[self.on.body] + np.cross(force, self.torques[number]) / square
+        found: Array = on_line + force * (float(force @ (near - on_line)) / square)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """All contact forces of a motion."""
+
+    pushes: Sequence[Push]
+
+    @classmethod
+    def of(cls, scene: Scene, motion: Motion, times: Array) -> Pushes:
+        """The forces on record of a motion, at other times (n,).
+
+        Surfaces of one element on one body share a record, and are shown once.
+        """
+        forces = {(force.element, force.frame): force for force in contact_forces(motion)}
+        found: dict[tuple[str, str], Push] = {}
+        for pushed in scene.pushed:
+            key = next((key for key in ((pushed.element, label) for label in pushed.labels) if key in forces), None)
+            if key is not None and key not in found:
+                force = forces[key]
+                torques = None if force.torques is None else at_times(motion, force.torques, times)
+                found[key] = Push(pushed, at_times(motion, force.vectors, times), torques)
+        return cls(list(found.values()))
+
+    @property
+    def largest(self) -> float:
+        """The largest component of any force, N."""
+        return max((float(np.abs(push.forces).max(initial=0.0)) for push in self.pushes), default=0.0)
+
+    def at(self, number: int, bodies: Bodies) -> list[tuple[Pushed, Array, Array]]:
+        """At a moment: on what, the point (3,) and the force (3,) of each, in ground."""
+        return [(push.on, push.point(number, bodies), push.forces[number]) for push in self.pushes]

@@ -1,0 +1,148 @@
+"""Surfaces to draw: unit shapes of triangles, and the mesh files of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.translate.obj import obj_polygons
+from osimlite.translate.stl import stl_corners
+from osimlite.translate.surface import Indices, Surface, triangulated
+from osimlite.translate.vtp import read_vtp
+
+SLICES, STACKS = 32, 16
+
+
+@cache
+def ball() -> Surface:
+    """A ball of radius 1 about the origin."""
+    return _turned([_half_circle(STACKS)])
+
+
+@cache
+def bead() -> Surface:
+    """A ball of radius 1 of few triangles, for what is small."""
+    return _turned([_half_circle(4)], 8)
+
+
+@cache
+def tube(slices: int = SLICES) -> Surface:
+    """A closed cylinder of radius 1 and length 1 along Z about the origin."""
+    caps = _strip((0, -0.5), (1, -0.5), (0, -1)), _strip((1, 0.5), (0, 0.5), (0, 1))
+    return _turned([caps[0], _strip((1, -0.5), (1, 0.5), (1, 0)), caps[1]], slices)
+
+
+@cache
+def spike() -> Surface:
+    """A closed cone of base radius 1 around the origin, and its tip at Z = 1."""
+    return _turned([_strip((0, 0), (1, 0), (0, -1)), _strip((1, 0), (0, 1), (0.5**0.5, 0.5**0.5))])
+
+
+@cache
+def ring(thickness: float) -> Surface:
+    """A torus about Z whose middle line has radius 1, of a tube of radius `thickness`."""
+    angles = np.linspace(0.0, 2.0 * np.pi, STACKS + 1)
+    arc = np.column_stack((np.cos(angles), np.sin(angles)))
+    return _turned([np.hstack((thickness * arc + (1.0, 0.0), arc))])
+
+
+@cache
+def cube() -> Surface:
+    """A box with edges of length 1 about the origin."""
+    points: list[Array] = []
+    normals: list[Array] = []
+    triangles: list[Indices] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            side = np.zeros((4, 3))
+            side[:, axis] = 0.5 * sign
+            side[:, axis - 2] = (-0.5, 0.5, 0.5, -0.5)
+            side[:, axis - 1] = (-0.5, -0.5, 0.5, 0.5)
+            first = 4 * len(points)
+            points.append(side)
+            normals.append(np.tile(sign * np.eye(3)[axis], (4, 1)))
+            corners = np.array(((0, 1, 2), (0, 2, 3))) + first
+            triangles.append(corners if sign > 0.0 else corners[:, ::-1])
+    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals))
+
+
+@cache
+def sheet() -> Surface:
+    """A square with edges of length 1 in the plane X = 0 about the origin; its outside is towards -X."""
+    points = np.array(((0, -0.5, -0.5), (0, 0.5, -0.5), (0, 0.5, 0.5), (0, -0.5, 0.5)))
+    return Surface(points, np.array(((0, 2, 1), (0, 3, 2))), np.tile((-1.0, 0.0, 0.0), (4, 1)))
+
+
+def _strip(start: tuple[float, float], end: tuple[float, float], normal: tuple[float, float]) -> Array:
+    return np.array(((*start, *normal), (*end, *normal)), dtype=float)
+
+
+def _half_circle(stacks: int) -> Array:
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, stacks + 1)
+    arc = np.column_stack((np.cos(angles), np.sin(angles)))
+    return np.hstack((arc, arc))
+
+
+def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
+    """The surface that lines in a half plane sweep when they turn about Z.
+
+    Args:
+        strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same two directions. With
+            the distance to the right and the height up, the outside is to the right of the way along a line.
+        slices: how many there are around.
+    """
+    around = 2.0 * np.pi * np.arange(slices) / slices
+    points: list[Array] = []
+    normals: list[Array] = []
+    triangles: list[Indices] = []
+    first = 0
+    for strip in strips:
+        for vectors, columns in ((points, strip[:, :2]), (normals, strip[:, 2:])):
+            out, up = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
+            vectors.append(np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3))
+        row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
+        a, b = first + row * slices + k, first + row * slices + (k + 1) % slices
+        triangles += [np.column_stack((a, b, b + slices)), np.column_stack((a, b + slices, a + slices))]
+        first += len(strip) * slices
+    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals))
+
+
+def read_surface(path: Path) -> Surface:
+    """The surface in a file of the kinds that OpenSim reads (.vtp, .stl, .obj).
+
+    Raises:
+        OsimliteError: it cannot be read, or holds no surface.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise OsimliteError(f"cannot read the file: {error.strerror}", file=path.name) from None
+    match path.suffix.lower():
+        case ".vtp":
+            return read_vtp(content, path.name)
+        case ".stl":
+            points = stl_corners(content, path.name).reshape(-1, 3)
+            return Surface(points, np.arange(len(points)).reshape(-1, 3))
+        case ".obj":
+            polygons = obj_polygons(content, path.name)
+            return Surface(polygons.points, triangulated(*polygons))
+    raise OsimliteError(f"osimlite does not read {path.suffix or 'such'} files", file=path.name)
+
+
+def normals_of(surface: Surface) -> Array:
+    """Outward unit vectors at the points (n, 3): those that come with the surface, else the mean of the triangles'."""
+    if surface.normals is not None:
+        return surface.normals
+    a, b, c = (surface.points[surface.triangles[:, place]] for place in range(3))
+    areas = np.cross(b - a, c - a)
+    total = np.zeros_like(surface.points)
+    for place in range(3):
+        np.add.at(total, surface.triangles[:, place], areas)
+    lengths = np.linalg.norm(total, axis=1, keepdims=True)
+    result: Array = total / np.where(lengths > 0.0, lengths, 1.0)
+    return result
