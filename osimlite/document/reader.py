@@ -34,6 +34,12 @@ OLDEST_KNOWN = 10901
 
 _COUNT = etree.XPath("count(descendant-or-self::*)")
 
+_MIXED = etree.XPath("boolean(//*/following-sibling::text() | //*/preceding-sibling::text())")
+"""Whether there is text beside an element; without blank text, as the parser leaves it out."""
+
+_BEGINS_WITH_ROOT = re.compile(rb"(?:<\?xml[^<>]*+>\s*+)?<[A-Za-z]")
+"""The beginning of a text in which the root element follows the XML declaration, with no DOCTYPE between."""
+
 _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
 
@@ -68,7 +74,7 @@ def read(path: str | Path) -> Model:
 
 def read_text(text: str | bytes) -> Model:
     """Read a model from the text of a document; DocumentError if it is none."""
-    return read_document(Source(text if isinstance(text, bytes) else text.encode())).model
+    return read_document(Source(text) if isinstance(text, bytes) else Source.of_characters(text)).model
 
 
 def read_document(source: Source) -> Document:
@@ -191,6 +197,8 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         recover=recover,
         remove_comments=all_generated(data),
         remove_blank_text=True,
+        # The parser need not look for ids. Told so, it reads what a DOCTYPE names, so that none may follow.
+        collect_ids=_BEGINS_WITH_ROOT.match(body) is None,
     )
     try:
         root = etree.fromstring(body, parser)
@@ -205,6 +213,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
+        source.mixed = cast("bool", _MIXED(root))
     return root
 
 

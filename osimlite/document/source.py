@@ -14,6 +14,9 @@ from typing import NamedTuple
 from osimlite.document.spans import PlainSpans, Span, spans_of
 from osimlite.errors import MissingFileError
 
+_BLOCK = 4096
+"""Characters between the places whose line is known at once."""
+
 
 class Position(NamedTuple):
     """A place in a text: 1-based line and column (in characters), and how many characters it covers."""
@@ -33,6 +36,8 @@ class Source:
         self.text = _decoded(data, self.encoding)
         self.elements: int | None = None
         """The number of elements, once the parser has found the text well-formed."""
+        self.mixed: bool | None = None
+        """Whether there is text beside elements, once the parser has found the text well-formed."""
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 
@@ -49,12 +54,23 @@ class Source:
             reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
             raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
 
+    @classmethod
+    def of_characters(cls, text: str, file: str | None = None) -> Source:
+        """The source of characters that somebody has decoded already, whatever encoding they declare.
+
+        Args:
+            text: the characters.
+            file: where they are kept, if anywhere.
+        """
+        source = cls(b"", file)
+        source.data, source.text = text.encode("utf-8", "replace"), text
+        return source
+
     @cached_property
     def spans(self) -> Sequence[Span]:
         """Every element in document order; of a text that is not well-formed, as far as its tags go."""
         if self.elements is not None:
-            plain = PlainSpans(self.text)
-            # Of a well-formed text no more "<" can be found than there are elements, but in comments and the like.
+            plain = PlainSpans(self.text, self.elements)
             if len(plain) == self.elements:
                 return plain
         return spans_of(self.text)
@@ -87,14 +103,31 @@ class Source:
 
     @cached_property
     def _line_starts(self) -> list[int]:
-        if "\r" not in self.text:
-            # Of the last line no other begins behind it.
-            return [0, *accumulate(len(line) + 1 for line in self.text.split("\n")[:-1])]
         return [0, *(match.end() for match in re.finditer(r"\n|\r\n?", self.text))]
+
+    @cached_property
+    def _lines_before(self) -> list[int] | None:
+        """How many lines end before each block of the text; None if a carriage return alone ends some of them.
+
+        Few places are asked for, and characters are counted much faster than all lines are listed.
+        """
+        text = self.text
+        if "\r" in text and text.count("\r") != text.count("\r\n"):
+            return None
+        counts = (text.count("\n", start, start + _BLOCK) for start in range(0, len(text), _BLOCK))
+        return [*accumulate(counts, initial=0)]
 
     def line_start(self, line: int) -> int:
         """The character offset at which a line begins."""
-        return self._line_starts[line - 1]
+        before = self._lines_before
+        if before is None:
+            return self._line_starts[line - 1]
+        # The block in which the line before ends; the first line begins at the beginning.
+        block = max(0, bisect_left(before, line - 1) - 1)
+        start = block * _BLOCK
+        for _ in range(line - 1 - before[block]):
+            start = self.text.index("\n", start) + 1
+        return start
 
     @property
     def lines(self) -> list[str]:
@@ -103,8 +136,13 @@ class Source:
 
     def position(self, offset: int, length: int = 1) -> Position:
         """Line and column of a character offset."""
-        line = bisect_right(self._line_starts, offset) - 1
-        return Position(line + 1, offset - self._line_starts[line] + 1, length)
+        before = self._lines_before
+        if before is None:
+            line = bisect_right(self._line_starts, offset) - 1
+            return Position(line + 1, offset - self._line_starts[line] + 1, length)
+        block = min(offset // _BLOCK, len(before) - 1)
+        line = before[block] + self.text.count("\n", block * _BLOCK, offset)
+        return Position(line + 1, offset - self.text.rfind("\n", 0, offset), length)
 
     def of_tag(self, number: int) -> Position:
         """Where the start tag of element `number` is: the ``<`` and the name.

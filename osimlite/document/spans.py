@@ -153,15 +153,22 @@ def spans_of(text: str) -> list[Span]:
 _BEGIN = re.compile(r"<[^/!?]")
 
 
+# The same where comments and their like may hold what looks like a tag.
+_BEGIN_OR_HIDDEN = re.compile(r"<[^/!?]|<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
+
+
 class PlainSpans(Sequence[Span]):
-    """The spans of a well-formed text in which no ``<`` means anything else than a tag; made as they are asked for.
+    """The spans of a well-formed text; made as they are asked for.
 
     Whoever wants to know of one place in a long text need not wait for all the others.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, elements: int) -> None:
         self.text = text
         self.starts = [match.start() for match in _BEGIN.finditer(text)]
+        if len(self.starts) != elements:
+            found = ((match.start(), match.end()) for match in _BEGIN_OR_HIDDEN.finditer(text))
+            self.starts = [start for start, end in found if end == start + 2]
         self._known: dict[int, Span] = {}
 
     def __len__(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -14,7 +15,7 @@ from osimlite.document.survey import Survey
 from osimlite.errors import DocumentError
 from osimlite.lint.config import Config
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, FieldSpec, Object, Unknown, object_specs
+from osimlite.schema.base import Component, FieldSpec, Object, Unknown, lineage
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Resolution, Tree, Use
 
@@ -73,37 +74,34 @@ class Subject:
     def tree(self) -> Tree:
         """The component tree."""
         assert self.model is not None
-        return self.model.tree()
+        # A model that was read for this check alone is not tied to its tree in a cycle, which only the garbage
+        # collector could undo.
+        return self.model.tree() if self.source is None else Tree(self.model)
+
+    @property
+    def by_class(self) -> dict[type[Object], list[Object]]:
+        """Every object of the model by its exact class, in tree order."""
+        return {} if self.model is None else self.tree.by_class
 
     @cached_property
-    def by_class(self) -> dict[type[Object], list[Object]]:
-        """Every object of the model by its exact class, in document order."""
-        found: dict[type[Object], list[Object]] = {}
-        if self.model is not None:
-            # The same order as `walk`, without a generator to resume for each of thousands of objects.
-            pending: list[Object] = [self.model]
-            while pending:
-                item = pending.pop()
-                cls = type(item)
-                if cls in found:
-                    found[cls].append(item)
-                else:
-                    found[cls] = [item]
-                if object_specs(cls):
-                    pending += [held for _, held in item.objects_held()][::-1]
+    def _by_base(self) -> dict[str, list[list[Object]]]:
+        """The lists of `by_class` by the name of the class and of each that it derives from.
+
+        Dozens of rules ask for the objects of a class, and most models have none of it.
+        """
+        found: dict[str, list[list[Object]]] = {}
+        for cls, items in self.by_class.items():
+            for name in lineage(cls):
+                found.setdefault(name, []).append(items)
         return found
 
     def each(self, cls: type[T]) -> Iterator[T]:
         """Every object of a class or of one derived from it."""
-        for known, items in self.by_class.items():
-            if issubclass(known, cls):
-                yield from cast("list[T]", items)
+        return cast("Iterator[T]", self.named(cls.__name__))
 
     def named(self, cls: str) -> Iterator[Any]:
         """Every object of the class with this name or of one derived from it; the class need not be imported."""
-        for known, items in self.by_class.items():
-            if any(base.__name__ == cls for base in known.__mro__):
-                yield from items
+        return chain.from_iterable(self._by_base.get(cls, ()))
 
     @cached_property
     def uses(self) -> list[Use]:

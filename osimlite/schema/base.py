@@ -89,6 +89,8 @@ class Object(BaseModel):
 
     tag: ClassVar[str] = ""
     abstract: ClassVar[bool] = True
+    is_component: ClassVar[bool] = False
+    """Whether objects of the class have a place, and so a path, in the component tree."""
     name_reference: ClassVar[Reference | None] = None
     """The rule by which the object's own name names a component, for the few classes where it does."""
 
@@ -130,7 +132,7 @@ class Object(BaseModel):
         _put_present(self, present)
         _put_extra(self, None)
         _put_private(self, None)
-        _put_model(self, home)
+        put_model(self, home)
         _put_index(self, index)
         _put_layout(self, None)
         return self
@@ -150,27 +152,22 @@ class Object(BaseModel):
         """What the file said about this object beyond its properties."""
         return cast("Layout | None", self._layout)
 
-    @property
-    def is_component(self) -> bool:
-        """Whether the object has a place, and so a path, in the component tree."""
-        return False
-
-    def objects_held(self) -> Iterator[tuple[FieldSpec, Object]]:
-        """Yield every object this one owns, with the property that holds it, in printing order."""
+    def objects_held(self) -> list[tuple[FieldSpec, Object]]:
+        """Every object this one owns, with the property that holds it, in printing order."""
+        held: list[tuple[FieldSpec, Object]] = []
         state = self.__dict__
-        for spec, name, is_list in _holding(type(self)):
-            if name in state:
-                value = state[name]
-            elif is_list:
+        for spec, name, is_list in holding(type(self)):
+            if is_list:
                 # A list that no one has asked for is empty.
+                for item in state.get(name, ()):
+                    held.append((spec, item))
                 continue
-            else:
-                value = getattr(self, name)
+            value = state[name] if name in state else getattr(self, name)
             if isinstance(value, list):
-                for item in value:
-                    yield spec, item
+                held += [(spec, item) for item in value]
             elif value is not None:
-                yield spec, value
+                held.append((spec, value))
+        return held
 
     def walk(self) -> Iterator[Object]:
         """Yield this object and everything below it, parents first."""
@@ -178,7 +175,7 @@ class Object(BaseModel):
         while pending:
             item = pending.pop()
             yield item
-            if _holding(type(item)):
+            if holding(type(item)):
                 pending += [held for _, held in item.objects_held()][::-1]
 
     def copy_deep(self) -> Self:
@@ -260,21 +257,17 @@ _put_state, _put_present, _put_extra, _put_private = (
     BaseModel.__dict__[name].__set__
     for name in ("__dict__", "__pydantic_fields_set__", "__pydantic_extra__", "__pydantic_private__")
 )
-_put_model, _put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
+put_model, _put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
 
 
 class Component(Object, abstract=True):
     """An object with a place in the component tree, which other components can name by its path."""
 
+    is_component: ClassVar[bool] = True
     internal: ClassVar[tuple[tuple[str, type[Component]], ...]] = ()
     """Names and classes of the parts that OpenSim makes for itself: they have a path and stand in no file."""
 
     subcomponents: Annotated[Many[Component], Tag("components")] = none()
-
-    @property
-    def is_component(self) -> bool:
-        """True: a component has a path."""
-        return True
 
     @property
     def model(self) -> Model | None:
@@ -346,9 +339,15 @@ def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @cache
-def _holding(cls: type[Object]) -> tuple[tuple[FieldSpec, str, bool], ...]:
+def holding(cls: type[Object]) -> tuple[tuple[FieldSpec, str, bool], ...]:
     """The properties of `cls` that hold objects: each with its name, and whether it is a list, empty by default."""
     return tuple((spec, spec.name, spec.factory is ObjectList) for spec in object_specs(cls))
+
+
+@cache
+def lineage(cls: type[Object]) -> tuple[str, ...]:
+    """The names of a class and of those it derives from, as far as :class:`Object`."""
+    return tuple(base.__name__ for base in cls.__mro__ if issubclass(base, Object))
 
 
 @cache

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, overload
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import Component, ModelComponent, made
+from osimlite.schema.base import Component, ModelComponent, made, put_model
 from osimlite.schema.constraints import ConstraintSet
 from osimlite.schema.contact import ContactGeometrySet
 from osimlite.schema.controllers import ControllerSet
@@ -70,6 +70,8 @@ class Model(ModelComponent):
         if known is None or known.epoch != epoch.count:
             known = Tree(self, known)
             object.__setattr__(self, "_tree", known)
+            for component in known.components:
+                put_model(component, self)
         return cast("Tree", known)
 
     @overload

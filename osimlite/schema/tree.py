@@ -9,12 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import Component, FieldSpec, Object, field_specs, name_spec, object_specs, reference_specs
+from osimlite.schema.base import (
+    Component,
+    FieldSpec,
+    Object,
+    field_specs,
+    holding,
+    name_spec,
+    reference_specs,
+)
 from osimlite.schema.fields import Held, Reference, epoch
-from osimlite.schema.sets import ModelComponentSet
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
@@ -64,8 +71,7 @@ class Use(NamedTuple):
     @property
     def reference(self) -> Reference:
         """The kind of the reference."""
-        assert isinstance(self.spec.kind, Reference)
-        return self.spec.kind
+        return cast("Reference", self.spec.kind)
 
 
 class Tree:
@@ -76,16 +82,22 @@ class Tree:
         self.model = model
         self.components: list[Component] = []
         self.by_path: dict[str, Component] = {}
+        self.by_class: dict[type[Object], list[Object]] = {}
+        """Every object of the model by its exact class; the parts that OpenSim makes for itself are left out."""
         self.renamed: list[Renamed] = []
         self._paths: dict[int, str] = {}
         self._parents: dict[int, Component] = {}
         self._owners: dict[int, Component] = {}
+        self._naming: list[tuple[Object, Component]] = []
+        # What an object of a class is put into, whether it can name others, and whether it can hold others.
+        self._shelves: dict[type[Object], tuple[list[Object], bool, bool]] = {}
         self._names: dict[str, dict[str, Component]] = {}
+        self._resolved: dict[tuple[str, str, str], Resolution] = {}
         self._parts: dict[int, tuple[Component, list[Component]]] = {}
         self._known_parts = previous._parts if previous is not None else {}
         self._internal: set[int] = set()
         self._below: dict[int, list[Component]] = {}
-        self._place(model, "", None)
+        self._place(model, "")
         self._known_parts = {}
 
     def path_of(self, component: Object) -> str | None:
@@ -98,7 +110,7 @@ class Tree:
 
     def owner_of(self, item: Object) -> Component:
         """The component that an object without a path belongs to; a component owns itself."""
-        return item if isinstance(item, Component) else self._owners[id(item)]
+        return cast("Component", item) if item.is_component else self._owners[id(item)]
 
     def is_internal(self, component: Component) -> bool:
         """Whether the component is a part that OpenSim makes for itself: it has a path and stands in no file."""
@@ -113,30 +125,37 @@ class Tree:
 
     def uses(self) -> Iterator[Use]:
         """Yield every reference of the model that has a text or a component, in tree order."""
-        for owner in self.components:
-            if id(owner) in self._internal:
-                continue
-            for holder in self._objects_of(owner):
-                if holder.name_reference is not None and holder.name:
-                    yield Use(holder, owner, name_spec(type(holder)), holder.name)
-                for spec in reference_specs(type(holder)):
-                    value = getattr(holder, spec.name)
-                    if isinstance(value, tuple):
-                        for position, word in enumerate(value):
-                            yield Use(holder, owner, spec, word, position)
-                    elif value is not None:
-                        yield Use(holder, owner, spec, value)
+        for holder, owner in self._naming:
+            cls = type(holder)
+            if cls.name_reference is not None and holder.name:
+                yield Use(holder, owner, name_spec(cls), holder.name)
+            # Plain values are in the dictionary of their object; through getattr they would cost several times as much.
+            state = holder.__dict__
+            for spec in reference_specs(cls):
+                value = state[spec.name]
+                if isinstance(value, tuple):
+                    for position, word in enumerate(value):
+                        yield Use(holder, owner, spec, word, position)
+                elif value is not None:
+                    yield Use(holder, owner, spec, value)
 
     def resolve(self, use: Use) -> Resolution:
         """Follow one reference by OpenSim's rule for its property."""
-        if isinstance(use.value, Component):
-            known = self.path_of(use.value) is not None
-            return self._typed(use.value if known else None, use.reference.target)
-        return self.lookup(use.reference, use.value, use.owner)
+        if isinstance(use.value, str):
+            return self.lookup(use.reference, use.value, use.owner)
+        known = self.path_of(use.value) is not None
+        return self._typed(use.value if known else None, use.reference.target)
 
     def lookup(self, reference: Reference, text: str, owner: Component) -> Resolution:
         """Follow `text` as the value of a property of `owner` with this kind of reference."""
-        return _RULES[reference.rule](self, text.strip(" \t\n\r\f\v"), owner, reference.target)
+        text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target
+        if not text.startswith("/") or rule not in _PATH_RULES or target == "Frame":
+            return _RULES[rule](self, text, owner, target)
+        # An absolute path leads to the same component from everywhere, and hundreds of points name one body.
+        known = self._resolved.get((rule, target, text))
+        if known is None:
+            known = self._resolved[rule, target, text] = _RULES[rule](self, text, owner, target)
+        return known
 
     def target(self, owner: Component, name: str, value: str | Component) -> Component:
         """The component that property `name` of `owner` leads to, for code that needs it to be there.
@@ -188,24 +207,59 @@ class Tree:
                     names.add(text)
         return sorted(names)
 
-    def _place(self, component: Component, path: str, parent: Component | None) -> None:
-        self.components.append(component)
-        self.by_path[path or "/"] = component
-        self._paths[id(component)] = path or "/"
-        object.__setattr__(component, "_model", self.model)
-        if parent is not None:
-            self._parents[id(component)] = parent
-            self._below.setdefault(id(parent), []).append(component)
-        children = list(self._internal_parts(component)) if component.internal else []
-        self._children(component, component, children)
+    def _place(self, component: Component, path: str) -> None:
+        """Enter a component at `path` ("" for the model), what belongs to it, and all that is below it."""
+        self._put(component, path or "/")
+        children: list[tuple[str, Component]] = []
+        self._enter(component, component, children)
+        if not children and not component.internal:
+            return
+        below = self._below[id(component)] = []
         taken: dict[str, Component] = {}
+        if component.internal:
+            for part in self._internal_parts(component):
+                taken[part.name] = part
+                below.append(part)
+                self._parents[id(part)] = component
+                self._put(part, f"{path}/{part.name}")
         for name, child in children:
             unique = name
             if name in taken:
                 unique = self._unique(name, taken)
                 self.renamed.append(Renamed(child, unique, taken[name]))
             taken[unique] = child
-            self._place(child, f"{path}/{unique}", component)
+            below.append(child)
+            self._parents[id(child)] = component
+            self._place(child, f"{path}/{unique}")
+
+    def _put(self, component: Component, path: str) -> None:
+        self.components.append(component)
+        self.by_path[path] = component
+        self._paths[id(component)] = path
+
+    def _enter(self, holder: Object, owner: Component, children: list[tuple[str, Component]]) -> None:
+        """Enter an object of the model, and those without a path in it, which add no level.
+
+        The components in it are added to `children`, with their names.
+        """
+        cls = type(holder)
+        shelf = self._shelves.get(cls)
+        if shelf is None:
+            items = self.by_class[cls] = []
+            shelf = self._shelves[cls] = items, _names_others(cls), bool(holding(cls))
+        items, names_others, holds_others = shelf
+        items.append(holder)
+        if names_others:
+            self._naming.append((holder, owner))
+        if not holds_others:
+            return
+        for spec, item in holder.objects_held():
+            if item.is_component:
+                component = cast("Component", item)
+                children.append((_name_in_tree(spec, component), component))
+            else:
+                self._owners[id(item)] = owner
+                self._enter(item, owner, children)
 
     @staticmethod
     def _unique(name: str, taken: dict[str, Component]) -> str:
@@ -214,32 +268,14 @@ class Tree:
             unique, count = f"{name}_{count}", count + 1
         return unique
 
-    def _children(self, holder: Object, owner: Component, found: list[tuple[str, Component]]) -> None:
-        """Add name and component of the children to `found`; objects without a path add no level."""
-        for spec, item in holder.objects_held():
-            if isinstance(item, Component):
-                found.append((_name_in_tree(spec, item), item))
-            else:
-                self._owners[id(item)] = owner
-                if object_specs(type(item)):
-                    self._children(item, owner, found)
-
-    def _internal_parts(self, owner: Component) -> Iterator[tuple[str, Component]]:
-        """Yield the parts that OpenSim makes for itself; the same ones for the same owner, as long as it lives."""
+    def _internal_parts(self, owner: Component) -> list[Component]:
+        """The parts that OpenSim makes for itself; the same ones for the same owner, as long as it lives."""
         known = self._known_parts.get(id(owner))
         if known is None or known[0] is not owner:
             known = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
         self._parts[id(owner)] = known
-        for (name, _), part in zip(owner.internal, known[1], strict=True):
-            self._internal.add(id(part))
-            yield name, part
-
-    def _objects_of(self, owner: Component) -> Iterator[Object]:
-        """Yield a component and the objects without a path that belong to it."""
-        pending: list[Object] = [owner]
-        for holder in pending:
-            yield holder
-            pending += [item for _, item in holder.objects_held() if not isinstance(item, Component)]
+        self._internal.update(map(id, known[1]))
+        return known[1]
 
     def _typed(self, found: Component | None, target: str) -> Resolution:
         if found is None:
@@ -293,6 +329,12 @@ def _derives(cls: type[Object], target: str) -> bool:
     return any(base.__name__ == target for base in cls.__mro__)
 
 
+@cache
+def _names_others(cls: type[Object]) -> bool:
+    """Whether an object of this class can name a component."""
+    return cls.name_reference is not None or bool(reference_specs(cls))
+
+
 def normalised(path: str) -> str | None:
     """An absolute path without doubled slashes, ``.`` and ``..``; None if it climbs above the root."""
     parts: list[str] = []
@@ -313,11 +355,11 @@ def _last(path: str) -> str:
 
 
 def _name_in_tree(spec: FieldSpec, item: Component) -> str:
-    form = spec.kind.form if isinstance(spec.kind, Held) else ""
-    if isinstance(item, ModelComponentSet) and form == "unnamed":
-        return type(item).__name__.lower()
+    form = cast("Held", spec.kind).form
     if form == "single":
         return spec.tag
+    if form == "unnamed" and is_a(item, "ModelComponentSet"):
+        return type(item).__name__.lower()
     return item.name or str(getattr(item, "class_name", "") or type(item).tag).lower()
 
 
@@ -381,6 +423,8 @@ def _nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) ->
     """Files, columns and positions name nothing in the component tree."""
     return Resolution(owner)
 
+
+_PATH_RULES = frozenset(("socket", "owner-path", "model-path"))
 
 _RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "socket": _socket,

@@ -157,7 +157,8 @@ def test_entities_and_files_of_others_are_not_followed(tmp_path: Path) -> None:
     outside = f'<!DOCTYPE a SYSTEM "{secret}"><OpenSimDocument Version="40600"><Model/></OpenSimDocument>'
     with pytest.raises(DocumentError):
         osimlite.read_text(bomb)
-    assert "do not read" not in osimlite.to_text(osimlite.read_text(outside))
+    for before in ("", "<!-- <OpenSimDocument> -->", "<?note <OpenSimDocument?>", "\n"):
+        assert "do not read" not in osimlite.to_text(osimlite.read_text(before + outside))
 
 
 def test_deep_nesting_is_an_error_not_a_crash() -> None:

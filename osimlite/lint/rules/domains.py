@@ -228,14 +228,16 @@ def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec]]:
     """Every property that holds a number that is not finite; a quick test first, since there are many numbers."""
     for cls, items in subject.by_class.items():
         specs = [s for s in value_specs(cls) if isinstance(s.kind, Value) and s.kind.scalar == "double"]
+        names = [(spec, spec.name) for spec in specs]
         for item in items:
             state = item.__dict__
-            for spec in specs:
-                value = state[spec.name]
+            for spec, name in names:
+                value = state[name]
                 if value.__class__ is float:
                     if -math.inf < value < math.inf:
                         continue
-                elif not value or all(-math.inf < number < math.inf for number in value):
+                # The sum of finite numbers may be infinite, and no other sum is finite.
+                elif not value or math.isfinite(sum(value)) or all(map(math.isfinite, value)):
                     continue
                 yield item, spec
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
-from pathlib import Path
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
@@ -46,14 +45,15 @@ def missing_mesh(subject: Subject, found: Found) -> None:
     items += [(mesh, "filename", mesh.filename) for mesh in subject.each(ContactMesh)]
     beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
     places = [str(path) for path in beside]
+    tried = listed(dict.fromkeys(places))
+    folders = _Folders()
     for item, tag, name in items:
         if not name:
             found(f"{called(item)} names no file", item, tag=tag)
             continue
-        if any(_is_file(place, name) for place in places):
+        if any(folders.has(place, name) for place in places):
             continue
-        twin = next((twin for place in places if (twin := _in_other_case(place, name)) is not None), None)
-        tried = listed(dict.fromkeys(places))
+        twin = folders.in_other_case(places, name)
         message = f"the file '{name}' of {called(item)} is not there; looked in {tried}"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
@@ -131,6 +131,7 @@ def missing_data_file(subject: Subject, found: Found) -> None:
     if subject.folder is None:
         return
     places = [str(subject.folder), ""]
+    folders = _Folders()
     for cls, tag in (
         ("PrescribedController", "controls_file"),
         ("ControlSetController", "controls_file"),
@@ -141,28 +142,53 @@ def missing_data_file(subject: Subject, found: Found) -> None:
             name = getattr(item, tag)
             if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
                 continue
-            if name and any(_is_file(place, name) for place in places):
+            if name and any(folders.has(place, name) for place in places):
                 continue
-            twin = next((twin for place in places if (twin := _in_other_case(place, name)) is not None), None)
+            twin = folders.in_other_case(places, name)
             fate = "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
             found(f"the file '{name}' of {called(item)} is not there: {fate}", item, tag=tag, suggestion=twin)
 
 
-def _is_file(place: str | Path, name: str) -> bool:
-    return os.path.isfile(os.path.join(place, name))
+class _Folders:
+    """The folders that files are looked for in, each listed once: a model names a hundred meshes in one of them."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, dict[str, str]] = {}
+
+    def has(self, place: str, name: str) -> bool:
+        """Whether there is a file `name`, which may have folders in it, in the folder `place`."""
+        listing, last = self._listing(place, name)
+        if last.isascii() and last.lower() not in listing:
+            return False
+        # A system may take other letters for the same, or the name be that of a folder.
+        return os.path.isfile(os.path.join(place, name))
+
+    def in_other_case(self, places: list[str], name: str) -> str | None:
+        """The file in the first of the folders that is called `name` but for upper and lower case."""
+        for place in places:
+            listing, last = self._listing(place, name)
+            if last.lower() in listing:
+                return listing[last.lower()]
+        return None
+
+    def _listing(self, place: str, name: str) -> tuple[dict[str, str], str]:
+        """The names in the folder of a file by their small letters, and the file's own."""
+        before, last = os.path.split(name)
+        folder = os.path.join(place, before) if before else place or "."
+        known = self._known.get(folder)
+        if known is None:
+            known = self._known[folder] = _lowered(folder)
+        return known, last
 
 
-def _in_other_case(place: str | Path, name: str) -> str | None:
-    """The file that is called `name` but for upper and lower case."""
-    before, last = os.path.split(name)
-    folder = os.path.join(place, before)
+def _lowered(folder: str) -> dict[str, str]:
     try:
         # The listing of a folder holds until something in it is made, renamed or removed.
-        return _lowered(folder, os.stat(folder).st_mtime_ns).get(last.lower())
+        return _listed(folder, os.stat(folder).st_mtime_ns)
     except (OSError, ValueError):
-        return None
+        return {}
 
 
 @lru_cache(maxsize=64)
-def _lowered(folder: str, changed: int) -> dict[str, str]:
+def _listed(folder: str, changed: int) -> dict[str, str]:
     return {name.lower(): name for name in os.listdir(folder)}

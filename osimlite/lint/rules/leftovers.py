@@ -67,7 +67,7 @@ def stray_text(subject: Subject, found: Found) -> None:
         if note.kind == "stray-text" and source is not None:
             start = source.text.find(note.word, source.line_start(note.line or 1))
             found(f"OpenSim ignores the text '{note.word}' outside the document", at=source.position(max(start, 0)))
-    if source is None or not (_MAYBE_AFTER.search(source.text) or _MAYBE_BEFORE.search(source.text)):
+    if source is None or source.mixed is False:
         return
     plain = _REMARKS.sub(lambda match: " " * len(match[0]), source.text)
     texts = {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}
@@ -117,9 +117,6 @@ def defaults_block(subject: Subject, found: Found) -> None:
         found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
 
 
-# Most files have no stray text: these say so quickly, and are wrong only about comments and odd attributes.
-_MAYBE_AFTER = re.compile(r"/[^<>]*+>\s*+[^\s<]")
-_MAYBE_BEFORE = re.compile(r">\s*+[^\s<][^<]*+<[^/!?]")
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
 
 

@@ -228,9 +228,10 @@ def _find(subject: Subject) -> Iterator[Broken]:
     for use in _uses(subject):
         resolution = subject.resolution(use) if use.value != "" else tree.resolve(use)
         if resolution.failure is None:
-            written = tree.path_of(resolution.target) if resolution.target is not None else None
-            if _wants_plain_path(use) and isinstance(use.value, str) and use.value != written:
-                yield Broken(use, use.value, "form", None, written)
+            if _wants_plain_path(use) and isinstance(use.value, str):
+                written = tree.path_of(resolution.target) if resolution.target is not None else None
+                if use.value != written:
+                    yield Broken(use, use.value, "form", None, written)
             continue
         if resolution.failure != "illegal" and _overwritten(subject, use):
             continue
