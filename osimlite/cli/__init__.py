@@ -22,6 +22,7 @@ COMMANDS = (
     "info",
     "translate",
     "simulate",
+    "sweep",
     "kinematics",
     "inverse-dynamics",
     "doctor",

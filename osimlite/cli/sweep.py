@@ -1,0 +1,105 @@
+"""``osimlite sweep``: one model, many starts and numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from osimlite.cli import _sweeping as options
+
+if TYPE_CHECKING:
+    from osimlite.sweep.plan import Plan
+    from osimlite.sweep.run import Outcome
+
+
+def sweep(
+    source: options.Source,
+    vary: options.Vary = None,
+    samples: Annotated[
+        int | None, typer.Option("--samples", help="How many runs; a grid has as many as it has.", show_default=False)
+    ] = None,
+    sampler: Annotated[
+        str | None,
+        typer.Option(help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of random samples: the same seed, the same samples.")] = 0,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--measure",
+            metavar="NAME",
+            help="What to keep of a run: distance, energy, largest_force, steps, scuffs, time_to_fall, "
+            "COORDINATE/value, COORDINATE/speed, or module:function.",
+            show_default="distance and largest_force",
+        ),
+    ] = None,
+    to: options.To = 2.0,
+    engine: options.Engine = "compiled",
+    accuracy: options.Accuracy = None,
+    stop_below: options.Below = None,
+    stop_above: options.Above = None,
+    report_interval: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS", help="Time between the states that a function can look at.", show_default=False
+        ),
+    ] = None,
+    parameter: options.Parameters = None,
+    workers: options.Workers = None,
+    cluster: options.Cluster = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run.")
+    ] = Path("results.parquet"),
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted sweep.")] = False,
+    skip_unsupported: options.SkipUnsupported = False,
+) -> None:
+    """Simulate a model from many starts, or with many values of its numbers: one row of the results for each run.
+
+    Results of an interrupted sweep are kept beside the file, and --resume goes on with them.
+
+    Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1 --samples 1000
+    """
+    from rich.console import Console
+
+    from osimlite.cli._progress import progress_bar
+    from osimlite.sweep.run import sweep as run
+    from osimlite.sweep.sampling import samples as choose
+
+    plan = options.make_plan(
+        source, vary, parameter, stop_below, stop_above, measures=tuple(measure) if measure else None, to=to,
+        engine=engine, accuracy=accuracy, report_interval=report_interval, skip_unsupported=skip_unsupported,
+    )  # fmt: skip
+    chosen = choose(plan.variables, sampler, samples, seed)
+    console = Console()
+    with progress_bar(console, "sweeping", chosen.count) as progress:
+        outcome = run(plan, chosen, output, resume=resume, workers=workers, cluster=cluster, progress=progress)
+    console.print(_table(plan, outcome))
+
+
+def _table(plan: Plan, outcome: Outcome) -> Any:
+    from rich.table import Table
+
+    from osimlite.sweep.measures import measure_name
+    from osimlite.sweep.results import ranges
+
+    table = Table(title=f"{outcome.count} runs", title_justify="left", show_header=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    new = sum(outcome.status.values())
+    if outcome.before:
+        table.add_row("there before", str(outcome.before))
+    if new:
+        table.add_row("time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second")
+        table.add_row("ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common()))
+    for reason, count in outcome.reasons.most_common(3):
+        table.add_row("failed", f"{count}: {reason}")
+    for name, found in ranges(outcome.path, [measure_name(spec) for spec in plan.measures]).items():
+        table.add_row(
+            name,
+            f"{found.least:.6g} (run {found.run_of_least}) to {found.most:.6g} (run {found.run_of_most}), "
+            f"mean {found.mean:.6g}",
+        )
+    table.add_row("file", str(outcome.path))
+    return table

@@ -1,0 +1,247 @@
+"""What is kept of a run: one number for each measure.
+
+A measure of your own is a function of a :class:`Run` that returns a number, named as ``module:function`` or
+``file.py:function``::
+
+    def drop(run):
+        return run.start["Pelvis_ty"] - run.end["Pelvis_ty"]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from osimlite._load import module_named, module_of_file
+from osimlite.errors import SettingError
+from osimlite.simulation.many import Runs, Watch
+from osimlite.sweep.variables import Floats
+from osimlite.text import did_you_mean, listed
+
+BUILT_IN = {
+    "distance": "osimlite.sweep.measures:distance",
+    "energy": "osimlite.sweep.measures:energy",
+    "largest_force": "osimlite.sweep.measures:largest_force",
+    "steps": "osimlite.sweep.walking:steps",
+    "scuffs": "osimlite.sweep.walking:scuffs",
+    "time_to_fall": "osimlite.sweep.walking:time_to_fall",
+}
+"""Measures by name, and the function of an engine that makes each."""
+
+LARGER_IS_BETTER = ("distance", "steps", "time_to_fall")
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Runs of models of one structure.
+
+    Attributes:
+        engine: of one of the models.
+        engines: of each run.
+        starts: initial states (W, 2n), in the engine's order.
+        runs: what came of them.
+        values: of the variables (W, d).
+        names: of the variables.
+        report_times: at which states were kept, s.
+        memory: where measures leave for each other what they have found.
+    """
+
+    engine: Any
+    engines: Sequence[Any]
+    starts: Floats
+    runs: Runs
+    values: Floats
+    names: Sequence[str]
+    report_times: Floats
+    memory: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number for each run.
+
+    Attributes:
+        name: of the column.
+        of: computes them (W,); not a number where there is none.
+        watches: what it needs to have watched.
+        room: how many events of a run of so many seconds it looks at.
+        event_states: whether it looks at the states there.
+    """
+
+    name: str
+    of: Callable[[Batch], Any]
+    watches: tuple[Watch, ...] = ()
+    room: Callable[[float], int] = lambda to: 0
+    event_states: bool = False
+
+
+class MeasureMaker(Protocol):
+    """Makes a measure for the models of an engine."""
+
+    def __call__(self, engine: Any) -> Measure:
+        """Make it; raises OsimliteError if the model has nothing of the kind."""
+
+
+class State(Mapping[str, float]):
+    """Values and speeds of the coordinates by name: ``state["RHip_rz"]``, ``state["RHip_rz/speed"]``."""
+
+    def __init__(self, engine: Any, y: Floats) -> None:
+        self._engine, self._y = engine, y
+
+    def __getitem__(self, name: str) -> float:
+        place, locked = _state_place(self._engine, name)
+        return locked if place is None else float(self._y[place])
+
+    def __iter__(self) -> Iterator[str]:
+        names = [info.name for info in self._engine.mechanism.coordinates]
+        return iter([*names, *(f"{name}/speed" for name in names)])
+
+    def __len__(self) -> int:
+        return 2 * len(self._engine.mechanism.coordinates)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, for a measure of your own.
+
+    Attributes:
+        values: of the variables, by name (rad, m).
+        start: initial state.
+        end: last state.
+        time: at which it ended, s.
+        times: moments at which the state was kept, if a report interval was asked for, s.
+        events: time (s), name of a contact or of what was watched, whether it begins.
+        largest_forces: N, by contact.
+        engine: that computed it, with its `mechanism`.
+    """
+
+    values: Mapping[str, float]
+    start: State
+    end: State
+    time: float
+    times: Floats
+    events: Sequence[tuple[float, str, bool]]
+    largest_forces: Mapping[str, float]
+    engine: Any = field(repr=False)
+    states: Floats = field(repr=False)
+
+    def history(self, name: str) -> Floats:
+        """A value or a speed at the times."""
+        place, locked = _state_place(self.engine, name)
+        return np.full(len(self.times), locked) if place is None else self.states[:, place]
+
+    @cached_property
+    def mechanism(self) -> Any:
+        """The mechanism that moved."""
+        return self.engine.mechanism
+
+
+def measure(spec: Any, engine: Any) -> Measure:
+    """The measure that is meant by a name, by ``NAME/value`` or ``NAME/speed`` at the end, or by a function.
+
+    Raises:
+        SettingError: there is none of that name, or the model has nothing of the kind.
+    """
+    name = measure_name(spec)
+    if callable(spec):
+        return Measure(name, partial(_each, spec), room=_room)
+    if name in BUILT_IN:
+        module, _, function = BUILT_IN[name].partition(":")
+        maker: MeasureMaker = getattr(import_module(module), function)
+        return maker(engine)
+    if ":" in name:
+        return Measure(name, partial(_each, _function(name)), room=_room)
+    if "/" in name:
+        place, locked = _state_place(engine, name)
+        return Measure(name, partial(_ends, place, locked))
+    near = did_you_mean(name, BUILT_IN)
+    raise SettingError(f"there is no measure '{name}'{near}; there is {listed(BUILT_IN)}, and module:function")
+
+
+EVENTS_PER_SECOND = 100
+"""So many events of a run a function can see."""
+
+
+def _room(to: float) -> int:
+    return 40 + round(EVENTS_PER_SECOND * to)
+
+
+def measure_name(spec: Any) -> str:
+    """What a measure is called."""
+    if callable(spec):
+        return f"{getattr(spec, '__module__', '?')}:{getattr(spec, '__qualname__', type(spec).__name__)}"
+    return str(spec)
+
+
+def distance(engine: Any) -> Measure:
+    """How far the first free coordinate that slides has come, m."""
+    infos = engine.mechanism.coordinates
+    place = next((k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None)
+    if place is None:
+        raise SettingError("no coordinate of the model slides, so that it has no distance; take another measure")
+    return Measure("distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place])
+
+
+def largest_force(engine: Any) -> Measure:
+    """The largest force of any contact at the end of a step, N."""
+    return Measure("largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0))
+
+
+def energy(engine: Any) -> Measure:
+    """Mechanical energy at the end less that at the start, J; contact and damping take it away."""
+
+    def gained(batch: Batch) -> Floats:
+        runs = batch.runs
+        ends = zip(batch.engines, runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True)
+        return np.array([sum(one.energies(t, end)) - sum(one.energies(0.0, start)) for one, t, start, end in ends])
+
+    return Measure("energy", gained)
+
+
+def _ends(place: int | None, locked: float, batch: Batch) -> Floats:
+    return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
+
+
+def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
+    found = []
+    names, contacts = batch.names, batch.engine.contacts
+    for k, engine in enumerate(batch.engines):
+        run = Run(
+            dict(zip(names, batch.values[k].tolist(), strict=True)),
+            State(engine, batch.starts[k]),
+            State(engine, batch.runs.states[k]),
+            float(batch.runs.times[k]),
+            batch.report_times,
+            batch.runs.events[k],
+            dict(zip(contacts, batch.runs.peaks[k, :, 0].tolist(), strict=True)),
+            engine,
+            batch.runs.reports[k],
+        )
+        found.append(function(run))
+    return found
+
+
+def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
+    """Where in a state ``NAME``, ``NAME/value`` or ``NAME/speed`` is; None and its value if it is locked."""
+    front, _, last = name.rpartition("/")
+    if last not in ("value", "speed"):
+        front, last = name, "value"
+    place, count = engine.mechanism.coordinate_index(front), len(engine.order)
+    if place not in engine.order:
+        return None, 0.0 if last == "speed" else engine.mechanism.coordinates[place].default_value
+    return engine.order.index(place) + (count if last == "speed" else 0), 0.0
+
+
+def _function(name: str) -> Callable[[Run], float]:
+    place, _, function = name.rpartition(":")
+    module = module_of_file(Path(place)) if place.endswith(".py") else module_named(place)
+    found = getattr(module, function, None)
+    if not callable(found):
+        raise SettingError(f"'{place}' has no function '{function}'{did_you_mean(function, vars(module))}")
+    return found  # type: ignore[no-any-return]

@@ -1,0 +1,144 @@
+"""What is to be run, as something that can be sent to other processes."""
+
+from __future__ import annotations
+
+import pickle
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+from osimlite.document.printer import to_text
+from osimlite.document.reader import read_text
+from osimlite.errors import SettingError
+from osimlite.multibody import build_mechanism
+from osimlite.schema.model import Model
+from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.sweep.measures import measure_name
+from osimlite.sweep.variables import Parameter, Range, Variable, variables
+
+Maker = Callable[[Mapping[str, float]], Model]
+"""Makes a model from the values of some of its parameters."""
+
+MOST_TRIES = 1_000_000
+"""Steps that a run may try: one that hardly moves on must not keep the others waiting."""
+
+DEFAULT_MEASURES = ("distance", "largest_force")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A coordinate that ends a run when it falls below a level, or rises above it (rad or m)."""
+
+    coordinate: str
+    level: float
+    is_below: bool = True
+
+    @property
+    def words(self) -> str:
+        """Why a run ended."""
+        return f"{self.coordinate} {'below' if self.is_below else 'above'} {self.level:g}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Runs of one model, each with its own values of some numbers.
+
+    Attributes:
+        text: the model as .osim.
+        variables: what differs.
+        measures: names of measures, ``module:function``, or functions.
+        to: how long a run lasts, s.
+        engine: that computes it.
+        accuracy: of the integrator.
+        stops: what ends a run before.
+        report_interval: time between the moments that a measure of one's own can look at (s), None for none.
+        skip_unsupported: leave out forces that cannot be computed.
+        make: makes the model from parameters, where some of them are varied.
+    """
+
+    text: str
+    variables: tuple[Variable, ...]
+    measures: tuple[Any, ...] = DEFAULT_MEASURES
+    to: float = 2.0
+    engine: str = "compiled"
+    accuracy: float = DEFAULT_ACCURACY
+    stops: tuple[Stop, ...] = ()
+    report_interval: float | None = None
+    skip_unsupported: bool = False
+    make: Maker | None = None
+
+    def model(self) -> Model:
+        """The model, with none of the variables set."""
+        return read_text(self.text.encode())
+
+    def packed(self) -> bytes:
+        """The plan for other processes.
+
+        Raises:
+            SettingError: a function cannot be named there.
+        """
+        try:
+            return zlib.compress(pickle.dumps(self))
+        except (pickle.PicklingError, AttributeError, TypeError):
+            raise SettingError(
+                "a function of the sweep cannot be sent to other processes; put it into a module and name it "
+                "module:function"
+            ) from None
+
+    @staticmethod
+    def unpacked(data: bytes) -> Plan:
+        """The plan that was packed; only from those whom you would let run programs here."""
+        found: Plan = pickle.loads(zlib.decompress(data))
+        return found
+
+    def settings(self) -> dict[str, Any]:
+        """All that the results depend on."""
+        import hashlib
+
+        from osimlite import __version__
+
+        return {
+            "osimlite": __version__,
+            "model": hashlib.sha256(self.text.encode()).hexdigest(),
+            "vary": [item.settings() for item in self.variables],
+            "measures": [measure_name(item) for item in self.measures],
+            "to": self.to,
+            "engine": self.engine,
+            "accuracy": self.accuracy,
+            "stops": [item.words for item in self.stops],
+            "report_interval": self.report_interval,
+            "skip_unsupported": self.skip_unsupported,
+        }
+
+
+def plan(
+    source: Model | Maker,
+    vary: Mapping[str, Range],
+    *,
+    parameters: Sequence[str] = (),
+    **choices: Any,
+) -> Plan:
+    """Make a plan.
+
+    Args:
+        source: the model, or what makes it from the parameters that it is given.
+        vary: ranges by name, see :mod:`osimlite.sweep.variables`.
+        parameters: names of the parameters that `source` takes.
+        choices: further attributes of :class:`Plan`.
+
+    Raises:
+        SettingError: a name means nothing, or a number has no meaning.
+        ModelError: the model is no mechanism.
+    """
+    model = source if isinstance(source, Model) else source({})
+    found = variables(vary, model, build_mechanism(model), parameters)
+    needs_maker = any(isinstance(item.target, Parameter) for item in found)
+    make = source if needs_maker and not isinstance(source, Model) else None
+    made = Plan(to_text(model), found, make=make)
+    made = replace(made, **{name: value for name, value in choices.items() if value is not None})
+    for name, value in (("to", made.to), ("accuracy", made.accuracy), ("report_interval", made.report_interval)):
+        if value is not None and not (isfinite(value) and value > 0.0):
+            raise SettingError(f"'{name}' is a positive number, not {value:g}")
+    return made

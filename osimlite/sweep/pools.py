@@ -1,0 +1,255 @@
+"""Who works: threads or processes of this machine, or the workers of a Dask cluster. All give the same results."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from queue import SimpleQueue
+from typing import Any, Protocol
+
+from osimlite._require import require
+from osimlite.errors import OsimliteError, SettingError
+from osimlite.sweep.plan import Plan
+from osimlite.sweep.runner import Block, Runner
+from osimlite.sweep.variables import Floats
+
+MOST_LOSSES = 20
+"""A task that was lost with its worker so often is not tried again."""
+
+
+PATIENCE = 30
+"""So long a cluster may take to have its first worker, s."""
+
+
+class ClusterLostError(OsimliteError):
+    """The cluster cannot be reached any more; what was done is kept."""
+
+
+class Pool(Protocol):
+    """Takes samples, and puts what came of them into a queue.
+
+    Attributes:
+        task_seconds: how long a task should take.
+    """
+
+    task_seconds: float
+
+    @property
+    def workers(self) -> int:
+        """How many samples can be worked on at a time; may change."""
+
+    def submit(self, tag: Any, values: Floats) -> None:
+        """Have samples (k, d) run."""
+
+    def result(self, timeout: float | None = None) -> tuple[Any, Block]:
+        """The next tag that is done, and its block.
+
+        Raises:
+            OsimliteError: it could not be done; TimeoutError: nothing was done in time.
+        """
+
+    def close(self) -> None:
+        """Stop what has not begun."""
+
+
+@contextmanager
+def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+    """Make a pool for a plan; without a cluster, on this machine.
+
+    Args:
+        plan: what is run.
+        workers: threads or processes here; by default one for each core.
+        cluster: address of a Dask scheduler, such as ``tcp://127.0.0.1:8786``.
+
+    Raises:
+        SettingError: the settings do not go together.
+        OsimliteError: the cluster cannot be reached.
+        MissingDependency: dask.distributed is not installed.
+    """
+    if workers is not None and workers < 1:
+        raise SettingError(f"there is at least one worker, not {workers}")
+    made: Pool
+    if cluster is not None:
+        if workers is not None:
+            raise SettingError("a cluster has the workers that were started for it; leave out --workers")
+        made = ClusterPool(plan, cluster)
+    else:
+        count = workers or _cores()
+        made = ThreadPool(plan, count) if plan.engine == "compiled" else ProcessPool(plan, count)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def _cores() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class _LocalPool:
+    """An executor whose finished work queues up."""
+
+    task_seconds = 0.25
+
+    def __init__(self, executor: ThreadPoolExecutor | ProcessPoolExecutor, work: Callable[[Floats], Block], count: int):
+        self.workers = count
+        self._executor, self._work = executor, work
+        self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
+
+    def submit(self, tag: Any, values: Floats) -> None:
+        """Have samples run."""
+        future = self._executor.submit(self._work, values)
+        future.add_done_callback(lambda done: self._done.put((tag, done)))
+
+    def result(self, timeout: float | None = None) -> tuple[Any, Block]:
+        """The next that is done."""
+        tag, future = _next(self._done, timeout)
+        try:
+            return tag, future.result()
+        except BrokenExecutor:
+            raise OsimliteError("a process of the sweep was ended from outside; go on with --resume") from None
+
+    def close(self) -> None:
+        """Stop what has not begun, and wait for the rest."""
+        self._executor.shutdown(cancel_futures=True)
+
+
+class ThreadPool(_LocalPool):
+    """Threads: the compiled engine lets them run side by side."""
+
+    def __init__(self, plan: Plan, count: int) -> None:
+        _thread_runner(plan)
+        super().__init__(ThreadPoolExecutor(count), lambda values: _thread_runner(plan).run(values), count)
+
+
+class ProcessPool(_LocalPool):
+    """Processes, for engines that keep Python's lock."""
+
+    def __init__(self, plan: Plan, count: int) -> None:
+        packed = plan.packed()
+        Runner(plan)
+        executor = ProcessPoolExecutor(count, get_context("spawn"))
+        super().__init__(executor, _Packed(packed), count)
+
+
+class _Packed:
+    """Runs samples of a packed plan, wherever it is called."""
+
+    def __init__(self, packed: bytes) -> None:
+        self._packed = packed
+
+    def __call__(self, values: Floats) -> Block:
+        return run_packed(self._packed, values)
+
+
+class ClusterPool:
+    """The workers of a Dask cluster. A task that is lost with its worker is done by another.
+
+    Args:
+        plan: what is run; it goes with every task, so that a new worker needs nothing from others.
+        address: of the scheduler.
+    """
+
+    task_seconds = 1.0
+
+    def __init__(self, plan: Plan, address: str) -> None:
+        distributed = require("distributed", extra="sweep", purpose="a sweep on a cluster")
+        Runner(plan)
+        self._packed, self._address = plan.packed(), address
+        self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
+        self._tasks: dict[Any, tuple[Any, Floats, int, Any]] = {}
+        self._threads, self._asked = 0, 0.0
+        try:
+            self._client: Any = distributed.Client(address, timeout=10, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise ClusterLostError(
+                f"there is no Dask scheduler at '{address}' ({reason}); start one with: dask scheduler"
+            ) from None
+        try:
+            self._client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError:
+            self._client.close()
+            raise ClusterLostError(
+                f"the Dask scheduler at '{address}' has no workers; start them with: dask worker {address}"
+            ) from None
+
+    @property
+    def workers(self) -> int:
+        """Threads of all workers, at least one."""
+        if time.monotonic() - self._asked > 1.0:
+            self._threads, self._asked = sum(self._client.nthreads().values()), time.monotonic()
+        return max(1, self._threads)
+
+    def submit(self, tag: Any, values: Floats) -> None:
+        """Have samples run."""
+        self._submit(tag, values, 0)
+
+    def _submit(self, tag: Any, values: Floats, losses: int) -> None:
+        future = self._client.submit(run_packed, self._packed, values, pure=False)
+        self._tasks[future.key] = tag, values, losses, future
+        future.add_done_callback(self._done.put)
+
+    def result(self, timeout: float | None = None) -> tuple[Any, Block]:
+        """The next that is done."""
+        from distributed.scheduler import KilledWorker
+
+        while True:
+            future = _next(self._done, timeout)
+            tag, values, losses, _ = self._tasks.pop(future.key)
+            try:
+                return tag, future.result(timeout=60)
+            except KilledWorker:
+                if losses + 1 >= MOST_LOSSES:
+                    raise OsimliteError(
+                        "the same task has ended worker after worker; look into their logs, then go on with --resume"
+                    ) from None
+                self._submit(tag, values, losses + 1)
+            except (CancelledError, OSError, TimeoutError):
+                raise self._lost() from None
+            except Exception as error:
+                if type(error).__name__ in ("FutureCancelledError", "CommClosedError"):
+                    raise self._lost() from None
+                raise
+
+    def _lost(self) -> ClusterLostError:
+        return ClusterLostError(f"the Dask scheduler at '{self._address}' has gone; go on with --resume")
+
+    def close(self) -> None:
+        """Stop what has not begun."""
+        # Futures that are let go are cancelled.
+        self._tasks.clear()
+        self._client.close()
+
+
+def _next(queue: SimpleQueue[Any], timeout: float | None) -> Any:
+    from queue import Empty
+
+    try:
+        return queue.get(timeout=timeout)
+    except Empty:
+        raise TimeoutError from None
+
+
+_local = threading.local()
+
+
+def _thread_runner(plan: Plan) -> Runner:
+    """The runner of this thread."""
+    kept: Runner | None = getattr(_local, "runner", None)
+    if kept is None or kept.plan is not plan:
+        kept = _local.runner = Runner(plan)
+    return kept
+
+
+def run_packed(packed: bytes, values: Floats) -> Block:
+    """Run samples of a packed plan; what a worker of a cluster does."""
+    if getattr(_local, "packed", None) != packed:
+        _local.packed, _local.plan = packed, Plan.unpacked(packed)
+    return _thread_runner(_local.plan).run(values)

@@ -1,0 +1,155 @@
+"""The numbers of a model by path: ``/forceset/RFootForce/contact_parameters/stiffness``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from osimlite.errors import SettingError
+from osimlite.schema.base import Component, Object
+from osimlite.schema.fields import Value
+from osimlite.schema.model import Model
+from osimlite.text import did_you_mean
+
+Step = str | int
+"""Name of a property, or place in the list that the step before led to."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """One number of a component.
+
+    Attributes:
+        component: path.
+        steps: from the component to the number.
+        unit: in the words of the schema, empty if it has none.
+    """
+
+    component: str
+    steps: tuple[Step, ...]
+    unit: str
+
+    def setter(self, model: Model) -> Setter:
+        """What puts numbers there.
+
+        Raises:
+            SettingError: this model has no such number.
+        """
+        holder: object = model.tree().by_path.get(self.component)
+        try:
+            for step in self.steps[:-2]:
+                holder = _at(holder, step)
+            *_, last = self.steps
+            if isinstance(last, str):
+                holder = holder if len(self.steps) == 1 else _at(holder, self.steps[-2])
+                return Setter(_object(holder), last, None)
+            return Setter(_object(holder), str(self.steps[-2]), last)
+        except (AttributeError, LookupError, TypeError):
+            words = "/".join(str(step) for step in self.steps)
+            raise SettingError(f"'{self.component}' has no number '{words}' in every model of the sweep") from None
+
+
+@dataclass(frozen=True)
+class Setter:
+    """Puts numbers into one property, or one entry of it."""
+
+    holder: Object
+    name: str
+    entry: int | None
+
+    def put(self, value: float) -> None:
+        """Set the number.
+
+        Raises:
+            ModelError: the property does not take it.
+        """
+        if self.entry is None:
+            setattr(self.holder, self.name, value)
+        else:
+            numbers = list(getattr(self.holder, self.name))
+            numbers[self.entry] = value
+            setattr(self.holder, self.name, tuple(numbers))
+
+    def get(self) -> float:
+        """The number that is there."""
+        found = getattr(self.holder, self.name)
+        return float(found if self.entry is None else found[self.entry])
+
+
+def places(model: Model, path: str) -> tuple[Place, ...]:
+    """The numbers that a path means; a ``*`` in it stands for any part of a name.
+
+    A path is that of a component and then the names of properties, with ``/``; entries of lists are counted from 0
+    (``/bodyset/Pelvis/mass_center/1``). What stands alone in a list needs no number.
+
+    Raises:
+        SettingError: there is no such number; with the nearest spelling.
+    """
+    words = path.strip("/").split("/")
+    tree = model.tree()
+    for count in range(len(words) - 1, -1, -1):
+        pattern, route = "/" + "/".join(words[:count]), "/".join(words[count:])
+        matching = [
+            (name, component)
+            for name, component in tree.by_path.items()
+            if name.count("/") == pattern.count("/") and fnmatchcase(name, pattern)
+        ]
+        if not matching:
+            continue
+        found = [
+            Place(name, *numbers[route])
+            for name, component in matching
+            if route in (numbers := dict(_numbers(component)))
+        ]
+        if found:
+            return tuple(found)
+        break
+    raise SettingError(f"the model has no number '{path}'{did_you_mean(path, _spellings(model))}")
+
+
+def _spellings(model: Model) -> list[str]:
+    return [
+        f"{name.rstrip('/')}/{route}"
+        for name, component in model.tree().by_path.items()
+        for route, _ in _numbers(component)
+    ]
+
+
+def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]]]:
+    """Every number below an object that is not below another component: how it is called, steps, unit."""
+    for spec in type(holder).field_specs().values():
+        kind = spec.kind
+        if isinstance(kind, Value) and kind.scalar == "double":
+            value = getattr(holder, spec.name)
+            if isinstance(value, tuple):
+                for entry in range(len(value)):
+                    yield f"{spec.tag}/{entry}", ((spec.name, entry), kind.unit or "")
+            elif value is not None:
+                yield spec.tag, ((spec.name,), kind.unit or "")
+    for spec, item in holder.objects_held():
+        if isinstance(item, Component) and item.is_component:
+            continue
+        held = getattr(holder, spec.name)
+        rest = list(_numbers(item))
+        if not isinstance(held, list):
+            for route, (steps, unit) in rest:
+                yield f"{spec.tag}/{route}", ((spec.name, *steps), unit)
+            continue
+        place = next(number for number, other in enumerate(held) if other is item)
+        # The list of a set is all that there is to it, so that its name says nothing.
+        front = "" if spec.tag == "objects" else f"{spec.tag}/"
+        names = [str(place), *([item.name] if item.name else []), *([""] if len(held) == 1 else [])]
+        for route, (steps, unit) in rest:
+            for name in names:
+                yield front + (f"{name}/" if name else "") + route, ((spec.name, place, *steps), unit)
+
+
+def _at(holder: object, step: Step) -> object:
+    return getattr(holder, step) if isinstance(step, str) else holder[step]  # type: ignore[index]
+
+
+def _object(holder: object) -> Object:
+    if not isinstance(holder, Object):
+        raise TypeError
+    return holder

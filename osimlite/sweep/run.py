@@ -1,0 +1,215 @@
+"""A sweep: every sample run, every result in its place, whatever happens in between."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.sweep.measures import measure_name
+from osimlite.sweep.plan import Plan
+from osimlite.sweep.pools import Pool, pool
+from osimlite.sweep.results import Partial, differences, schema, settings_of
+from osimlite.sweep.runner import Block
+from osimlite.sweep.sampling import Samples
+
+Progress = Callable[[float, float], object]
+"""Called with the number of runs that are done, and of all."""
+
+FIRST_TASK, LARGEST_TASK = 4, 4096
+AHEAD = 3
+"""So many tasks for each worker are under way; a lost worker takes no more with it."""
+
+SAVE_SECONDS = 2.0
+"""So often results are saved; at most so much work is done again after the program was killed."""
+
+
+class Interrupted(OsimliteError):
+    """A sweep was stopped before its end; what was done is saved."""
+
+    exit_code = 130
+
+
+@dataclass
+class Outcome:
+    """What a sweep did.
+
+    Attributes:
+        path: of the results.
+        count: of runs in them.
+        before: of runs that were there when it began.
+        status: how many ended how, of those that it did itself.
+        reasons: why runs failed, with their number.
+        seconds: that it took.
+    """
+
+    path: Path
+    count: int
+    before: int = 0
+    status: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+    seconds: float = 0.0
+
+
+def settings(plan: Plan, samples: Samples) -> dict[str, Any]:
+    """All that the results of a sweep depend on."""
+    return {**plan.settings(), "sampler": samples.sampler, "samples": samples.count, "seed": samples.seed}
+
+
+def sweep(
+    plan: Plan,
+    samples: Samples,
+    output: str | Path,
+    *,
+    resume: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Run all samples of a plan, and write one row for each.
+
+    The rows are in the order of the samples, and the same however many work at them, here or elsewhere. Until all are
+    there, they are kept in ``<output>.partial``.
+
+    Args:
+        plan: what is run.
+        samples: with which numbers.
+        output: Parquet file to write.
+        resume: go on with an interrupted sweep.
+        workers: threads or processes of this machine; by default one for each core.
+        cluster: address of a Dask scheduler whose workers do it instead.
+        progress: called as runs are done.
+
+    Raises:
+        Interrupted: by the keyboard; the sweep can be resumed.
+        OsimliteError: the model cannot be simulated, the settings differ, or the cluster cannot be reached.
+    """
+    path, started = Path(output), time.perf_counter()
+    wanted = settings(plan, samples)
+    table = schema(columns(plan), wanted)
+    if resume and path.exists() and not path.with_name(f"{path.name}.partial").exists():
+        if unlike := differences(settings_of(path), wanted):
+            raise OsimliteError(f"'{path}' has other settings: {', '.join(unlike)}; give the results another name")
+        return Outcome(path, samples.count, samples.count)
+    with pool(plan, workers=workers, cluster=cluster) as workforce:
+        partial = Partial(path, table, resume=resume)
+        outcome = Outcome(path, samples.count, partial.rows)
+        try:
+            _Work(samples, workforce, partial, outcome, progress).do()
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"interrupted after {partial.rows} of {samples.count} runs, which are in '{partial.partial}'; "
+                "go on with --resume"
+            ) from None
+        finally:
+            partial.close()
+        partial.finish()
+    outcome.seconds = time.perf_counter() - started
+    return outcome
+
+
+def columns(plan: Plan) -> dict[str, str]:
+    """The columns of the results, and what they hold."""
+    return {
+        "run": "int64",
+        **{item.name: "float64" for item in plan.variables},
+        "status": "string",
+        "reason": "string",
+        "time": "float64",
+        **{measure_name(spec): "float64" for spec in plan.measures},
+    }
+
+
+class _Work:
+    """Gives out samples, and saves what comes back in their order."""
+
+    def __init__(
+        self, samples: Samples, workforce: Pool, partial: Partial, outcome: Outcome, progress: Progress | None
+    ) -> None:
+        self.samples, self.pool, self.partial, self.outcome = samples, workforce, partial, outcome
+        self.progress = progress
+        self.next = self.saved = partial.rows
+        self.under_way = 0
+        self.size = FIRST_TASK
+        self.done: dict[int, tuple[np.ndarray[Any, Any], Block]] = {}
+        self.values: dict[int, np.ndarray[Any, Any]] = {}
+        self.last_saved = time.monotonic()
+
+    def do(self) -> None:
+        try:
+            self._tell()
+            while self.saved < self.samples.count:
+                self._give_out()
+                first, block = self.pool.result()
+                self.under_way -= 1
+                self.done[first] = self.values.pop(first), block
+                self._note(block)
+                is_last = not self.under_way and self.next >= self.samples.count
+                if is_last or time.monotonic() - self.last_saved > SAVE_SECONDS:
+                    self._save()
+        except BaseException:
+            self._save()
+            raise
+
+    def _give_out(self) -> None:
+        # One run that takes long must not let all that comes after it pile up.
+        farthest = self.saved + 64 * max(LARGEST_TASK, self.size)
+        while self.next < min(self.samples.count, farthest) and self.under_way < AHEAD * self.pool.workers:
+            values = self.samples.block(self.next, self.size)
+            self.values[self.next] = values
+            self.pool.submit(self.next, values)
+            self.next += len(values)
+            self.under_way += 1
+
+    def _note(self, block: Block) -> None:
+        """Let tasks take about as long as they should; the last of them end together."""
+        each = max(block.seconds, 1e-6) / max(len(block.status), 1)
+        left = self.samples.count - self.next
+        fair = -(-left // (AHEAD * self.pool.workers)) if left else 1
+        wanted = int(self.pool.task_seconds / each)
+        self.size = max(1, min(wanted, 4 * self.size, LARGEST_TASK, max(fair, FIRST_TASK)))
+        self.outcome.status.update(block.status)
+        self.outcome.reasons.update(
+            reason for status, reason in zip(block.status, block.reasons, strict=True) if status == "failed" and reason
+        )
+        if len(self.outcome.reasons) > 1000:
+            self.outcome.reasons = Counter(dict(self.outcome.reasons.most_common(100)))
+        self._tell()
+
+    def _tell(self) -> None:
+        if self.progress is not None:
+            there = self.outcome.before + sum(self.outcome.status.values())
+            self.progress(there, self.samples.count)
+
+    def _save(self) -> None:
+        """Write the rows before which none is missing."""
+        rows: list[list[Any]] = []
+        first = self.saved
+        while self.saved in self.done:
+            values, block = self.done.pop(self.saved)
+            rows.append([values, block])
+            self.saved += len(values)
+        self.last_saved = time.monotonic()
+        if not rows:
+            return
+        values = np.concatenate([row[0] for row in rows])
+        blocks: list[Block] = [row[1] for row in rows]
+        found: Mapping[str, Any] = {
+            name: np.concatenate([block.measures[name] for block in blocks]) for name in blocks[0].measures
+        }
+        self.partial.add(
+            [
+                np.arange(first, self.saved),
+                *values.T,
+                [status for block in blocks for status in block.status],
+                [reason for block in blocks for reason in block.reasons],
+                np.concatenate([block.times for block in blocks]),
+                *found.values(),
+            ]
+        )

@@ -1,0 +1,241 @@
+"""What a sweep varies: how it is written, and what of a model or its start it means.
+
+======================================  ==========================================================
+``RHip_rz``                             value at the start, by the name or the path of a coordinate
+``RHip_rz/speed``                       generalized speed at the start
+``/bodyset/Pelvis/mass``                any number of the model, by its path
+``/forceset/*Foot*/.../stiffness``      several numbers that are the same in each run
+``thigh_length``                        parameter of the function that makes the model
+``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
+======================================  ==========================================================
+
+A parameter of that name is meant by `slope` if there is one. A locked coordinate is held at the value that it is given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.errors import SettingError
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.quantity import Quantity, quantity
+from osimlite.schema.model import Model
+from osimlite.sweep.properties import Place, places
+from osimlite.text import did_you_mean
+
+if TYPE_CHECKING:
+    from osimlite.multibody.parts import CoordinateInfo
+
+Floats = NDArray[np.float64]
+Range = float | str | Sequence[Any]
+"""A value; ``(low, high)``, ``(low, high, count)``, each with ``"log"`` at its end; or the text for it."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A coordinate's value or speed at the start."""
+
+    coordinate: str
+    is_speed: bool
+
+
+@dataclass(frozen=True)
+class Property:
+    """Numbers of the model that are the same."""
+
+    places: tuple[Place, ...]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An argument of the function that makes the model."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Gravity of the same size, tilted about z, in rad."""
+
+
+Target = Start | Property | Parameter | Slope
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number that differs from run to run.
+
+    Attributes:
+        name: as it was given.
+        target: what it is.
+        low: least value, in rad, m or the unit of the property.
+        high: largest value.
+        count: of values in a grid.
+        is_log: whether its logarithm is what is spread evenly.
+    """
+
+    name: str
+    target: Target
+    low: float
+    high: float
+    count: int | None = None
+    is_log: bool = False
+
+    def at(self, fraction: Floats) -> Floats:
+        """The values at fractions of the way from low to high; exact at either end."""
+        if self.is_log:
+            a, b = math.log(self.low), math.log(self.high)
+            found = np.exp(a + fraction * (b - a))
+        else:
+            found = self.low + fraction * (self.high - self.low)
+        return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, found))
+
+    def fraction(self, value: float) -> float:
+        """Where a value lies, 0 at low and 1 at high."""
+        if self.is_log:
+            return (math.log(value) - math.log(self.low)) / (math.log(self.high) - math.log(self.low))
+        return (value - self.low) / (self.high - self.low)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it has one value only."""
+        return self.low == self.high
+
+    def settings(self) -> dict[str, Any]:
+        """What makes it, for comparison and for people."""
+        row: dict[str, Any] = {"name": self.name, "low": self.low, "high": self.high}
+        if self.count is not None:
+            row["count"] = self.count
+        return {**row, "log": True} if self.is_log else row
+
+
+def parse(words: Sequence[str]) -> dict[str, Range]:
+    """Ranges by name from words ``NAME=LOW:HIGH[:COUNT][:log]`` or ``NAME=VALUE``.
+
+    Raises:
+        SettingError: a word is not of that form, or a name comes twice.
+    """
+    found: dict[str, Range] = {}
+    for word in words:
+        name, equals, text = (part.strip() for part in word.partition("="))
+        if not (name and equals and text):
+            raise SettingError(f"--vary takes NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT, got '{word}'")
+        if name in found:
+            raise SettingError(f"'{name}' is varied twice; give it once")
+        found[name] = text
+    return found
+
+
+def variables(
+    ranges: Mapping[str, Range], model: Model, mechanism: Mechanism, parameters: Collection[str] = ()
+) -> tuple[Variable, ...]:
+    """Find what is meant by names, and read their ranges.
+
+    Args:
+        ranges: by name.
+        model: that is varied.
+        mechanism: of it.
+        parameters: of the function that makes it.
+
+    Raises:
+        SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
+    """
+    found = []
+    for name, given in ranges.items():
+        target, unit = _target(name, model, mechanism, parameters)
+        found.append(_variable(name, target, unit, given))
+    taken: dict[object, str] = {}
+    for item in found:
+        for part in item.target.places if isinstance(item.target, Property) else (item.target,):
+            if part in taken:
+                raise SettingError(f"'{taken[part]}' and '{item.name}' are the same number; vary one of them")
+            taken[part] = item.name
+    return tuple(found)
+
+
+def _target(name: str, model: Model, mechanism: Mechanism, parameters: Collection[str]) -> tuple[Target, str]:
+    """What a name means, and in what unit."""
+    infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
+    front, _, last = name.rpartition("/")
+    key, is_speed = (front, last == "speed") if last in ("value", "speed") and front in infos else (name, False)
+    if key in infos:
+        return _coordinate(name, infos[key], is_speed, model)
+    if name in parameters:
+        return Parameter(name), "parameter"
+    if name.startswith("/"):
+        found = places(model, name)
+        unit = found[0].unit
+        if unit.startswith("rad | m") and found[0].component in infos:
+            unit = _unit_of(infos[found[0].component])
+        return Property(found), unit
+    if name == "slope":
+        return Slope(), "rad"
+    known = [*(info.name for info in mechanism.coordinates), *parameters, "slope"]
+    known += [f"{info.name}/speed" for info in mechanism.coordinates]
+    near = did_you_mean(name, known)
+    raise SettingError(f"there is no coordinate, parameter or path '{name}' to vary{near}")
+
+
+def _coordinate(name: str, info: CoordinateInfo, is_speed: bool, model: Model) -> tuple[Target, str]:
+    if not info.locked:
+        return Start(info.path, is_speed), _unit_of(info)
+    if is_speed:
+        raise SettingError(f"the coordinate of '{name}' is locked, so that it has no speed; unlock it in the model")
+    return Property(places(model, f"{info.path}/default_value")), _unit_of(info)
+
+
+def _unit_of(info: CoordinateInfo) -> str:
+    return {"rotational": "rad", "translational": "m"}.get(info.motion_type, "rad | m")
+
+
+def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
+    parts = given.split(":") if isinstance(given, str) else [given] if isinstance(given, int | float) else list(given)
+    count, is_log = None, False
+    if len(parts) > 1 and parts[-1] == "log":
+        is_log = True
+        parts.pop()
+    if len(parts) == 3:
+        text = str(parts.pop())
+        if not text.strip().isdigit() or int(text) < 1:
+            raise SettingError(f"the number of values of '{name}' is a whole number above zero, not '{text}'")
+        count = int(text)
+    if len(parts) not in (1, 2):
+        raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
+    low, high = (_number(name, part, unit) for part in (parts[0], parts[-1]))
+    if len(parts) == 1:
+        count = 1
+    if low > high:
+        raise SettingError(f"the range of '{name}' ends below its start: {low:g} to {high:g}; turn it round")
+    if is_log and low <= 0.0:
+        raise SettingError(f"'{name}' is spread by its logarithm, so that it must be above zero, not {low:g}")
+    if count is not None and count > 1 and low == high:
+        raise SettingError(f"'{name}' cannot have {count} values between {low:g} and {high:g}; give it one")
+    if count == 1 and low != high:
+        raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
+    return Variable(name, target, low, high, count, is_log)
+
+
+def _number(name: str, part: object, unit: str) -> float:
+    if isinstance(part, int | float):
+        given: Quantity | None = Quantity(float(part), None)
+    else:
+        given = quantity(str(part))
+    if given is None or not math.isfinite(given.number):
+        raise SettingError(f"'{part}' is no number for '{name}'; give one such as 0.5 or 30deg")
+    if given.unit is None:
+        return given.number
+    if given.is_angle and unit.startswith("deg"):
+        return given.number if given.unit == "deg" else math.degrees(given.number)
+    if given.is_angle and unit.startswith("rad"):
+        return given.value
+    if not given.is_angle and unit in ("m", "m/s", "rad | m", "rad/s | m/s"):
+        return given.value
+    if unit == "parameter":
+        raise SettingError(f"'{name}' is a parameter of a function, whose unit only that knows; give a plain number")
+    raise SettingError(f"'{name}' is in {unit or 'no unit'}, which '{part}' does not fit")

@@ -1,0 +1,185 @@
+"""The models of a sweep: those that a sample's properties and parameters make of the given one.
+
+A model is made afresh for each new set of numbers, from where they have an effect: all of it in general, and the
+elements of the forces alone if only forces have changed. The numbers are those of a model that is built from a file,
+since the same functions make them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.schema.forces import Force
+from osimlite.schema.model import Model
+from osimlite.simulation.elements import ElementBuilder
+from osimlite.simulation.engines import engine_factory
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.run import Simulation
+from osimlite.sweep.plan import Plan
+from osimlite.sweep.properties import Setter
+from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
+
+MOST_KEPT = 64
+"""So many models are kept: a grid asks for the same ones again and again."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A model made ready.
+
+    Attributes:
+        engine: of it.
+        start: its default state (2n,), in the engine's order.
+        structure: equal for variants that differ in numbers only.
+        simulation: that it was made for; None if only its forces are new.
+    """
+
+    engine: Any
+    start: Floats
+    structure: bytes
+    simulation: Simulation | None
+
+
+class Variants:
+    """Makes the models of a plan; for one thread.
+
+    Args:
+        plan: whose.
+
+    Attributes:
+        model: with the numbers of the variant that was made last.
+
+    Raises:
+        OsimliteError: the model cannot be simulated as it is given.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        targets = [item.target for item in plan.variables]
+        self._starts = [(k, t) for k, t in enumerate(targets) if isinstance(t, Start)]
+        self._changes = [k for k, target in enumerate(targets) if not isinstance(target, Start)]
+        self._parameters = [k for k, target in enumerate(targets) if isinstance(target, Parameter)]
+        self._adopt(plan.model())
+        self.given = self._whole()
+        self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
+        self._builder: ElementBuilder | None = None
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether there is one model only."""
+        return not self._changes
+
+    def variant(self, values: Sequence[float]) -> Variant:
+        """The model of a sample.
+
+        Raises:
+            OsimliteError: there is none with these numbers.
+        """
+        if not self._changes:
+            return self.given
+        key = tuple(values[place] for place in self._changes)
+        found = self._kept.get(key)
+        if found is None:
+            try:
+                found = self._make(values)
+            except OsimliteError as error:
+                found = error
+            if len(self._kept) >= MOST_KEPT:
+                self._kept = {}
+            self._kept[key] = found
+        if isinstance(found, OsimliteError):
+            raise found
+        return found
+
+    def start(self, variant: Variant, values: Sequence[float]) -> Floats:
+        """Initial state of a sample (2n,)."""
+        row, engine = variant.start.copy(), variant.engine
+        for place, target in self._starts:
+            number = engine.order.index(engine.mechanism.coordinate_index(target.coordinate))
+            row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
+        return row
+
+    def set_start(self, values: Sequence[float]) -> None:
+        """Make the initial state of a sample the default state of `model`."""
+        coordinates: Any = self.model.tree().by_path
+        for place, target in self._starts:
+            name = "default_speed_value" if target.is_speed else "default_value"
+            setattr(coordinates[target.coordinate], name, float(values[place]))
+
+    def put(self, values: Sequence[float]) -> None:
+        """Make `model` that of a sample, but for its initial state.
+
+        Raises:
+            OsimliteError: it does not take the numbers.
+        """
+        if self._parameters:
+            assert self._plan.make is not None
+            names = {self._plan.variables[place].name: float(values[place]) for place in self._parameters}
+            self._adopt(self._plan.make(names))
+        for place, setters in self._setters:
+            for setter in setters:
+                setter.put(float(values[place]))
+        for place in self._slopes:
+            angle, g = float(values[place]), self._gravity
+            self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
+
+    # ------------------------------------------------------------------------------------------------ helpers
+    def _adopt(self, model: Model) -> None:
+        self.model = model
+        self._gravity = math.hypot(*model.gravity[:2])
+        self._slopes, self._setters = [], []
+        forces: list[Force] = []
+        only_forces = not self._parameters
+        for place in self._changes:
+            target = self._plan.variables[place].target
+            if isinstance(target, Property):
+                setters: list[Setter] = [item.setter(model) for item in target.places]
+                self._setters.append((place, setters))
+                for item in target.places:
+                    owner = model.tree().by_path[item.component]
+                    if isinstance(owner, Force):
+                        forces.append(owner)
+                    else:
+                        only_forces = False
+            elif isinstance(target, Slope):
+                self._slopes.append(place)
+                only_forces = False
+        self._forces = forces if only_forces and self._plan.engine == "compiled" else None
+
+    def _whole(self) -> Variant:
+        simulation = Simulation(self.model, self._plan.engine, skip_unsupported=self._plan.skip_unsupported)
+        return _variant(simulation.engine, simulation)
+
+    def _make(self, values: Sequence[float]) -> Variant:
+        self.put(values)
+        if self._forces is None or self.given.simulation is None:
+            return self._whole()
+        mechanism, forces = self.given.simulation.mechanism, self.given.simulation.forces
+        if self._builder is None:
+            self._builder = ElementBuilder(self.model, mechanism, False, Path())
+        made = {}
+        for force in self._forces:
+            element = self._builder.element(force)
+            made[element.path] = element
+        known = {element.path for element in forces.elements}
+        if not made.keys() <= known:
+            return self._whole()
+        changed = tuple(made.get(element.path, element) for element in forces.elements)
+        make = engine_factory(self._plan.engine)
+        return _variant(make(mechanism, replace(forces, elements=changed), Settings()), None)
+
+
+def _variant(engine: Any, simulation: Simulation | None) -> Variant:
+    infos = engine.mechanism.coordinates
+    state = engine.state if simulation is None else simulation.state
+    start = state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
+    parts = [np.array((len(infos), *engine.order)), *getattr(engine, "structure", ())]
+    structure = b"|".join((*(part.tobytes() for part in parts), *(name.encode() for name in engine.contacts)))
+    return Variant(engine, np.array(start), structure, simulation)
