@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.gait.footing import Footing, find_footing
-from osimlite.simulation.engines.compiled import NO_LIMIT, CompiledEngine, compiled
+from osimlite.simulation.engines.batch import NO_LIMIT
+from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
-from osimlite.simulation.kernels.arrays import Floats, Ints, numbers_of
-from osimlite.simulation.kernels.places import contact_places
-from osimlite.simulation.many import ENDINGS, Runs, Watch, run_many
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import ENDINGS, Runs, Watch, contact_places, contact_radii, run_many
 
 SHORTEST = 0.05
 """How far ahead of the other a foot touches down in a step, at least, m."""
@@ -250,8 +250,7 @@ def along_slope(
     table = np.array(engine.numbers if vectors is None else vectors, dtype=np.float64, order="C")
     table = table.reshape(-1, table.shape[-1])
     which = np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
-    places = np.zeros((len(states), len(engine.contacts), 9))
-    compiled(contact_places)(engine.structure, table, which, np.array(states, dtype=np.float64, order="C"), places)
+    places = contact_places(engine, states, table, which)
     origin, normal, center = places[..., :3], places[..., 3:6], places[..., 6:]
     gravity = table[:, :3]
     pull = gravity[which][:, None, :] - np.sum(gravity[which][:, None, :] * normal, axis=2, keepdims=True) * normal
@@ -260,10 +259,5 @@ def along_slope(
     forward = np.array((1.0, 0.0, 0.0)) - normal[..., :1] * normal
     along = np.where(level[..., None], forward, pull)
     along /= np.linalg.norm(along, axis=2, keepdims=True)
-    radii = _radii(engine, table)[which]
+    radii = contact_radii(engine, table)[which]
     return np.sum(center * along, axis=2), radii - np.sum((center - origin) * normal, axis=2)
-
-
-def _radii(engine: CompiledEngine, table: Floats) -> Floats:
-    """Radius of surface 2 of each contact for each row of numbers (v, P), m."""
-    return np.array([numbers_of(engine.structure, row).pairs[:, 10] for row in table]).reshape(len(table), -1)

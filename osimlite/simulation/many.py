@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError
-from osimlite.simulation.engines.compiled import NO_LIMIT, CompiledEngine, compiled
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP
-from osimlite.simulation.kernels import merson
-from osimlite.simulation.kernels.arrays import Floats, Ints
+from osimlite.simulation.engines.batch import NO_LIMIT, Batch
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.engines.machine_code import entry_point
+from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels.contacts import RADIUS
+from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.text import did_you_mean
 
 AT_ONCE = 8
@@ -119,36 +122,82 @@ def run_many(
     size = 2 * len(engine.order)
     if starts.ndim != 2 or starts.shape[1] != size:
         raise OsimliteError(f"the states are one row of {size} numbers for each run; got {starts.shape}")
-    vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
-    vectors = vectors.reshape(-1, vectors.shape[-1])
-    count = len(starts)
+    vectors, count = _rows(engine, numbers), len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
         raise OsimliteError(
             f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
         )
     kinds, levels = _watches(engine, watches)
-    pairs = len(engine.contacts)
-    moments = np.array(report_times, dtype=np.float64)
-    clocks = np.tile((0.0, INITIAL_STEP), (count, 1))
-    counts, endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
-    reports = np.full((count, len(moments), size), np.nan)
-    events = np.zeros((count, most_events, 3 + size * event_states))
-    peaks, control = np.zeros((count, pairs, 2)), engine.control(to, accuracy, most_tries)
-    run_several, no_log, no_forces = compiled(merson.run_several), np.zeros((1, 0, 0)), np.zeros((1, 0, pairs, 3))
+    batch = Batch(
+        engine,
+        starts,
+        to,
+        accuracy,
+        vectors=vectors,
+        times=report_times,
+        kinds=kinds,
+        levels=levels,
+        most_events=most_events,
+        event_states=event_states,
+        most_tries=most_tries,
+    )
 
     def work(first: int) -> None:
-        run_several(
-            engine.structure, vectors, clocks, counts, starts, control, moments, reports, events, peaks, kinds,
-            levels, no_log, no_forces, endings, first, min(first + AT_ONCE, count),
-        )  # fmt: skip
+        batch.run(first, min(first + AT_ONCE, count))
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))
     names = [*engine.contacts, *(watch.name for watch in watches)]
-    kept = [rows[:total] for rows, total in zip(events, counts[:, merson.EVENTS], strict=True)]
+    kept = [rows[:total] for rows, total in zip(batch.events, batch.counts[:, merson.EVENTS], strict=True)]
     named = [[(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()] for rows in kept]
     at_events = [rows[:, 3:] for rows in kept] if event_states else []
-    return Runs(clocks[:, 0].copy(), starts, endings, counts[:, :3].copy(), reports, named, peaks, at_events)
+    return Runs(
+        batch.clocks[:, 0].copy(),
+        batch.states,
+        batch.endings,
+        batch.counts[:, :3].copy(),
+        batch.reports,
+        named,
+        batch.peaks,
+        at_events,
+    )
+
+
+def contact_places(
+    engine: CompiledEngine, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
+) -> Floats:
+    """Where the surfaces of all contacts are: centre and normal of surface 1, centre of surface 2 (k, P, 9), in ground.
+
+    Args:
+        engine: of the model.
+        states: (k, 2n).
+        numbers: of models of the same structure (v, m); by default the engine's own.
+        rows: which of them each state goes with (k,); by default the first.
+    """
+    vectors, given = _rows(engine, numbers), np.array(states, dtype=np.float64, order="C")
+    which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
+    places = np.zeros((len(given), len(engine.contacts), 9))
+    w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(2 * len(engine.order))
+    entry_point("contact_places")(
+        *(part.ctypes.data for part in (engine.program, vectors, w)),
+        vectors.shape[1],
+        *(part.ctypes.data for part in (which, given, derivative, places)),
+        len(given),
+    )
+    return places
+
+
+def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
+    """Radius of surface 2 of each contact for each row of numbers (v, P), m."""
+    s = engine.structure
+    records = s[s[layout.CONTACT_AT] : s[layout.CONTACT_AT] + len(engine.contacts)]
+    radii: Floats = _rows(engine, numbers)[:, s[records + layout.NUMBERS] + RADIUS]
+    return radii
+
+
+def _rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+    vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
+    return vectors.reshape(-1, vectors.shape[-1])
 
 
 def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:

@@ -1,85 +1,31 @@
 """The compiled engine: accelerations, steps and events in machine code.
 
 What is compiled are the functions of :mod:`osimlite.simulation.kernels` with the force laws and the step control that
-they call, none of which knows of it. The code is kept in numba's cache, and serves every model: models and parameters
-are arrays.
+they call. The code serves every model: models and parameters are arrays.
 """
 
 from __future__ import annotations
 
-import dis
-import hashlib
-from collections.abc import Callable, Iterator, Sequence
-from functools import cache
-from math import inf
-from pathlib import Path
-from types import FunctionType
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from osimlite._require import require
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.forces.coordinate_limit import limit_energy, limit_force
-from osimlite.forces.hunt_crossley import contact_energy
 from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.simulation.contact_elements import HuntCrossley
-from osimlite.simulation.elements import CoordinateLimit, Forces
+from osimlite.simulation.contact_elements import PairContact
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.machine_code import address_of, entry_point, numba
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.integrators import Observer, RungeKuttaMerson, SemiImplicitEuler, Stepper
-from osimlite.simulation.kernels import dynamics, merson
-from osimlite.simulation.kernels.arrays import Floats, numbers_of, vector_of, work_for
-from osimlite.simulation.kernels.motion import FINE, SINGULAR_MASS, SINGULAR_RATES
+from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pack import pack
-
-numba = require("numba", extra="fast", purpose="the compiled engine")
-
-LEAN = tuple(
-    f"osimlite.{name}" for name in ("forces", *(f"simulation.kernels.{x}" for x in ("functions", "motion", "dynamics")))
-)
-"""Modules whose functions allocate nothing."""
-
-SHARED = ("evaluate", "contacts_at", "ball", "limit_force", "contact_force")
-"""Functions of them that are called, not copied to where they are called."""
+from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.kernels.table import LAW_NUMBERS
 
 LOGGED_STEPS = 2048
 """So many steps are taken in one call of a motion that is watched."""
-
-NO_LIMIT = 2**62
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of ours in machine code, from the cache if it is there; it runs without Python's lock."""
-    found: Callable[..., Any] = _compile(function, True)
-    return found
-
-
-@cache
-def _compile(function: Any, is_kept: bool) -> Any:
-    """Compile a function and all functions of ours that it calls; what is kept has its callees within."""
-    scope = dict(function.__globals__)
-    for name in {item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"}:
-        value = scope.get(name)
-        if isinstance(value, FunctionType) and value.__module__.startswith("osimlite."):
-            scope[name] = _compile(value, False)
-    copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, None)
-    # Numba looks at the time of one source file only; a kept function depends on several.
-    copy.__qualname__ = f"{function.__qualname__}_{_digest()}" if is_kept else function.__qualname__
-    copy.__module__ = function.__module__
-    if not function.__module__.startswith(LEAN):
-        return numba.njit(copy, nogil=True, cache=is_kept, error_model="numpy")
-    # These work on arrays that somebody else holds; counting references to them would take half of the time.
-    inline = not is_kept and function.__name__ not in SHARED
-    return numba.njit(copy, nogil=True, cache=is_kept, error_model="numpy", forceinline=inline, _nrt=False)
-
-
-@cache
-def _digest() -> str:
-    """What tells whether any source of the compiled code has changed."""
-    package = Path(__file__).parents[2]
-    sources = [*sorted(package.glob("forces/*.py")), *sorted(package.glob("simulation/kernels/*.py"))]
-    sources += [package / "simulation" / "integrators.py", Path(__file__)]
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:12]
 
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> CompiledEngine:
@@ -99,8 +45,9 @@ class CompiledEngine:
         forces: what pushes it, besides gravity.
 
     Attributes:
-        structure: what is connected to what; equal for models that differ in numbers only.
+        structure: what is connected to what, integers; equal for models that differ in numbers only.
         numbers: all numbers in one vector.
+        program: the structure with the addresses of the machine code, good in this process only.
 
     Raises:
         UnsupportedError: a joint, a function or a force that it does not know.
@@ -115,28 +62,41 @@ class CompiledEngine:
         self.mechanism = mechanism
         self.forces = forces
         self.structure = packed.structure
-        self.numbers = vector_of(packed.numbers)
+        self.numbers = packed.numbers
         self.order = packed.order
         self.placements = packed.placements
         self.state = FreeState(mechanism, self.order)
-        contacts = [element for element in forces.elements if isinstance(element, HuntCrossley)]
+        contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
-        self._views = numbers_of(self.structure, self.numbers)
-        self._work = work_for(self.structure)
-        self._f = np.zeros(2 * len(self.order))
-        self._evaluate = compiled(dynamics.evaluate)
+        self.program = packed.structure.copy()
+        for law in packed.laws:
+            self.program[layout.LAWS + LAW_NUMBERS[law]] = address_of(law)
+        self._items = packed.items
+        self._w = np.zeros(self.structure[layout.WORK_SIZE])
+        start, links = self.structure[layout.WORK_LINK], self.structure[layout.LINKS]
+        self._links = self._w[start : start + layout.LINK_WORK * links].reshape(links, layout.LINK_WORK)
+        start = self.structure[layout.WORK_CONTACT]
+        self._pairs = self._w[start : start + layout.CONTACT_WORK * len(self.contacts)].reshape(-1, layout.CONTACT_WORK)
+        self._y, self._f = np.zeros(2 * len(self.order)), np.zeros(2 * len(self.order))
+        self._evaluate = entry_point("evaluate")
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
         """(qdot, udot) at a state."""
-        status = self._evaluate(self.structure, self._views, self._work, np.array(y, dtype=float), self._f)
-        if status != FINE:
+        status = self._at(t, y, layout.WHOLE)
+        if status != layout.FINE:
             raise self._refusal(status, y)
-        self._note_loads(self._work.contacts[:, :3])
+        self._note_loads(self._pairs[:, :3])
         found: list[float] = self._f.tolist()
         return found
+
+    def _at(self, t: float, y: Sequence[float], how_far: int) -> int:
+        self._w[layout.TIME] = t
+        self._y[:] = y
+        s, x, w, y_at, f = self.program, self.numbers, self._w, self._y, self._f
+        return self._evaluate(s.ctypes.data, x.ctypes.data, w.ctypes.data, y_at.ctypes.data, f.ctypes.data, how_far)
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
@@ -146,12 +106,12 @@ class CompiledEngine:
     def _refusal(self, status: int, y: Sequence[float]) -> SimulationError:
         if not np.isfinite(np.array(y)).all():
             return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
-        if status == SINGULAR_RATES:
+        if status == layout.SINGULAR_RATES:
             try:
                 self.mechanism.rate_matrix(self.state.values(y))
             except SimulationError as error:
                 return error
-        if status == SINGULAR_MASS:
+        if status == layout.SINGULAR_MASS:
             name = self.mechanism.coordinates[self.order[int(self._f[0])]].name
             return SimulationError(
                 f"coordinate '{name}' moves no mass, or a negative inertia; "
@@ -162,12 +122,12 @@ class CompiledEngine:
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: Sequence[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
-        self._touch(y)
+        self._touch(t, y)
         return int(self.loads[-1])
 
     def force_records(self, t: float, y: Sequence[float]) -> list[float]:
         """One number for each of the columns."""
-        self._touch(y)
+        self._touch(t, y)
         origins = [self._origin(body) for body in range(len(self.placements))] + [(0.0, 0.0, 0.0)]
         row: list[float] = []
         for element, values in self._reported(y):
@@ -176,7 +136,7 @@ class CompiledEngine:
 
     def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
-        self._touch(y)
+        self._touch(t, y)
         kinetic, gravity = self._mechanical()
         for (link, frame), body in zip(self.placements, self.mechanism.bodies, strict=True):
             if link == GROUND:
@@ -187,41 +147,37 @@ class CompiledEngine:
 
     def _mechanical(self) -> tuple[float, float]:
         """Kinetic energy and potential energy of gravity of all links, after `_touch`."""
-        w, inertia = self._work, self._views.inertia
-        rotations, turning = w.rotation.reshape(-1, 3, 3), w.velocity[:, :3]
-        arms = w.position - w.origin + (rotations @ inertia[:, 1:4, None])[:, :, 0]
-        v = w.velocity[:, 3:] + np.cross(turning, arms)
+        w, links = self._links, len(self._links)
+        inertia = self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + 10 * links].reshape(links, 10)
+        rotations, velocity = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 6]
+        position, origin = (w[:, place : place + 3] for place in (layout.POSITION, layout.ORIGIN))
+        turning, arms = velocity[:, :3], position - origin + (rotations @ inertia[:, 1:4, None])[:, :, 0]
+        v = velocity[:, 3:] + np.cross(turning, arms)
         own = (turning[:, None, :] @ rotations)[:, 0]
         moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
         spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
         kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
-        return kinetic, -float(inertia[:, 0] @ (arms + w.origin) @ self._views.gravity)
+        return kinetic, -float(inertia[:, 0] @ (arms + origin) @ self.mechanism.gravity)
 
-    def _touch(self, y: Sequence[float]) -> None:
-        self._evaluate(self.structure, self._views, self._work, np.array(y, dtype=float), self._f)
-        self._note_loads(self._work.contacts[:, :3])
+    def _touch(self, t: float, y: Sequence[float]) -> None:
+        self._at(t, y, layout.TOUCHED)
+        self._note_loads(self._pairs[:, :3])
 
     def _reported(self, y: Sequence[float]) -> Iterator[tuple[Any, list[Any]]]:
         """Each element with what it wants for its record, after `_touch`."""
-        values, speeds = self.state.values(y), self.state.speeds(y)
-        rows = iter(self._work.contacts.tolist())
-        for element in self.forces.elements:
-            if isinstance(element, HuntCrossley):
-                found: list[Any] = []
-                for pair, row in zip(element.pairs, rows, strict=False):
-                    energy = contact_energy(row[6], row[7], pair.effective[0])
-                    found.append((*row[:6], energy) if row[6] > 0.0 else None)
-                yield element, found
-            elif isinstance(element, CoordinateLimit):
-                q, (Ku, qu, Kl, ql, _, t) = values[element.coordinate], element.constants
-                force = limit_force(q, speeds[element.coordinate], *element.constants)
-                yield element, [(force, limit_energy(q, Ku, qu, Kl, ql, t))]
+        values, speeds, work = self.state.values(y), self.state.speeds(y), self._w.tolist()
+        for element, items in zip(self.forces.elements, self._items, strict=True):
+            yield element, [kept for item, place in items for kept in item.kept(work[place:], values, speeds)]
 
     def _origin(self, body: int) -> tuple[float, float, float]:
         link, frame = self.placements[body]
         x, y, z = frame[:3, 3].tolist()
-        found: tuple[float, float, float] = dynamics.station(self._work, link, x, y, z)
-        return found
+        if link == GROUND:
+            return x, y, z
+        here = self._links[link]
+        place = here[layout.POSITION : layout.POSITION + 3] + here[:9].reshape(3, 3) @ frame[:3, 3]
+        x, y, z = place.tolist()
+        return x, y, z
 
     def _note_loads(self, forces: Floats) -> None:
         bits = 0
@@ -245,13 +201,6 @@ class CompiledEngine:
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
         return self.derivative(0.0, q + u)[: len(self.order)]
-
-    def control(self, limit: float, accuracy: float, most_tries: int = NO_LIMIT) -> merson.Control:
-        """How to run up to a time (s)."""
-        # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
-        count = len(self.mechanism.coordinates)
-        spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
-        return merson.Control(float(limit), float(accuracy), inf, 0.0, count + spare, count, most_tries)
 
     def close(self) -> None:
         """Nothing is held."""
@@ -291,14 +240,14 @@ class CompiledMerson(RungeKuttaMerson):
     ) -> None:
         self._engine = engine
         count = len(engine.mechanism.coordinates)
-        control = engine.control(t, accuracy)
+        spare = sum(not body.mobilizer.speeds_are_rates for body in engine.mechanism.bodies)
         super().__init__(
             engine.derivative,
             t,
             y,
             len(engine.order),
             accuracy=accuracy,
-            count_q=control.count_q,
+            count_q=count + spare,
             count_u=count,
             observe=observe,
             names=names,
@@ -308,31 +257,33 @@ class CompiledMerson(RungeKuttaMerson):
 
     def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
         """Yield (time, state) at times that do not decrease, s; the steps are those of the base."""
-        engine, size, pairs = self._engine, len(self.state), len(self._engine.contacts)
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
-        clocks = np.array(((self.time, self._next_step),))
-        counts = np.array(((self.taken, self.attempted, self.evaluations, 0, 0, 0),), dtype=np.int64)
-        rows, states = np.array((self.state,), dtype=float), np.zeros((1, len(times), size))
-        control, moments = engine.control(times[-1], self._accuracy), np.array(times, dtype=float)
-        run, done, endings = compiled(merson.run_several), 0, np.array((merson.FULL,))
-        while endings[0] == merson.FULL:
-            logs, forces = np.zeros((1, LOGGED_STEPS, 1 + 2 * size)), np.zeros((1, LOGGED_STEPS, pairs, 3))
-            counts[0, merson.LOGGED] = 0
-            run(
-                engine.structure, engine.numbers[None], clocks, counts, rows, control, moments, states,
-                np.zeros((1, 0, 3)), np.zeros((1, 0, 2)), np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7)),
-                logs, forces, endings, 0, 1,
-            )  # fmt: skip
-            (clock,), (count,), (y,), log = clocks.tolist(), counts.tolist(), rows.tolist(), logs[0]
-            logged = count[merson.LOGGED]
-            self._put_off.append((log[:logged], forces[0, :logged]))
-            self.time, self._next_step, self.state = clock[0], clock[1], y
-            self.taken, self.attempted, self.evaluations = count[:3]
-            if endings[0] == merson.FAILED:
+        batch = Batch(
+            self._engine,
+            [self.state],
+            times[-1],
+            self._accuracy,
+            start=self.time,
+            next_step=self._next_step,
+            times=times,
+            most_logged=LOGGED_STEPS,
+        )
+        (count,), done = batch.counts, 0
+        count[: merson.REPORTED] = self.taken, self.attempted, self.evaluations
+        ending = merson.FULL
+        while ending == merson.FULL:
+            count[merson.LOGGED] = 0
+            batch.run()
+            (ending,), logged = batch.endings.tolist(), count[merson.LOGGED]
+            self._put_off.append((batch.log[:logged].copy(), batch.forces[:logged].copy()))
+            self.time, self._next_step = batch.clocks[0].tolist()
+            self.state = batch.states[0].tolist()
+            self.taken, self.attempted, self.evaluations = count[: merson.REPORTED].tolist()
+            if ending == merson.FAILED:
                 self._explain()
-            reached = count[merson.REPORTED]
-            yield from zip(times[done:reached], states[0, done:reached], strict=True)
+            reached = int(count[merson.REPORTED])
+            yield from zip(times[done:reached], batch.reports[0, done:reached], strict=True)
             done = reached
 
     def catch_up(self) -> None:

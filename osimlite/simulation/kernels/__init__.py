@@ -1,6 +1,5 @@
-"""The arithmetic of the compiled engine: plain loops over arrays, which run as Python and compiled.
+"""The arithmetic of the compiled engine: plain loops over three vectors.
 
-Nothing here knows a compiler; :mod:`osimlite.simulation.engines.compiled` compiles these functions and all that they
-call. A mechanism with its forces is a `Structure` of integers, what is connected to what, and one vector of numbers;
-functions take the `Numbers` that are views of that vector.
+Nothing here knows a compiler; :mod:`osimlite.simulation.engines.machine_code` compiles these functions and all that
+they call. :mod:`osimlite.simulation.kernels.layout` says what is where in the vectors.
 """

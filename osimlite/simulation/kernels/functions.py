@@ -1,7 +1,4 @@
-"""Functions of coordinates from a table of numbers.
-
-Each function has a kind and a piece of the table, which begins with a factor for the whole function.
-"""
+"""Functions of coordinates from a table of numbers: kind, a factor for the whole function, and what the kind needs."""
 
 from __future__ import annotations
 
@@ -12,14 +9,30 @@ import numpy as np
 from osimlite.errors import UnsupportedError
 from osimlite.multibody import functions as f
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
-from osimlite.simulation.kernels.arrays import Floats, Numbers, Structure, Work
+from osimlite.simulation.kernels.layout import (
+    AMOUNT,
+    ARGUMENT_COUNT,
+    ARGUMENTS,
+    CURVATURE,
+    EXTRA,
+    FINE,
+    FREEDOMS,
+    GRADIENT,
+    OPERATION_AT,
+    OPERATION_INTS,
+    OPERATION_WORK,
+    RATE,
+    WORK_OPERATION,
+)
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
-PIECES, SINE, STEP, MONOMIALS = 0, 1, 2, 3
-"""Kinds: polynomials between knots, a sine, a smooth step, a sum of products of powers of several arguments."""
+PIECES, SINE, STEP, MONOMIALS, MONOMIALS_OF_OPENSIM = 0, 1, 2, 3, 4
+"""Kinds: polynomials between knots, a sine, a smooth step, a sum of products of powers of several arguments; the last
+with what OpenSim 4.6 takes for its second derivatives, which is the gradient in every column."""
 
 
-def function_table(function: f.Function, where: str) -> tuple[int, list[float]]:
-    """Kind and numbers of a function.
+def function_table(function: f.Function, where: str) -> list[float]:
+    """The table of a function.
 
     Raises:
         UnsupportedError: there is no kind for it.
@@ -29,20 +42,36 @@ def function_table(function: f.Function, where: str) -> tuple[int, list[float]]:
         factor *= function.scale
         function = function.function
     if isinstance(function, f.Sine):
-        return SINE, [factor, function.amplitude, function.omega, function.phase, function.offset]
+        return [SINE, factor, function.amplitude, function.omega, function.phase, function.offset]
     if isinstance(function, f.Step):
-        return STEP, [factor, function.start, function.end, function.start_value, function.end_value]
+        return [STEP, factor, function.start, function.end, function.start_value, function.end_value]
     if isinstance(function, f.WeightedSum):
         size = len(function.weights)
         powers = np.vstack([np.eye(size), np.zeros(size)])
-        return MONOMIALS, [factor, size + 1.0, *function.weights, function.start, *powers.ravel().tolist()]
-    if isinstance(function, f.MultivariatePolynomial) and not function.opensim_derivatives:
+        return [MONOMIALS, factor, size + 1.0, *function.weights, function.start, *powers.ravel().tolist()]
+    if isinstance(function, f.MultivariatePolynomial):
         powers = np.array(function.powers, dtype=float)
-        return MONOMIALS, [factor, float(len(powers)), *function.coefficients, *powers.ravel().tolist()]
+        kind = MONOMIALS_OF_OPENSIM if function.opensim_derivatives else MONOMIALS
+        return [kind, factor, float(len(powers)), *function.coefficients, *powers.ravel().tolist()]
     knots, pieces = _pieces(function, where)
     width = max(map(len, pieces))
     rows = [[*piece, *[0.0] * (width - len(piece))] for piece in pieces]
-    return PIECES, [factor, float(len(knots)), float(width), *knots, *(x for row in rows for x in row)]
+    return [PIECES, factor, float(len(knots)), float(width), *knots, *(x for row in rows for x in row)]
+
+
+def table_of_one(function: f.Function, where: str) -> list[float]:
+    """The table of a function of one number, for `value_at`."""
+    if isinstance(function, f.Scaled):
+        kind, factor, *rest = table_of_one(function.function, where)
+        return [kind, function.scale * factor, *rest]
+    if isinstance(function, f.WeightedSum):
+        function = f.Linear(function.weights[0], function.start)
+    elif isinstance(function, f.MultivariatePolynomial):
+        coefficients = [0.0] * (1 + max(power for (power,) in function.powers))
+        for (power,), coefficient in zip(function.powers, function.coefficients, strict=True):
+            coefficients[power] += coefficient
+        function = f.Polynomial(tuple(reversed(coefficients)))
+    return function_table(function, where)
 
 
 def _pieces(function: f.Function, where: str) -> tuple[list[float], list[list[float]]]:
@@ -64,126 +93,96 @@ def _pieces(function: f.Function, where: str) -> tuple[list[float], list[list[fl
     if isinstance(function, PiecewisePolynomial):
         return function.knots.tolist(), function.pieces.tolist()
     raise UnsupportedError(
-        f"an axis of the joint '{where}' moves by a {type(function).__name__}, which the compiled engine cannot do; "
-        "take --engine bullet, or another function"
+        f"{where} is a {type(function).__name__}, which the compiled engine cannot do; take --engine bullet, or "
+        "another function"
     )
 
 
-def argument(s: Structure, x: Numbers, q: Floats, place: int) -> float:
-    """Value of an argument."""
-    freedom = s.arguments[place]
-    value: float = q[freedom] if freedom >= 0 else x.constants[place]
-    return value
-
-
-def value_of(s: Structure, x: Numbers, q: Floats, operation: int) -> float:
-    """The amount of an operation that has a function."""
-    first, number = s.first_argument[operation], s.function[operation]
-    at, kind, table = s.function_start[number], s.function_kind[number], x.table
-    factor: float = table[at]
-    total = 0.0
-    if kind == MONOMIALS:
-        count, size = int(table[at + 1]), s.first_argument[operation + 1] - first
-        for term in range(count):
-            product: float = table[at + 2 + term]
-            for place in range(size):
-                power = int(table[at + 2 + count + term * size + place])
-                product *= argument(s, x, q, first + place) ** power
-            total += product
-        return factor * total
-    z = argument(s, x, q, first)
+def value_at(table: Floats, z: float) -> tuple[float, float, float]:
+    """Value, slope and second derivative of a function of one number."""
+    kind, factor = int(table[0]), table[1]
+    value = slope = curvature = 0.0
     if kind == SINE:
-        wave: float = table[at + 1] * sin(table[at + 2] * z + table[at + 3]) + table[at + 4]
-        return factor * wave
-    if kind == STEP:
-        t = (z - table[at + 1]) / (table[at + 2] - table[at + 1])
-        t = min(max(t, 0.0), 1.0)
-        rise: float = (table[at + 4] - table[at + 3]) * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
-        found: float = factor * (table[at + 3] + rise)
-        return found
-    start, width, t = piece_at(table, at, z)
-    for k in range(width - 1, -1, -1):
-        total = total * t + table[start + k]
-    return factor * total
-
-
-def piece_at(table: Floats, at: int, z: float) -> tuple[int, int, float]:
-    """Where the polynomial for an argument begins, how many coefficients it has, and its own argument."""
-    knots, width = int(table[at + 1]), int(table[at + 2])
-    low, high = 0, knots
-    while high - low > 1:
-        middle = (low + high) // 2
-        if z < table[at + 3 + middle]:
-            high = middle
-        else:
-            low = middle
-    return at + 3 + knots + low * width, width, z - table[at + 3 + low]
-
-
-def slope_of(s: Structure, x: Numbers, w: Work, q: Floats, u: Floats, operation: int) -> tuple[float, float]:
-    """Rate of the amount of an operation, and its second derivative while the speeds stay; fills `w.gradient`."""
-    first, number = s.first_argument[operation], s.function[operation]
-    at, kind, table = s.function_start[number], s.function_kind[number], x.table
-    factor = table[at]
-    if kind == MONOMIALS:
-        return slope_of_monomials(s, x, w, q, u, operation)
-    z = argument(s, x, q, first)
-    slope = curvature = 0.0
-    if kind == SINE:
-        angle = table[at + 2] * z + table[at + 3]
-        slope = table[at + 1] * table[at + 2] * cos(angle)
-        curvature = -table[at + 1] * table[at + 2] * table[at + 2] * sin(angle)
+        angle = table[3] * z + table[4]
+        value = table[2] * sin(angle) + table[5]
+        slope = table[2] * table[3] * cos(angle)
+        curvature = -table[2] * table[3] * table[3] * sin(angle)
     elif kind == STEP:
-        rate = 1.0 / (table[at + 2] - table[at + 1])
-        t, rise = (z - table[at + 1]) * rate, table[at + 4] - table[at + 3]
+        rate = 1.0 / (table[3] - table[2])
+        t, rise = (z - table[2]) * rate, table[5] - table[4]
         if 0.0 < t < 1.0:
             slope = 30.0 * rise * rate * t * t * (1.0 - t) * (1.0 - t)
             curvature = 60.0 * rise * rate * rate * t * (1.0 - t) * (1.0 - 2.0 * t)
+        t = min(max(t, 0.0), 1.0)
+        value = table[4] + rise * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
     else:
-        start, width, t = piece_at(table, at, z)
-        total = 0.0
+        knots, width = int(table[2]), int(table[3])
+        low, high = 0, knots
+        while high - low > 1:
+            middle = (low + high) // 2
+            if z < table[4 + middle]:
+                high = middle
+            else:
+                low = middle
+        piece, t = at(table, 4 + knots + low * width), z - table[4 + low]
         for k in range(width - 1, -1, -1):
             curvature = curvature * t + slope
-            slope = slope * t + total
-            total = total * t + table[start + k]
+            slope = slope * t + value
+            value = value * t + piece[k]
         curvature *= 2.0
-    freedom = s.arguments[first]
-    speed = u[freedom] if freedom >= 0 else 0.0
-    w.gradient[0] = factor * slope
-    return factor * slope * speed, factor * curvature * speed * speed
+    return factor * value, factor * slope, factor * curvature
 
 
-def slope_of_monomials(s: Structure, x: Numbers, w: Work, q: Floats, u: Floats, operation: int) -> tuple[float, float]:
-    """As `slope_of`, for MONOMIALS."""
-    first, number = s.first_argument[operation], s.function[operation]
-    at, table = s.function_start[number], x.table
-    count, size = int(table[at + 1]), s.first_argument[operation + 1] - first
+def amount_by_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Amount of an operation by a function of one coordinate, with its derivatives."""
+    j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
+    freedom = s[j[ARGUMENTS]]
+    value, slope, curvature = value_at(at(x, j[EXTRA] + 1), y[freedom] if freedom >= 0 else x[j[EXTRA]])
+    speed = y[s[FREEDOMS] + freedom] if freedom >= 0 else 0.0
+    a[AMOUNT], a[RATE], a[CURVATURE] = value, slope * speed, curvature * speed * speed
+    w[j[GRADIENT]] = slope
+    return FINE
+
+
+def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Amount of an operation by a polynomial of several coordinates, with its derivatives."""
+    j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
+    size, arguments, constants, gradient = j[ARGUMENT_COUNT], at(s, j[ARGUMENTS]), at(x, j[EXTRA]), at(w, j[GRADIENT])
+    table, u = at(constants, size), at(y, s[FREEDOMS])
+    factor, count = table[1], int(table[2])
+    value = rate = curvature = 0.0
     for place in range(size):
-        w.gradient[place] = 0.0
-    rate = curvature = 0.0
+        gradient[place] = 0.0
     for term in range(count):
-        powers = at + 2 + count + term * size
-        for i in range(size):
-            one = table[at] * table[at + 2 + term] * table[powers + i]
-            if one == 0.0:
+        coefficient, powers = factor * table[3 + term], at(table, 3 + count + term * size)
+        value += coefficient * product(size, arguments, constants, y, powers, -1, -1)
+        for one in range(size):
+            if powers[one] == 0.0:
                 continue
-            for place in range(size):
-                one *= argument(s, x, q, first + place) ** (int(table[powers + place]) - (1 if place == i else 0))
-            w.gradient[i] += one
-            rate += one * speed_of(s, u, first + i)
-            for j in range(size):
-                two = table[at] * table[at + 2 + term] * table[powers + i]
-                two *= table[powers + j] - (1.0 if i == j else 0.0)
-                if two == 0.0:
+            first = coefficient * powers[one] * product(size, arguments, constants, y, powers, one, -1)
+            gradient[one] += first
+            if arguments[one] < 0:
+                continue
+            rate += first * u[arguments[one]]
+            for two in range(size):
+                power = powers[two] - (1.0 if one == two else 0.0)
+                if power == 0.0 or arguments[two] < 0:
                     continue
-                for place in range(size):
-                    less = (1 if place == i else 0) + (1 if place == j else 0)
-                    two *= argument(s, x, q, first + place) ** (int(table[powers + place]) - less)
-                curvature += two * speed_of(s, u, first + i) * speed_of(s, u, first + j)
-    return rate, curvature
+                second = coefficient * powers[one] * power * product(size, arguments, constants, y, powers, one, two)
+                curvature += second * u[arguments[one]] * u[arguments[two]]
+    if int(table[0]) == MONOMIALS_OF_OPENSIM:
+        total = 0.0
+        for place in range(size):
+            total += u[arguments[place]] if arguments[place] >= 0 else 0.0
+        curvature = rate * total
+    a[AMOUNT], a[RATE], a[CURVATURE] = value, rate, curvature
+    return FINE
 
 
-def speed_of(s: Structure, u: Floats, place: int) -> float:
-    """Speed of an argument."""
-    freedom = s.arguments[place]
-    return u[freedom] if freedom >= 0 else 0.0
+def product(size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int) -> float:
+    """Product of powers of all arguments; the powers of arguments `one` and `two` (-1 for none) are one less."""
+    total = 1.0
+    for place in range(size):
+        power = int(powers[place]) - (1 if place == one else 0) - (1 if place == two else 0)
+        total *= (y[arguments[place]] if arguments[place] >= 0 else constants[place]) ** power
+    return total

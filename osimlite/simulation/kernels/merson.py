@@ -8,12 +8,23 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
-import numpy as np
-
 from osimlite.simulation.integrators import next_step_size
-from osimlite.simulation.kernels.arrays import Floats, Ints, Numbers, Structure, Work, numbers_of, work_for
-from osimlite.simulation.kernels.dynamics import contacts_at, evaluate, station
-from osimlite.simulation.kernels.motion import FINE, SINGULAR_MASS, place
+from osimlite.simulation.kernels.layout import (
+    CONTACT_WORK,
+    CONTACTS,
+    FINE,
+    FREEDOMS,
+    LAWS,
+    PLACED,
+    SINGULAR_MASS,
+    TIME,
+    TOUCHED,
+    WHOLE,
+    WORK_CONTACT,
+    WORK_STATE,
+)
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.points import station
 
 DONE, FAILED, FULL, STOPPED, TOO_MANY = 0, 1, 2, 3, 4
 """How a run ends: at its limit, at a state beyond which there is no step, with a full log, at an event that stops it,
@@ -28,31 +39,31 @@ TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS = 0, 1, 2, 3, 4, 5
 COORDINATE, HEIGHT, TOUCH = 0, 1, 2
 """Kinds of watches: on the value of a coordinate, on how far a point lies along a direction, on a contact."""
 
+STATES = 9
+"""Room for so many states that a run needs at WORK_STATE, and two numbers for each contact and watch after them."""
 
-class Control(NamedTuple):
-    """How to run.
+LIMIT, ACCURACY, LARGEST_STEP, SMALLEST_STEP = 0, 1, 2, 3
+"""Places of the settings: last time (s), and as `RungeKuttaMerson` has them."""
 
-    Attributes:
-        limit: last time, s.
-        accuracy: as of `RungeKuttaMerson`, like the next four.
-        most_tries: steps that may be tried.
-    """
-
-    limit: float
-    accuracy: float
-    maximum_step: float
-    minimum_step: float
-    count_q: int
-    count_u: int
-    most_tries: int
+COUNT_Q, COUNT_U, MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5, 6, 7
+"""Places of the sizes: as `RungeKuttaMerson` has the first two, steps that may be tried, how many rows there are and
+how long the row of an event is."""
 
 
-class Records(NamedTuple):
-    """What a run writes down; any of these may have no rows.
+class Motion(NamedTuple):
+    """What a run works on and writes down; any of the records may have no rows.
 
     Attributes:
+        s: the mechanism.
+        x: its numbers.
+        w: room.
+        sizes: see COUNT_Q.
+        settings: see LIMIT.
+        clock: time and next step to try, s; changed.
+        counts: steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room
+            for them are counted only.
         times: of the reports, s (r,).
-        states: at these times (r, 2n).
+        reports: states at these times (r, 2n).
         log: of each step the time, y, f (k, 1 + 4n).
         forces: of each step the force on surface 2 of each pair (k, P, 3).
         events: time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if
@@ -63,8 +74,15 @@ class Records(NamedTuple):
         levels: of each watch the station in the link, the direction in ground, and the level (w, 7).
     """
 
+    s: Ints
+    x: Floats
+    w: Floats
+    sizes: Ints
+    settings: Floats
+    clock: Floats
+    counts: Ints
     times: Floats
-    states: Floats
+    reports: Floats
     log: Floats
     forces: Floats
     events: Floats
@@ -73,156 +91,191 @@ class Records(NamedTuple):
     levels: Floats
 
 
-def run(
-    s: Structure, vector: Floats, clock: Floats, counts: Ints, y: Floats, control: Control, records: Records
+def run_several(
+    s: Ints,
+    x: Floats,
+    w: Floats,
+    each: int,
+    sizes: Ints,
+    settings: Floats,
+    clocks: Floats,
+    counts: Ints,
+    states: Floats,
+    times: Floats,
+    reports: Floats,
+    log: Floats,
+    forces: Floats,
+    events: Floats,
+    peaks: Floats,
+    watches: Ints,
+    levels: Floats,
+    endings: Ints,
+    first: int,
+    last: int,
 ) -> int:
-    """Go on from the state y until something ends the run.
+    """The runs `first` to `last` - 1, each on its own rows.
 
-    Args:
-        s: the mechanism.
-        vector: its numbers.
-        clock: time and next step to try, s; changed.
-        counts: steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room
-            for them are counted only.
-        y: the state (2n,); changed.
-        control: how.
-        records: what to write down.
+    Args: as of `Motion`, one row for each run; a log, `w` and what tells how to run serve them all. `each` is the
+    length of a row of numbers, 0 if one serves them all.
     """
-    x, w, n = numbers_of(s, vector), work_for(s), len(s.above)
-    size = 2 * n
-    y0, f0, y1, f1 = y.copy(), np.zeros(size), np.zeros(size), np.zeros(size)
-    stages = np.zeros((5, size))
-    pairs, watching = len(s.pair_kind), len(records.watches)
-    before, after = np.zeros(pairs + watching), np.zeros(pairs + watching)
-    status = evaluate(s, x, w, y0, f0)
+    size, pairs = 2 * s[FREEDOMS], s[CONTACTS]
+    for k in range(first, last):
+        m = Motion(
+            s,
+            at(x, each * k),
+            w,
+            sizes,
+            settings,
+            at(clocks, 2 * k),
+            at(counts, 6 * k),
+            times,
+            at(reports, k * sizes[TIMES] * size),
+            log,
+            forces,
+            at(events, sizes[EVENT] * k * sizes[MOST_EVENTS]),
+            at(peaks, 2 * k * pairs),
+            watches,
+            levels,
+        )
+        endings[k] = run(m, at(states, k * size))
+    return FINE
+
+
+def evaluated(m: Motion, t: float, y: Floats, f: Floats, how_far: int) -> int:
+    """Evaluate at a time."""
+    m.w[TIME] = t
+    return call(m.s[LAWS], m.s, m.x, m.w, y, f, how_far)
+
+
+def run(m: Motion, y: Floats) -> int:
+    """Go on from the state y, which is changed, until something ends the run."""
+    s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
+    size = 2 * s[FREEDOMS]
+    room = at(m.w, s[WORK_STATE])
+    y0, f0, y1, f1 = room, at(room, size), at(room, 2 * size), at(room, 3 * size)
+    before = at(room, STATES * size)
+    after = at(before, s[CONTACTS] + sizes[WATCHES])
+    limit = m.settings[LIMIT]
+    copy(size, y, y0)
+    status = evaluated(m, clock[0], y0, f0, WHOLE)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
         counts[EVALUATIONS] = 1
-    if status != FINE or not is_finite(f0):
+    if status != FINE or not is_finite(size, f0):
         return FAILED
-    levels_at(s, x, w, y0, records, before)
-    note_peaks(w, records, clock[0])
-    while counts[REPORTED] < len(records.times) and records.times[counts[REPORTED]] <= clock[0]:
-        records.states[counts[REPORTED]] = y0
+    levels_at(m, y0, before)
+    note_peaks(m, clock[0])
+    while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= clock[0]:
+        copy(size, y0, at(m.reports, size * counts[REPORTED]))
         counts[REPORTED] += 1
-    while clock[0] < control.limit:
-        if 0 < len(records.log) == counts[LOGGED]:
+    while clock[0] < limit:
+        if sizes[MOST_LOGGED] > 0 and sizes[MOST_LOGGED] == counts[LOGGED]:
             return FULL
         t0 = clock[0]
-        t1 = step(s, x, w, t0, y0, f0, y1, stages, clock, counts, control)
+        t1 = step(m, t0, y0, f0, y1)
         if t1 <= t0:
             return FAILED if t1 < t0 else TOO_MANY
         counts[EVALUATIONS] += 1
-        if evaluate(s, x, w, y1, f1) != FINE or not is_finite(f1):
+        if evaluated(m, t1, y1, f1, WHOLE) != FINE or not is_finite(size, f1):
             return FAILED
         counts[TAKEN] += 1
         clock[0] = t1
-        note_peaks(w, records, t1)
-        if len(records.log) > 0:
-            note_step(w, records, counts[LOGGED], t1, y1, f1)
-            counts[LOGGED] += 1
+        note_peaks(m, t1)
+        if sizes[MOST_LOGGED] > 0:
+            note_step(m, t1, y1, f1)
         end, stopped = t1, False
-        if len(records.events) > 0 or watching > 0:
-            levels_at(s, x, w, y1, records, after)
-            end = note_events(s, x, w, t0, y0, f0, t1, y1, f1, before, after, stages, counts, records)
+        if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
+            levels_at(m, y1, after)
+            end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1
             end = min(end, t1)
-            before[:] = after
-        while counts[REPORTED] < len(records.times) and records.times[counts[REPORTED]] <= end:
-            report = counts[REPORTED]
-            if records.times[report] == t1:
-                records.states[report] = y1
+            copy(s[CONTACTS] + sizes[WATCHES], after, before)
+        while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
+            t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
+            if t == t1:
+                copy(size, y1, report)
             else:
-                cubic(t0, y0, f0, t1, y1, f1, records.times[report], records.states[report])
+                cubic(size, t0, y0, f0, t1, y1, f1, t, report)
             counts[REPORTED] += 1
         if stopped:
             if end < t1:
-                cubic(t0, y0, f0, t1, y1, f1, end, y)
+                cubic(size, t0, y0, f0, t1, y1, f1, end, y)
             else:
-                y[:] = y1
+                copy(size, y1, y)
             clock[0] = end
             return STOPPED
         y0, y1 = y1, y0
         f0, f1 = f1, f0
-        y[:] = y0
+        copy(size, y0, y)
     return DONE
 
 
-def step(
-    s: Structure,
-    x: Numbers,
-    w: Work,
-    t0: float,
-    y0: Floats,
-    f0: Floats,
-    y1: Floats,
-    stages: Floats,
-    clock: Floats,
-    counts: Ints,
-    control: Control,
-) -> float:
+def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
-    n = len(s.above)
-    smallest = max(control.minimum_step, 4.0 * 2.0**-52 * max(1.0, abs(t0)))
+    counts, clock, settings, sizes, n = m.counts, m.clock, m.settings, m.sizes, m.s[FREEDOMS]
+    companion = at(m.w, m.s[WORK_STATE] + 8 * 2 * n)
+    limit, accuracy = settings[LIMIT], settings[ACCURACY]
+    smallest = max(settings[SMALLEST_STEP], 4.0 * 2.0**-52 * max(1.0, abs(t0)))
     while True:
-        if counts[ATTEMPTED] >= control.most_tries:
+        if counts[ATTEMPTED] >= sizes[MOST_TRIES]:
             return t0
-        h = clock[1]
+        h = float(clock[1])
         # A step that all but reaches the limit goes there. One cut much shorter tells nothing about the next.
-        t1 = control.limit if control.limit <= t0 + 1.001 * h else t0 + h
-        cut = control.limit < t0 + 0.95 * h
+        t1 = limit if limit <= t0 + 1.001 * h else t0 + h
+        cut = limit < t0 + 0.95 * h
         counts[ATTEMPTED] += 1
         counts[EVALUATIONS] += 4
-        status = merson(s, x, w, t1 - t0, y0, f0, y1, stages)
+        status = merson(m, t0, t1, y0, f0, y1)
         if status == SINGULAR_MASS:
             return t0 - 1.0
-        error = norm(n, y0, y1, stages[4], control) if status == FINE else inf
-        clock[1] = min(next_step_size(h, error, control.accuracy, cut), control.maximum_step)
-        if error <= control.accuracy:
+        error = norm(n, y0, y1, companion, sizes[COUNT_Q], sizes[COUNT_U]) if status == FINE else inf
+        clock[1] = min(next_step_size(h, error, accuracy, cut), settings[LARGEST_STEP])
+        if error <= accuracy:
             return t1
         if h <= smallest:
             return t0 - 1.0
         clock[1] = max(clock[1], smallest)
 
 
-def merson(s: Structure, x: Numbers, w: Work, h: float, y0: Floats, f0: Floats, y1: Floats, stages: Floats) -> int:
-    """One step of Merson's method; the companion of y1 is the last stage."""
-    ya, fa, fb, fc, companion = stages[0], stages[1], stages[2], stages[3], stages[4]
-    size = len(y0)
-    c = h / 3.0
-    for k in range(size):
-        ya[k] = y0[k] + c * f0[k]
-    status = attempt(s, x, w, ya, fa)
-    if status != FINE:
-        return status
-    c = h / 6.0
-    for k in range(size):
-        ya[k] = y0[k] + c * (f0[k] + fa[k])
-    status = attempt(s, x, w, ya, fb)
-    if status != FINE:
-        return status
-    c = h / 8.0
-    for k in range(size):
-        ya[k] = y0[k] + c * (f0[k] + 3.0 * fb[k])
-    status = attempt(s, x, w, ya, fc)
-    if status != FINE:
-        return status
-    c = h / 2.0
-    for k in range(size):
-        companion[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
-    status = attempt(s, x, w, companion, fa)
+def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) -> int:
+    """One step of Merson's method; the companion of y1 is the last of the stages."""
+    size = 2 * m.s[FREEDOMS]
+    room = at(m.w, m.s[WORK_STATE] + 4 * size)
+    ya, fa, fb, fc, companion = room, at(room, size), at(room, 2 * size), at(room, 3 * size), at(room, 4 * size)
+    h = t1 - t0
+    status = FINE
+    for stage in range(4):
+        # Where the next evaluation is to be.
+        y, f, t = ya, fa, t1
+        if stage == 0:
+            c = h / 3.0
+            t = t0 + c
+            for k in range(size):
+                ya[k] = y0[k] + c * f0[k]
+        elif stage == 1:
+            c, f, t = h / 6.0, fb, t0 + h / 3.0
+            for k in range(size):
+                ya[k] = y0[k] + c * (f0[k] + fa[k])
+        elif stage == 2:
+            c, f, t = h / 8.0, fc, t0 + h / 2.0
+            for k in range(size):
+                ya[k] = y0[k] + c * (f0[k] + 3.0 * fb[k])
+        else:
+            c, y = h / 2.0, companion
+            for k in range(size):
+                companion[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
+        status = evaluated(m, t, y, f, WHOLE)
+        if status != FINE and stage < 3:
+            break
+    if status == SINGULAR_MASS and not is_finite(size, companion if stage == 3 else ya):
+        # A state that is not finite only makes the step smaller.
+        status = -1
     c = h / 6.0
     for k in range(size):
         y1[k] = y0[k] + c * (f0[k] + 4.0 * fc[k] + fa[k])
     return status
 
 
-def attempt(s: Structure, x: Numbers, w: Work, y: Floats, f: Floats) -> int:
-    """Evaluate within a step, where a state that is not finite only makes the step smaller."""
-    status = evaluate(s, x, w, y, f)
-    return -1 if status == SINGULAR_MASS and not is_finite(y) else status
-
-
-def norm(n: int, y0: Floats, y1: Floats, companion: Floats, control: Control) -> float:
+def norm(n: int, y0: Floats, y1: Floats, companion: Floats, count_q: int, count_u: int) -> float:
     """Larger of two root mean squares: errors of q as they are, of u relative to u at the start where |u| > 1."""
     of_q = of_u = 0.0
     for k in range(n):
@@ -232,20 +285,26 @@ def norm(n: int, y0: Floats, y1: Floats, companion: Floats, control: Control) ->
         size = abs(y0[k])
         weighted = (1.0 / size if size > 1.0 else 1.0) * (0.2 * (y1[k] - companion[k]))
         of_u += weighted * weighted
-    of_q /= max(control.count_q, 1)
-    of_u /= max(control.count_u, 1)
+    of_q /= max(count_q, 1)
+    of_u /= max(count_u, 1)
     return sqrt(max(of_q, of_u)) if isfinite(of_q + of_u) else inf
 
 
-def is_finite(values: Floats) -> bool:
+def copy(count: int, values: Floats, to: Floats) -> None:
+    """Copy numbers."""
+    for k in range(count):
+        to[k] = values[k]
+
+
+def is_finite(count: int, values: Floats) -> bool:
     """Whether all are."""
     total = 0.0
-    for value in values:
-        total += value
+    for k in range(count):
+        total += values[k]
     return total - total == 0.0
 
 
-def cubic(t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats) -> None:
+def cubic(size: int, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats) -> None:
     """State y at a time within a step, on the cubic Hermite polynomial through its ends."""
     h = t1 - t0
     z = (t - t0) / h
@@ -254,52 +313,50 @@ def cubic(t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, 
     c = h * z * (z - 1.0)
     c1 = c * z
     c0 = c1 - c
-    for k in range(len(y)):
+    for k in range(size):
         y[k] = b0 * y0[k] + b1 * y1[k] + c0 * f0[k] + c1 * f1[k]
 
 
-def note_peaks(w: Work, records: Records, t: float) -> None:
+def note_peaks(m: Motion, t: float) -> None:
     """Keep the largest forces."""
-    for pair in range(len(records.peaks)):
-        c = w.contacts[pair]
+    for pair in range(m.s[CONTACTS]):
+        c, peak = at(m.w, m.s[WORK_CONTACT] + CONTACT_WORK * pair), at(m.peaks, 2 * pair)
         size = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
-        if size > records.peaks[pair, 0]:
-            records.peaks[pair, 0], records.peaks[pair, 1] = size, t
+        if size > peak[0]:
+            peak[0], peak[1] = size, t
 
 
-def note_step(w: Work, records: Records, row: int, t: float, y: Floats, f: Floats) -> None:
+def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     """Write a step into the log."""
-    size = len(y)
-    log = records.log[row]
+    size, row = 2 * m.s[FREEDOMS], m.counts[LOGGED]
+    log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
-    for k in range(size):
-        log[1 + k], log[1 + size + k] = y[k], f[k]
-    for pair in range(len(w.contacts)):
-        for k in range(3):
-            records.forces[row, pair, k] = w.contacts[pair, k]
+    copy(size, y, at(log, 1))
+    copy(size, f, at(log, 1 + size))
+    for pair in range(m.s[CONTACTS]):
+        copy(3, at(m.w, m.s[WORK_CONTACT] + CONTACT_WORK * pair), at(m.forces, 3 * (m.s[CONTACTS] * row + pair)))
+    m.counts[LOGGED] += 1
 
 
-def levels_at(s: Structure, x: Numbers, w: Work, y: Floats, records: Records, levels: Floats) -> None:
+def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
     """Fill levels: of each contact 1 if it pushes, else -1; of each watch how far it is above its level."""
-    pairs = len(w.contacts)
+    pairs = m.s[CONTACTS]
     for pair in range(pairs):
-        c = w.contacts[pair]
+        c = at(m.w, m.s[WORK_CONTACT] + CONTACT_WORK * pair)
         levels[pair] = 1.0 if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0 else -1.0
-    for number in range(len(records.watches)):
-        kind, index, a = records.watches[number, 0], records.watches[number, 1], records.levels[number]
-        if kind == COORDINATE:
-            levels[pairs + number] = y[index] - a[6]
-        elif kind == TOUCH:
-            levels[pairs + number] = levels[index]
+    for number in range(m.sizes[WATCHES]):
+        watch, a = at(m.watches, 3 * number), at(m.levels, 7 * number)
+        if watch[0] == COORDINATE:
+            levels[pairs + number] = y[watch[1]] - a[6]
+        elif watch[0] == TOUCH:
+            levels[pairs + number] = levels[watch[1]]
         else:
-            px, py, pz = station(w, index, a[0], a[1], a[2])
+            px, py, pz = station(m.s, m.w, watch[1], a[0], a[1], a[2])
             levels[pairs + number] = px * a[3] + py * a[4] + pz * a[5] - a[6]
 
 
 def note_events(
-    s: Structure,
-    x: Numbers,
-    w: Work,
+    m: Motion,
     t0: float,
     y0: Floats,
     f0: Floats,
@@ -308,83 +365,52 @@ def note_events(
     f1: Floats,
     before: Floats,
     after: Floats,
-    stages: Floats,
-    counts: Ints,
-    records: Records,
 ) -> float:
     """Write down what began and ended within a step; returns the time at which the run is to stop, or infinity."""
-    stop, first, pairs = inf, counts[EVENTS], len(w.contacts)
-    found = np.zeros(len(before))
-    for number in range(len(before)):
+    counts, events = m.counts, m.events
+    size, pairs = 2 * m.s[FREEDOMS], m.s[CONTACTS]
+    stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
+    ya = at(m.w, m.s[WORK_STATE] + 4 * size)
+    fa, found = at(ya, size), at(after, total)
+    for number in range(total):
         rises = after[number] > 0.0
         if rises == (before[number] > 0.0):
             continue
         low, high = t0, t1
         while high - low > TIME_OF_EVENT:
             middle = 0.5 * (low + high)
-            cubic(t0, y0, f0, t1, y1, f1, middle, stages[0])
-            if number < pairs or records.watches[number - pairs, 0] == TOUCH:
-                contacts_at(s, x, w, stages[0], stages[1])
-            else:
-                place(s, x, w, stages[0][: len(s.above)])
-            levels_at(s, x, w, stages[0], records, found)
+            cubic(size, t0, y0, f0, t1, y1, f1, middle, ya)
+            touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
+            evaluated(m, middle, ya, fa, TOUCHED if touch else PLACED)
+            levels_at(m, ya, found)
             if (found[number] > 0.0) == rises:
                 high = middle
             else:
                 low = middle
         t = 0.5 * (low + high)
-        if number >= pairs and records.watches[number - pairs, 2] == (1 if rises else -1):
+        if number >= pairs and m.watches[3 * (number - pairs) + 2] == (1 if rises else -1):
             t = high
             stop = min(stop, t)
-        row = insert(records.events, first, counts, t, number, rises)
-        if row < len(records.events) and records.events.shape[1] > 3:
-            cubic(t0, y0, f0, t1, y1, f1, t, records.events[row, 3:])
+        row = insert(m, first, t, number, rises)
+        if row < m.sizes[MOST_EVENTS] and event > 3:
+            cubic(size, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
     # What lies behind the end of the run has not happened.
-    while counts[EVENTS] > first and counts[EVENTS] <= len(records.events):
-        if records.events[counts[EVENTS] - 1, 0] <= stop:
+    while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
+        if events[event * (counts[EVENTS] - 1)] <= stop:
             break
         counts[EVENTS] -= 1
     return stop
 
 
-def insert(events: Floats, first: int, counts: Ints, t: float, number: int, rises: bool) -> int:
+def insert(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
     """Put an event among those of its step, by time; returns its row, which may lie beyond the room."""
-    row = int(counts[EVENTS])
-    counts[EVENTS] += 1
-    if row >= len(events):
+    row, events, length = int(m.counts[EVENTS]), m.events, m.sizes[EVENT]
+    m.counts[EVENTS] += 1
+    if row >= m.sizes[MOST_EVENTS]:
         return row
-    while row > first and events[row - 1, 0] > t:
-        events[row] = events[row - 1]
+    while row > first and events[length * (row - 1)] > t:
+        copy(length, at(events, length * (row - 1)), at(events, length * row))
         row -= 1
-    events[row, 0], events[row, 1], events[row, 2] = t, number, 1.0 if rises else 0.0
+    event = at(events, length * row)
+    event[0], event[1], event[2] = t, number, 1.0 if rises else 0.0
     return row
-
-
-def run_several(
-    s: Structure,
-    vectors: Floats,
-    clocks: Floats,
-    counts: Ints,
-    states: Floats,
-    control: Control,
-    times: Floats,
-    reports: Floats,
-    events: Floats,
-    peaks: Floats,
-    watches: Ints,
-    levels: Floats,
-    logs: Floats,
-    forces: Floats,
-    endings: Ints,
-    first: int,
-    last: int,
-) -> None:
-    """The runs `first` to `last` - 1, each on its own rows; a single row of numbers or of a log serves them all.
-
-    Args: as of `run`, one row for each run.
-    """
-    for k in range(first, last):
-        log = k if len(logs) > 1 else 0
-        records = Records(times, reports[k], logs[log], forces[log], events[k], peaks[k], watches, levels)
-        vector = vectors[k] if len(vectors) > 1 else vectors[0]
-        endings[k] = run(s, vector, clocks[k], counts[k], states[k], control, records)

@@ -1,4 +1,4 @@
-"""From a mechanism and its forces to what the kernels work on."""
+"""From a mechanism and its forces to the vectors that the kernels work on."""
 
 from __future__ import annotations
 
@@ -14,22 +14,13 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
-from osimlite.simulation.contact_elements import HuntCrossley
-from osimlite.simulation.elements import CoordinateLimit, Forces
-from osimlite.simulation.kernels.arrays import (
-    BALL,
-    BALL_BACK,
-    HALF_SPACE,
-    MOVE,
-    NOTHING,
-    SHIFT,
-    SLIDE,
-    SPHERES,
-    TURN,
-    Numbers,
-    Structure,
-)
-from osimlite.simulation.kernels.functions import function_table
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.kernels import layout as at
+from osimlite.simulation.kernels.functions import MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
+from osimlite.simulation.kernels.items import Item, Placement, Places, items_of
+from osimlite.simulation.kernels.merson import STATES
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.table import LAW_NUMBERS
 
 
 @dataclass
@@ -37,14 +28,20 @@ class Packed:
     """A mechanism with its forces, packed.
 
     Attributes:
+        structure: the integers, with no addresses of laws in them.
+        numbers: the numbers.
+        laws: names of those that must be there.
         order: place in the mechanism of the coordinate of each degree of freedom.
-        placements: of every body its link (-1 for ground) and its frame (4, 4) in that.
+        placements: of every body its link (-1 for ground) and its frame in that.
+        items: of every force element what it became, with the places of their records in the work vector.
     """
 
-    structure: Structure
-    numbers: Numbers
+    structure: Ints
+    numbers: Floats
+    laws: tuple[str, ...]
     order: tuple[int, ...]
-    placements: list[tuple[int, Array]]
+    placements: list[Placement]
+    items: list[list[tuple[Item, int]]]
 
 
 @dataclass
@@ -72,14 +69,14 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         UnsupportedError: a joint, a function or a force that the kernels do not know.
     """
     links: list[_Link] = []
-    placements: list[tuple[int, Array]] = []
+    placements: list[Placement] = []
     for body in mechanism.bodies:
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
         operations, rest = _operations(mechanism, body.mobilizer, frame)
         if operations:
             links.append(_Link(parent, operations))
             parent = len(links) - 1
-        placements.append((parent, rest))
+        placements.append(Placement(parent, rest))
         if parent != GROUND:
             _load(links[parent], body.mass_properties, rest)
     order: list[int] = []
@@ -88,30 +85,9 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         own = {place for item in link.operations for place in item.arguments}
         order += sorted(place for place in own if not mechanism.coordinates[place].locked)
         ends.append(len(order))
-    freedom = {place: number for number, place in enumerate(order)}
-    structure, numbers = _arrays(mechanism, links, ends, freedom)
-    pairs = [_pairs(element, placements) for element in forces.elements if isinstance(element, HuntCrossley)]
-    limits = []
-    for element in forces.elements:
-        if isinstance(element, CoordinateLimit):
-            limits.append(element)
-        elif not isinstance(element, HuntCrossley):
-            raise UnsupportedError(
-                f"the compiled engine cannot compute '{element.path}' ({type(element).__name__}); "
-                "take --engine bullet, or leave the force out"
-            )
-    rows = [row for group in pairs for row in group]
-    limits = [item for item in limits if item.coordinate in freedom]
-    structure = structure._replace(
-        pair_kind=_ints([kind for kind, _, _ in rows]),
-        pair_links=_ints([ends for _, ends, _ in rows]).reshape(-1, 2),
-        limited=_ints([freedom[item.coordinate] for item in limits]),
-    )
-    numbers = numbers._replace(
-        pairs=np.array([row for _, _, row in rows], dtype=float).reshape(-1, 18),
-        limits=np.array([item.constants for item in limits], dtype=float).reshape(-1, 6),
-    )
-    return Packed(structure, numbers, tuple(order), placements)
+    places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
+    items = [items_of(element, places) for element in forces.elements]
+    return _Packer(places, links, ends, items).packed(tuple(order))
 
 
 def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tuple[list[_Operation], Array]:
@@ -134,7 +110,7 @@ def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tup
         elif isinstance(motion, AxisMotion):
             axis = -motion.axis if mobilizer.reversed else motion.axis
             turned = transform(_to_axis(axis))
-            kind = TURN if motion.kind == "rotate" else SLIDE
+            kind = at.TURN if motion.kind == "rotate" else at.SLIDE
             function = None if motion.function == IDENTITY else motion.function
             found.append(_Operation(kind, frame @ turned, places, function))
             frame = inverse(turned)
@@ -144,7 +120,7 @@ def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tup
                     f"'{mobilizer.joint}' ({mobilizer.joint_type}) has locked and free coordinates, which the "
                     "simulation cannot do; lock all of them or none"
                 )
-            kind = BALL_BACK if mobilizer.reversed else BALL
+            kind = at.BALL_BACK if mobilizer.reversed else at.BALL
             found.append(_Operation(kind, frame, places, radii=motion.radii))
             frame = np.eye(4)
         else:
@@ -188,87 +164,142 @@ def _inertia(link: _Link) -> list[float]:
     return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
 
-def _arrays(
-    mechanism: Mechanism, links: Sequence[_Link], ends: list[int], freedom: dict[int, int]
-) -> tuple[Structure, Numbers]:
-    """Everything but the forces."""
-    operations = [item for link in links for item in link.operations]
-    above, carrying = [-1] * len(freedom), [-1] * len(links)
-    for number, link in enumerate(links):
-        last = carrying[link.parent] if link.parent >= 0 else -1
-        for place in range(ends[number], ends[number + 1]):
-            above[place], last = last, place
-        carrying[number] = last
-    places = [place for item in operations for place in item.arguments]
-    tables = [
-        function_table(item.function, mechanism.coordinates[item.arguments[0]].joint)
-        for item in operations
-        if item.function is not None
-    ]
-    numbered = iter(range(len(tables)))
-    structure = Structure(
-        parent=_ints([link.parent for link in links]),
-        operations=_ints(np.cumsum([0, *(len(link.operations) for link in links)])),
-        freedoms=_ints(ends),
-        kind=_ints([item.kind for item in operations]),
-        before=_ints([_kind_of(item.before) for item in operations]),
-        function=_ints([-1 if item.function is None else next(numbered) for item in operations]),
-        first_argument=_ints(np.cumsum([0, *(len(item.arguments) for item in operations)])),
-        arguments=_ints([freedom.get(place, -1) for place in places]),
-        above=_ints(above),
-        function_kind=_ints([kind for kind, _ in tables]),
-        function_start=_ints(np.cumsum([0, *(len(table) for _, table in tables)])),
-        pair_kind=_ints([]),
-        pair_links=_ints([]).reshape(-1, 2),
-        limited=_ints([]),
-    )
-    fixed = [[*item.before[:3, :3].ravel().tolist(), *item.before[:3, 3].tolist()] for item in operations]
-    numbers = Numbers(
-        gravity=np.array(mechanism.gravity, dtype=float),
-        fixed=np.array(fixed, dtype=float).reshape(-1, 12),
-        radii=np.array([item.radii for item in operations], dtype=float).reshape(-1, 3),
-        inertia=np.array([_inertia(link) for link in links], dtype=float).reshape(-1, 10),
-        constants=np.array([mechanism.coordinates[place].default_value for place in places], dtype=float),
-        table=np.array([x for _, table in tables for x in table], dtype=float),
-        pairs=np.zeros((0, 18)),
-        limits=np.zeros((0, 6)),
-    )
-    return structure, numbers
+class _Packer:
+    """Puts everything at its place in the vectors."""
+
+    def __init__(self, places: Places, links: list[_Link], ends: list[int], items: list[list[Item]]) -> None:
+        self.places = places
+        self.links = links
+        self.ends = ends
+        self.items = items
+        self.operations = [operation for link in links for operation in link.operations]
+        self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
+        self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
+        self.work = at.WORK_HEAD
+        self.laws: list[str] = ["evaluate"]
+
+    def packed(self, order: tuple[int, ...]) -> Packed:
+        """Everything."""
+        ints, size = self.ints, len(order)
+        for link in self.links:
+            self.numbers += _inertia(link)
+        ints[at.FIXED_AT] = len(self.numbers)
+        for operation in self.operations:
+            self.numbers += [*operation.before[:3, :3].ravel().tolist(), *operation.before[:3, 3].tolist()]
+        ints[at.LINKS], ints[at.FREEDOMS] = len(self.links), size
+        ints[at.WORK_LINK] = self.room(at.LINK_WORK * len(self.links))
+        ints[at.WORK_OPERATION] = self.room(at.OPERATION_WORK * len(self.operations))
+        ints[at.WORK_COLUMN], ints[at.WORK_PIVOT] = self.room(6 * size), self.room(size)
+        above = self.link_records()
+        self.freedom_records(above)
+        self.operation_records()
+        found = self.item_records()
+        ints[at.WORK_STATE] = self.room(2 * size * STATES)
+        ints[at.WORK_SIZE] = self.work
+        structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
+        laws = tuple(dict.fromkeys(self.laws))
+        return Packed(structure, numbers, laws, order, self.places.placements, found)
+
+    def room(self, count: int) -> int:
+        """Place of some more numbers in the work vector."""
+        self.work += count
+        return self.work - count
+
+    def law(self, name: str) -> int:
+        """Number of a law, which must then be there."""
+        self.laws.append(name)
+        return LAW_NUMBERS[name]
+
+    def link_records(self) -> list[int]:
+        """Write the links; returns the degree of freedom above each."""
+        self.ints[at.LINK_AT] = len(self.ints)
+        above, carrying, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
+        for number, link in enumerate(self.links):
+            first, end = self.ends[number], self.ends[number + 1]
+            self.ints += [link.parent, operation, operation + len(link.operations), first, end]
+            operation += len(link.operations)
+            last = carrying[link.parent] if link.parent >= 0 else -1
+            for freedom in range(first, end):
+                above[freedom], last = last, freedom
+            carrying[number] = last
+        return above
+
+    def freedom_records(self, above: Sequence[int]) -> None:
+        """Write the degrees of freedom, and the list of those whose columns are sums."""
+        self.ints[at.FREEDOM_AT] = len(self.ints)
+        depths: list[int] = []
+        for freedom in above:
+            depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
+            self.ints += [freedom, self.room(depths[-1] + 1), depths[-1]]
+        self.ints[at.SUMMED_AT] = len(self.ints)
+        summed = [number for number in range(len(above)) if not self.is_alone(number)]
+        self.ints[at.SUMMED] = len(summed)
+        self.ints += summed
+
+    def is_alone(self, freedom: int) -> bool:
+        """Whether a degree of freedom is the amount of one operation, and nothing else."""
+        users = [item for item in self.operations if freedom in map(self.places.freedom, item.arguments)]
+        return len(users) == 1 and users[0].function is None and users[0].kind in (at.TURN, at.SLIDE)
+
+    def operation_records(self) -> None:
+        """Write the operations, and what their functions need."""
+        start = self.ints[at.OPERATION_AT] = len(self.ints)
+        self.ints += [0] * (at.OPERATION_INTS * len(self.operations))
+        for number, item in enumerate(self.operations):
+            freedom, law, gradient = -1, at.ALONE, 0
+            extra = len(self.numbers)
+            freedoms = [self.places.freedom(place) for place in item.arguments]
+            if item.kind in (at.BALL, at.BALL_BACK):
+                law = self.law("place_ball")
+                self.law("move_ball")
+                self.numbers += item.radii.tolist()
+            elif item.function is None:
+                freedom = freedoms[0]
+                law = at.ALONE if self.is_alone(freedom) else at.TOGETHER
+            else:
+                infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
+                table = function_table(item.function, f"the function of an axis of the joint '{infos[0].joint}'")
+                several = table[0] in (MONOMIALS, MONOMIALS_OF_OPENSIM)
+                law = self.law("amount_by_several" if several else "amount_by_one")
+                self.numbers += [*(info.default_value for info in infos), *table]
+                gradient = self.room(len(freedoms))
+            arguments = len(self.ints)
+            self.ints += freedoms
+            record = [item.kind, _kind_of(item.before), freedom, law, arguments, len(freedoms), extra, gradient]
+            self.ints[start + at.OPERATION_INTS * number : start + at.OPERATION_INTS * (number + 1)] = record
+
+    def item_records(self) -> list[list[tuple[Item, int]]]:
+        """Write the items; the records of the contacts come first, in their order."""
+        flat = [item for group in self.items for item in group]
+        self.ints[at.CONTACTS] = sum(item.is_contact for item in flat)
+        contact = self.ints[at.WORK_CONTACT] = self.room(at.CONTACT_WORK * self.ints[at.CONTACTS])
+        records: list[int] = []
+        pairs: list[int] = []
+        found: list[list[tuple[Item, int]]] = []
+        for group in self.items:
+            found.append([])
+            first = contact
+            for item in group:
+                place = self.room(item.room) if item.room else first
+                if item.is_contact:
+                    place = contact
+                    contact += at.CONTACT_WORK
+                found[-1].append((item, place))
+                if item.law is not None:
+                    (pairs if item.is_part else records).append(len(self.ints))
+                    if item.is_contact and not item.is_part:
+                        pairs.append(len(self.ints))
+                    law = self.law(item.law) if item.law not in at.WITHIN else at.WITHIN[item.law]
+                    self.ints += [law, len(self.numbers), place, *item.ints]
+                    self.numbers += item.numbers
+        self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)
+        self.ints += records
+        self.ints[at.CONTACT_AT] = len(self.ints)
+        self.ints += pairs
+        return found
 
 
 def _kind_of(matrix: Array) -> int:
     if not np.array_equal(matrix[:3, :3], np.eye(3)):
-        return MOVE
-    return SHIFT if matrix[:3, 3].any() else NOTHING
-
-
-def _pairs(
-    element: HuntCrossley, placements: Sequence[tuple[int, Array]]
-) -> list[tuple[int, tuple[int, int], list[float]]]:
-    """Kind, links and numbers of every pair of surfaces."""
-    if element.early_return:
-        raise UnsupportedError(
-            f"the compiled engine does not reproduce Simbody's early return in '{element.path}'; take --engine bullet"
-        )
-    found = []
-    for pair in element.pairs:
-        one, two = element.surfaces[pair.first], element.surfaces[pair.second]
-        row: list[float] = []
-        links = []
-        for surface in (one, two):
-            link, frame = placements[surface.body] if surface.body != GROUND else (GROUND, np.eye(4))
-            links.append(link)
-            center = frame[:3, :3] @ np.array(surface.center) + frame[:3, 3]
-            normal = frame[:3, :3] @ np.array(surface.normal)
-            row += center.tolist()
-            if surface is one:
-                row += [*normal.tolist(), 0.0 if surface.is_half_space else surface.radius]
-            else:
-                row.append(surface.radius)
-        row += [*pair.effective, element.vt]
-        found.append((HALF_SPACE if one.is_half_space else SPHERES, (links[0], links[1]), row))
-    return found
-
-
-def _ints(values: Any) -> Any:
-    return np.array(values, dtype=np.int64)
+        return at.MOVE
+    return at.SHIFT if matrix[:3, 3].any() else at.NOTHING

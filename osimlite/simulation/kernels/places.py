@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from osimlite.simulation.kernels.arrays import Floats, Ints, Structure, numbers_of, work_for
-from osimlite.simulation.kernels.dynamics import direction, station
-from osimlite.simulation.kernels.motion import place
+from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, FINE, FREEDOMS, LAWS, NUMBERS, OWN, PLACED
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.points import direction, station
 
 
-def contact_places(s: Structure, vectors: Floats, rows: Ints, states: Floats, places: Floats) -> None:
+def contact_places(
+    s: Ints, vectors: Floats, w: Floats, each: int, rows: Ints, states: Floats, room: Floats, places: Floats, count: int
+) -> int:
     """Centres of the surfaces of all contacts at many states.
 
     Args:
         s: the mechanism.
-        vectors: its numbers, one row or several (v, m).
+        vectors: its numbers, one row or several.
+        w: room for an evaluation.
+        each: length of a row of numbers.
         rows: which of them each state goes with (k,).
         states: (k, 2n).
+        room: for a derivative (2n,).
         places: filled with the centre of surface 1, its normal, and the centre of surface 2, in ground (k, P, 9).
+        count: k.
     """
-    w, n = work_for(s), len(s.above)
-    for k in range(len(states)):
-        x = numbers_of(s, vectors[rows[k]])
-        place(s, x, w, states[k, :n])
-        for pair in range(len(s.pair_kind)):
-            a, to = x.pairs[pair], places[k, pair]
-            one, two = s.pair_links[pair, 0], s.pair_links[pair, 1]
-            to[0], to[1], to[2] = station(w, one, a[0], a[1], a[2])
-            to[3], to[4], to[5] = direction(w, one, a[3], a[4], a[5])
-            to[6], to[7], to[8] = station(w, two, a[7], a[8], a[9])
+    pairs, size = s[CONTACTS], 2 * s[FREEDOMS]
+    for k in range(count):
+        x = at(vectors, each * rows[k])
+        call(s[LAWS], s, x, w, at(states, size * k), room, PLACED)
+        for pair in range(pairs):
+            i, to = at(s, s[s[CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
+            a, one, two = at(x, i[NUMBERS]), i[OWN], i[OWN + 1]
+            to[0], to[1], to[2] = station(s, w, one, a[0], a[1], a[2])
+            to[3], to[4], to[5] = direction(s, w, one, a[3], a[4], a[5])
+            to[6], to[7], to[8] = station(s, w, two, a[7], a[8], a[9])
+    return FINE

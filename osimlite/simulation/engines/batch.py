@@ -1,0 +1,117 @@
+"""Several motions of the compiled engine: the arrays that they read and write, and the call that computes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.simulation.engines.machine_code import entry_point
+from osimlite.simulation.integrators import INITIAL_STEP
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.pointers import Floats, Ints
+
+if TYPE_CHECKING:
+    from osimlite.simulation.engines.compiled import CompiledEngine
+
+NO_LIMIT = 2**62
+
+NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
+
+
+class Batch:
+    """Runs that differ in their starts or in their numbers.
+
+    Args:
+        engine: whose mechanism.
+        states: where the runs start (W, 2n).
+        to: when they end, s.
+        accuracy: of the integrator.
+        start: time from which they go on, s.
+        next_step: that is tried first, s.
+        vectors: numbers, one row for all or one for each run.
+        times: of the reports, s.
+        kinds: of the watches (k, 3).
+        levels: of the watches (k, 7).
+        most_events: room for the events of a run.
+        event_states: keep the states at the events.
+        most_tries: steps that a run may try.
+        most_logged: room for steps in the log, which all runs share.
+
+    Attributes:
+        clocks: time and next step of each run, s (W, 2).
+        counts: see :mod:`osimlite.simulation.kernels.merson` (W, 6).
+        states: at the end (W, 2n).
+        endings: of the runs (W,).
+        reports: states at the times (W, r, 2n), not a number after the end of a run.
+        events: time, number, 1 for a beginning, and the state if it is kept (W, e, 3 or 3 + 2n).
+        peaks: largest force of each contact and its time (W, P, 2).
+        log: of each step time, state and derivative.
+        forces: of each step the force of each contact.
+    """
+
+    def __init__(
+        self,
+        engine: CompiledEngine,
+        states: ArrayLike,
+        to: float,
+        accuracy: float,
+        *,
+        start: float = 0.0,
+        next_step: float = INITIAL_STEP,
+        vectors: Floats | None = None,
+        times: Sequence[float] = (),
+        kinds: Ints = NO_KINDS,
+        levels: Floats = NO_LEVELS,
+        most_events: int = 0,
+        event_states: bool = False,
+        most_tries: int = NO_LIMIT,
+        most_logged: int = 0,
+    ) -> None:
+        self.states = np.array(states, dtype=np.float64, order="C")
+        count, size, pairs = len(self.states), 2 * len(engine.order), len(engine.contacts)
+        self._engine, self._kinds, self._levels = engine, kinds, levels
+        self._vectors = engine.numbers[None] if vectors is None else vectors
+        self._times = np.array(times, dtype=np.float64)
+        # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
+        coordinates = len(engine.mechanism.coordinates)
+        event = 3 + size * event_states
+        spare = sum(not body.mobilizer.speeds_are_rates for body in engine.mechanism.bodies)
+        sizes = (coordinates + spare, coordinates, most_tries, len(times), most_events, event, len(kinds), most_logged)
+        self._sizes, self._settings = np.array(sizes, dtype=np.int64), np.array((to, accuracy, inf, 0.0))
+        self.clocks = np.empty((count, 2))
+        self.clocks[:] = start, next_step
+        self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
+        self.reports = np.full((count, len(times), size), np.nan)
+        self.events, self.peaks = np.zeros((count, most_events, event)), np.zeros((count, pairs, 2))
+        self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
+        self._room = int(engine.structure[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
+
+    def run(self, first: int = 0, last: int | None = None) -> None:
+        """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
+        vectors, room = self._vectors, np.zeros(self._room)
+        entry_point("run_several")(
+            self._engine.program.ctypes.data,
+            vectors.ctypes.data,
+            room.ctypes.data,
+            vectors.shape[1] if len(vectors) > 1 else 0,
+            self._sizes.ctypes.data,
+            self._settings.ctypes.data,
+            self.clocks.ctypes.data,
+            self.counts.ctypes.data,
+            self.states.ctypes.data,
+            self._times.ctypes.data,
+            self.reports.ctypes.data,
+            self.log.ctypes.data,
+            self.forces.ctypes.data,
+            self.events.ctypes.data,
+            self.peaks.ctypes.data,
+            self._kinds.ctypes.data,
+            self._levels.ctypes.data,
+            self.endings.ctypes.data,
+            first,
+            len(self.states) if last is None else last,
+        )

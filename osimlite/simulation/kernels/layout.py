@@ -1,0 +1,95 @@
+"""What the kernels work on: three vectors.
+
+A mechanism is a tree of links. A link is one body, or several that never move in one another, and has its frame where
+the last motion of its joint ends. The way from the carrying link to it is a list of operations: each is a fixed
+transform and then one motion, along or about the z axis if it has an axis. The degrees of freedom are numbered in the
+order of the links, so that what carries stands before what is carried. Whatever pushes is an item.
+
+The integers s say what is connected to what, and where everything is in the other two; the numbers x hold masses,
+places, parameters of forces, in SI units; the work w is what an evaluation leaves behind. Models of one structure
+differ in x only. Spatial vectors stack the angular part over the linear part; velocities, accelerations, inertias and
+wrenches of a link are along the axes of ground and about an origin that stays in ground: the place of the first link of
+its tree, so that no digits are lost far away from ground's own origin.
+"""
+
+from __future__ import annotations
+
+# Integers: a head with counts and places, then records.
+LINKS, FREEDOMS, ITEMS, CONTACTS = 0, 1, 2, 3
+"""Counts."""
+LINK_AT, OPERATION_AT, FREEDOM_AT, ITEM_AT = 4, 5, 6, 7
+"""Places of the records in s; at ITEM_AT are the places of the items' records."""
+SUMMED, SUMMED_AT = 8, 9
+"""Count and place of a list of the degrees of freedom whose columns are sums of several."""
+FIXED_AT = 10
+"""Place in x of the fixed transforms of the operations, by rows and then the translation (K, 12)."""
+WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = 11, 12, 13, 14, 15, 16
+"""Places in w."""
+WORK_SIZE = 17
+"""Length of w."""
+CONTACT_AT = 18
+"""Where the places of the records of the pairs stand, by contact."""
+LAWS = 19
+"""From here on the addresses of the laws, by their number."""
+
+LINK_INTS = 5
+PARENT, FIRST_OPERATION, END_OPERATION, FIRST_FREEDOM, END_FREEDOM = 0, 1, 2, 3, 4
+"""Of a link; -1 is ground."""
+
+OPERATION_INTS = 8
+MOTION, BEFORE, FREEDOM, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT = 0, 1, 2, 3, 4, 5, 6, 7
+"""Of an operation: its motion, the kind of its fixed transform, the degree of freedom that is its amount or -1, the law
+that gives the amount otherwise or the motion of a ball; place and number of the arguments in s (degrees of freedom, -1
+for a number that does not change); place in x of the radii, or of the values of such arguments and the table of the
+function after them; place in w of the gradient."""
+
+ALONE, TOGETHER = -1, -2
+"""In the place of the law: the column of the degree of freedom comes from this operation only, or from several."""
+
+FREEDOM_INTS = 3
+ABOVE, ROW, DEPTH = 0, 1, 2
+"""Of a degree of freedom: the next one on the way to ground or -1, place in w of its row of the mass matrix, and how
+many there are on the way."""
+
+LAW, NUMBERS, RECORD, OWN = 0, 1, 2, 3
+"""Of an item: its law, places in x and w of what it owns there, and from OWN on integers of its own."""
+
+# Numbers.
+GRAVITY_AT, INERTIA_AT = 0, 3
+"""Gravity in ground (3,); of each link mass, mass centre in the link, xx, yy, zz, xy, xz, yz about it (L, 10)."""
+
+# Work.
+TIME, SCRATCH = 0, 1
+"""The time, s; room for what laws hand over."""
+WORK_HEAD = 32
+
+LINK_WORK = 44
+ROTATION, POSITION, ORIGIN, VELOCITY, ACCELERATION, INERTIA, WRENCH = 0, 9, 12, 15, 21, 27, 37
+"""Of a link: rotation in ground by rows, position of its origin, origin of the spatial vectors, velocity, acceleration
+while the derivatives of all speeds are zero (upwards against gravity); inertia (mass, first moment, xx, yy, zz, xy, xz,
+yz) and wrench of it, and of all that it carries too after the evaluation."""
+
+OPERATION_WORK = 16
+AXIS, POINT, AMOUNT, RATE, CURVATURE = 0, 9, 12, 13, 14
+"""Of an operation: the axis, or the frame by rows whose axes a ball's speeds are about; where that is; amount, rate and
+second derivative without udot, if a function gives them."""
+
+CONTACT_WORK = 8
+FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
+"""Of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without contact."""
+
+# Kinds.
+TURN, SLIDE, BALL, BALL_BACK = 0, 1, 2, 3
+"""Motions: about z, along z (those before BALL have one axis), a SphericalMotion, one that is passed from its end to its
+start."""
+NOTHING, SHIFT, MOVE = 0, 1, 2
+"""Fixed transforms: none, a translation, any."""
+HALF_SPACE, LIMIT = 0, 1
+"""Laws that the evaluation has within; the others are called by their address."""
+
+FINE, SINGULAR_MASS, SINGULAR_RATES = 0, 1, 2
+"""What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined."""
+WHOLE, PLACED, TOUCHED = 0, 1, 2
+"""How far an evaluation goes: to the end, to the places of the links, to the contacts."""
+WITHIN = {"touch_half_space": HALF_SPACE, "limit": LIMIT}
+"""Their numbers by name."""

@@ -1,0 +1,38 @@
+"""Which laws there are, and which kernels make what pushes out of which element.
+
+A law is compiled when the first model that has it is made ready, and kept; the evaluation calls it by its address. A
+new kind of force is a law in a module of its own, a line in each of the tables here, and a function that packs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+LAW_MODULES = {
+    "evaluate": "dynamics",
+    "run_several": "merson",
+    "contact_places": "places",
+    "place_ball": "balls",
+    "move_ball": "balls",
+    "amount_by_one": "functions",
+    "amount_by_several": "functions",
+    "touch_spheres": "contacts",
+}
+"""The module of each law. The first two are no items: their numbers are those of the laws within the evaluation."""
+
+LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
+"""Place of a law's address after `layout.LAWS`."""
+
+PACKERS = {
+    "HuntCrossley": ("pack_contacts", "pack_pairs"),
+    "CoordinateLimit": ("pack_contacts", "pack_limit"),
+}
+"""Module and function that pack each class of elements."""
+
+
+def law_function(name: str) -> Callable[..., Any]:
+    """The function of a law."""
+    function: Callable[..., Any] = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
+    return function
