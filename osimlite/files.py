@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from osimlite.errors import MissingFileError, OsimliteError
 
@@ -33,11 +35,18 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     Raises:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
+    with written_atomically(path) as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
+    """A stream whose content becomes a file when all is written; errors as those of :func:`write_atomically`."""
     # A link stays a link to the file that is written; a pipe or a device takes the text as it is.
     target = Path(os.path.realpath(path))
-    data = content.encode() if isinstance(content, str) else content
     if target.exists() and not target.is_file():
-        _write_into(target, data)
+        with _opened(target) as stream:
+            yield stream
         return
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
@@ -45,7 +54,7 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            yield stream
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
         Path(name).chmod(mode)
         Path(name).replace(target)
@@ -73,11 +82,13 @@ def make_folder(path: str | Path) -> Path:
     return folder
 
 
-def _write_into(target: Path, data: bytes) -> None:
+@contextmanager
+def _opened(target: Path) -> Iterator[BinaryIO]:
     if target.is_dir():
         raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(target))
     try:
-        target.write_bytes(data)
+        with target.open("wb") as stream:
+            yield stream
     except OSError as error:
         raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
 

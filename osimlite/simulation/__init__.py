@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.storage import StoTable as StoTable
     from osimlite.simulation.storage import read_sto as read_sto
     from osimlite.simulation.storage import write_sto as write_sto
+    from osimlite.simulation.table_stream import stream_table as stream_table
     from osimlite.simulation.trajectory import Trajectory as Trajectory
 
 _PUBLIC = {
@@ -19,6 +20,7 @@ _PUBLIC = {
     "StoTable": "storage",
     "read_sto": "storage",
     "write_sto": "storage",
+    "stream_table": "table_stream",
     "Trajectory": "trajectory",
 }
 

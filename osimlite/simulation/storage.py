@@ -1,17 +1,20 @@
-"""OpenSim's storage files (.sto): tables over time."""
+"""OpenSim's storage files (.sto, .mot): tables over time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import shutil
+import tempfile
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
-from osimlite.files import write_atomically
+from osimlite.errors import OsimliteError
+from osimlite.files import written_atomically
 from osimlite.multibody.spatial import Array
+from osimlite.simulation.table_stream import TableStream, suffixes
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +28,8 @@ class StoTable:
         rows: (n, m).
         in_degrees: whether rotational values are in degrees.
         header: every ``key=value`` line of the header.
+        kind: what the file holds; where it is not ``double``, a value has several columns.
+        file: where it was read from.
     """
 
     name: str
@@ -33,6 +38,8 @@ class StoTable:
     rows: Array
     in_degrees: bool = False
     header: dict[str, str] = field(default_factory=dict)
+    kind: str = "double"
+    file: str | None = None
 
     def __getitem__(self, column: str) -> Array:
         """The first column (n,) of a label; KeyError if there is none."""
@@ -51,18 +58,8 @@ def sto_text(
     in_degrees: bool = False,
 ) -> str:
     """Write a table as OpenSim 4.6 does, but with all digits of every number."""
-    lines = ["\t".join(map(_number, (t, *row))) for t, row in zip(times, rows, strict=True)]
-    header = [
-        name,
-        f"inDegrees={'yes' if in_degrees else 'no'}",
-        f"nColumns={len(columns) + 1}",
-        f"nRows={len(lines)}",
-        "DataType=double",
-        "version=3",
-        "endheader",
-        "\t".join(("time", *columns)),
-    ]
-    return "\n".join([*header, *lines]) + "\n"
+    lines = list(_lines(times, rows, 1))
+    return "".join([*_header(name, columns, len(lines), in_degrees, "double"), *lines])
 
 
 def write_sto(
@@ -73,68 +70,77 @@ def write_sto(
     rows: Iterable[Iterable[float]],
     *,
     in_degrees: bool = False,
+    kind: str = "double",
 ) -> None:
-    """Write a table to a file, whole or not at all.
+    """Write a table to a file, whole or not at all; the rows are taken one by one.
+
+    Args:
+        path: of the file.
+        name: first line of the file.
+        times: s.
+        columns: labels; for another kind than ``double`` one for each value.
+        rows: numbers, of one value after the other.
+        in_degrees: whether rotational values are in degrees.
+        kind: of the values: ``Vec3``, ``Quaternion`` and whatever else OpenSim knows.
 
     Raises:
         OsimliteError: the file cannot be written.
+        UnsupportedError: OpenSim does not know the kind.
     """
-    write_atomically(path, sto_text(name, times, columns, rows, in_degrees=in_degrees))
+    # How many rows there are stands before them.
+    with tempfile.TemporaryFile("w+b") as body:
+        count = 0
+        for line in _lines(times, rows, len(suffixes(kind))):
+            body.write(line.encode())
+            count += 1
+        body.seek(0)
+        with written_atomically(path) as stream:
+            stream.write("".join(_header(name, columns, count, in_degrees, kind)).encode())
+            shutil.copyfileobj(body, stream)
 
 
 def read_sto(path: str | Path) -> StoTable:
-    """Read a table of numbers, as OpenSim 4 or an older version wrote it.
+    """Read a table, as OpenSim 4 or an older version wrote it; errors as those of :class:`TableStream`."""
+    times, rows = array("d"), array("d")
+    with TableStream(path) as stream:
+        for time, row in stream:
+            times.append(time)
+            rows.extend(row)
+        return StoTable(
+            stream.name,
+            np.frombuffer(times) if times else np.zeros(0),
+            stream.columns,
+            np.frombuffer(rows).reshape(-1, len(stream.columns))
+            if rows
+            else np.zeros((len(times), len(stream.columns))),
+            stream.in_degrees,
+            stream.header,
+            stream.kind,
+            str(path),
+        )
 
-    Raises:
-        MissingFileError: there is no such file, or it may not be read.
-        DocumentError: it is not a storage file; the message names the line.
-        UnsupportedError: it holds something else than numbers.
-    """
-    try:
-        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise MissingFileError(f"cannot read the file: {error.strerror}", file=str(path)) from None
-    stripped = [line.strip().lower() for line in lines]
-    if "endheader" not in stripped:
-        raise DocumentError("this is no storage file: it has no line 'endheader'", file=str(path))
-    end = stripped.index("endheader")
-    header = dict(_pairs(lines[:end]))
-    kind = header.get("DataType", "double")
-    if kind.lower() != "double":
-        raise UnsupportedError(f"the table holds {kind}; osimlite reads tables of plain numbers", file=str(path))
-    start = next((place for place in range(end + 1, len(lines)) if stripped[place]), None)
-    if start is None:
-        raise DocumentError("the table ends before its column labels", file=str(path), line=len(lines))
-    labels = lines[start].strip().split("\t") if "\t" in lines[start].strip() else lines[start].split()
-    labels = [label.strip() for label in labels]
-    if labels[0].lower() != "time":
-        raise DocumentError(f"the first column is '{labels[0]}'; it must be 'time'", file=str(path), line=start + 1)
-    numbers = [_parsed(lines[place], len(labels), path, place + 1) for place in range(start + 1, len(lines))]
-    rows = np.array([row for row in numbers if row], dtype=float).reshape(-1, len(labels))
-    name = next((line.strip() for line in lines[:end] if line.strip() and "=" not in line), "")
-    degrees = header.get("inDegrees", "no").lower() in ("yes", "y", "true")
-    return StoTable(name, rows[:, 0], tuple(labels[1:]), rows[:, 1:], degrees, header)
+
+def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str) -> Iterator[str]:
+    yield f"{name}\n"
+    yield f"inDegrees={'yes' if in_degrees else 'no'}\n"
+    yield f"nColumns={len(columns) + 1}\n"
+    yield f"nRows={rows}\n"
+    yield f"DataType={kind}\n"
+    yield "version=3\nendheader\n"
+    yield "\t".join(("time", *columns)) + "\n"
+
+
+def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -> Iterator[str]:
+    """Lines of numbers, of which `size` make a value."""
+    for time, row in zip(times, rows, strict=True):
+        words = list(map(_number, row))
+        if size > 1:
+            if len(words) % size:
+                raise OsimliteError(f"a row has {len(words)} numbers, which makes no whole values of {size} each")
+            words = [",".join(words[start : start + size]) for start in range(0, len(words), size)]
+        yield "\t".join((_number(time), *words)) + "\n"
 
 
 def _number(value: float) -> str:
     text = repr(float(value))
     return text[:-2] if text.endswith(".0") else text
-
-
-def _pairs(lines: Iterable[str]) -> Iterable[tuple[str, str]]:
-    for line in lines:
-        key, equals, value = line.partition("=")
-        if equals:
-            yield key.strip(), value.strip()
-
-
-def _parsed(line: str, count: int, path: Any, number: int) -> list[float]:
-    words = line.split()
-    if not words:
-        return []
-    if len(words) != count:
-        raise DocumentError(f"the row has {len(words)} numbers and needs {count}", file=str(path), line=number)
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise DocumentError(f"the row has something that is no number: {error}", file=str(path), line=number) from None

@@ -1,0 +1,55 @@
+"""Storage files exchanged with a live OpenSim 4.6."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from osimlite.simulation import read_sto, write_sto
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+KINDS = {"double": ("", 1), "Vec3": ("Vec3", 3), "Quaternion": ("Quaternion", 4), "SpatialVec": ("SpatialVec", 6)}
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_opensim_reads_what_we_write_and_back(kind, tmp_path):
+    ending, size = KINDS[kind]
+    rng = np.random.default_rng(4)
+    rows = rng.normal(size=(5, 2 * size))
+    if kind == "Quaternion":
+        # OpenSim scales them to length 1.
+        halves = rows.reshape(5, 2, 4)
+        rows = (halves / np.linalg.norm(halves, axis=2, keepdims=True)).reshape(5, 8)
+    times = [0.1 * k for k in range(5)]
+    write_sto(tmp_path / "ours.sto", "t", times, ["a b", "c"], rows.tolist(), kind=kind)
+    theirs = getattr(opensim, f"TimeSeriesTable{ending}")(str(tmp_path / "ours.sto"))
+    assert tuple(theirs.getColumnLabels()) == ("a b", "c")
+    flat = theirs if size == 1 else theirs.flatten()
+    found = [flat.getRowAtIndex(row).to_numpy() for row in range(flat.getNumRows())]
+    assert np.abs(np.array(found) - rows).max() < 1e-15
+    adapter = getattr(opensim, f"STOFileAdapter{ending}")
+    adapter.write(theirs, str(tmp_path / "theirs.sto"))
+    table = read_sto(tmp_path / "theirs.sto")
+    assert (table.kind, len(table.columns)) == (kind, 2 * size)
+    assert table.times.tolist() == pytest.approx(times)
+    assert np.abs(table.rows - rows).max() < 1e-9
+
+
+OLD = "header\n{}\nnRows=2\nnColumns=3\n{}\nendheader\ntime\ta\tb\n0\t1\t2\n1\t3\t4\n"
+
+
+@pytest.mark.parametrize("suffix", [".sto", ".mot"])
+@pytest.mark.parametrize("version", ["version=1", "version=0", ""])
+@pytest.mark.parametrize("said", ["inDegrees=no", "inDegrees=yes", "Angles are in degrees.", ""])
+def test_degrees_of_older_files(suffix, version, said, tmp_path):
+    path = tmp_path / f"old{suffix}"
+    path.write_text(OLD.format(version, said))
+    opensim.Logger.setLevelString("off")
+    theirs = opensim.Storage(str(path))
+    ours = read_sto(path)
+    assert ours.in_degrees is theirs.isInDegrees()
+    assert ours.name == theirs.getName()
+    labels = theirs.getColumnLabels()
+    assert ours.columns == tuple(labels.get(k) for k in range(1, labels.getSize()))
