@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from osimlite.multibody.functions import Function
-from osimlite.multibody.kinematics import CoordinateState, Kinematics
+from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.spatial import Array
 
 
@@ -80,19 +80,19 @@ class Lock:
     coordinate: int
     name: str = "lock"
 
-    def position_errors(self, state: CoordinateState) -> Array:
+    def position_errors(self, state: Kinematics) -> Array:
         """Nothing: every value is right, as long as it stays."""
         return np.zeros(0)
 
-    def velocity_equations(self, state: CoordinateState) -> tuple[Array, Array]:
+    def velocity_equations(self, state: Kinematics) -> tuple[Array, Array]:
         """The rate of the coordinate is zero."""
         return self._row(state), np.zeros(1)
 
-    def acceleration_equations(self, state: CoordinateState) -> tuple[Array, Array]:
+    def acceleration_equations(self, state: Kinematics) -> tuple[Array, Array]:
         """The second derivative of the coordinate is zero."""
         return self._row(state), -state.mechanism.rate_bias(state.q, state.u)[[self.coordinate]]
 
-    def _row(self, state: CoordinateState) -> Array:
+    def _row(self, state: Kinematics) -> Array:
         return state.mechanism.rate_matrix(state.q)[[self.coordinate]]
 
 
@@ -105,7 +105,7 @@ class Prescribed(Holonomic):
     function: Function
     name: str = "prescribed coordinate"
 
-    def bond(self, state: CoordinateState) -> Bond:
+    def bond(self, state: Kinematics) -> Bond:
         """The coordinate minus the function."""
         value, first, second = self.function.evaluate(np.array((state.time,)))
         mechanism, own = state.mechanism, [self.coordinate]
@@ -127,7 +127,7 @@ class Coupler(Holonomic):
     function: Function
     name: str = "coupler"
 
-    def bond(self, state: CoordinateState) -> Bond:
+    def bond(self, state: Kinematics) -> Bond:
         """The function minus the dependent coordinate."""
         mechanism, others = state.mechanism, list(self.independent)
         value, gradient, hessian = self.function.evaluate(state.q[others])

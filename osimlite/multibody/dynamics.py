@@ -112,11 +112,31 @@ def accelerations(state: Kinematics, applied: Array, constraints: Sequence[Const
     bodies = MassCentres.of(state)
     matrix = bodies.mass_matrix()
     right = applied + bodies.gravity_forces() - bodies.inertia_forces(state.biases)
-    if not constraints:
-        return _solve(state.mechanism, matrix, right, np.eye(len(right)))
-    rows, values = stacked([constraint.acceleration_equations(state) for constraint in constraints])
-    particular, free = solutions(rows, values)
-    reduced = _solve(state.mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free)
+    equations = (
+        stacked([constraint.acceleration_equations(state) for constraint in constraints]) if constraints else None
+    )
+    return constrained_accelerations(state.mechanism, matrix, right, equations, range(len(right)))
+
+
+def constrained_accelerations(
+    mechanism: Mechanism, matrix: Array, right: Array, equations: tuple[Array, Array] | None, order: Sequence[int]
+) -> Array:
+    """Udot (k,) with M udot = f but for forces that make G udot = b.
+
+    Args:
+        mechanism: whose motion.
+        matrix: M (k, k).
+        right: f (k,).
+        equations: G (m, k) and b (m,), if there are any.
+        order: place in the mechanism of each of the k coordinates, for messages.
+
+    Raises:
+        SimulationError: a motion that nothing forbids moves no mass.
+    """
+    if equations is None:
+        return _solve(mechanism, matrix, right, None, order)
+    particular, free = solutions(*equations)
+    reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free, order)
     udot: Array = particular + free @ reduced
     return udot
 
@@ -144,8 +164,8 @@ def _projected(jacobians: Array, loads: Array) -> Array:
     return result
 
 
-def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array) -> Array:
-    """Solve with a positive definite matrix whose unknowns are motions along `directions` (n, f)."""
+def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array | None, order: Sequence[int]) -> Array:
+    """Solve with a positive definite matrix whose unknowns are motions along `directions` (k, f)."""
     if not len(right):
         return right
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
@@ -156,17 +176,19 @@ def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array)
     try:
         pivots = np.linalg.cholesky(matrix).diagonal() ** 2
     except np.linalg.LinAlgError:
-        raise SimulationError(_massless(mechanism, matrix, directions)) from None
+        raise SimulationError(_massless(mechanism, matrix, directions, order)) from None
     if np.min(pivots / matrix.diagonal()) < 1e-13:
-        raise SimulationError(_massless(mechanism, matrix, directions))
+        raise SimulationError(_massless(mechanism, matrix, directions, order))
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
-def _massless(mechanism: Mechanism, matrix: Array, directions: Array) -> str:
+def _massless(mechanism: Mechanism, matrix: Array, directions: Array | None, order: Sequence[int]) -> str:
     scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
     _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    motion = directions @ (vectors[:, 0] / scale)
-    name = mechanism.coordinates[int(np.argmax(np.abs(motion)))].name
+    motion = vectors[:, 0] / scale
+    if directions is not None:
+        motion = directions @ motion
+    name = mechanism.coordinates[order[int(np.argmax(np.abs(motion)))]].name
     return (
         f"coordinate '{name}' moves no mass, or a negative inertia; "
         "give the bodies beyond its joint mass and inertia, or lock it"

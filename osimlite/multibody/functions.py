@@ -43,6 +43,10 @@ class Univariate(Function):
         value, first, second = self._at(float(arguments[0]))
         return value, np.array((first,)), np.array(((second,),))
 
+    def derivatives(self, x: float) -> tuple[float, float, float]:
+        """Value, first and second derivative at `x`, all three as plain numbers."""
+        return self._at(x)
+
 
 @dataclass(frozen=True)
 class Constant(Function):

@@ -201,6 +201,15 @@ class Mobilizer:
         return all(type(motion).rates is Motion.rates for motion in self.motions)
 
     @cached_property
+    def turning(self) -> tuple[tuple[int, ...], ...]:
+        """Index in the mechanism of the coordinates whose rates together follow from as many speeds, set by set."""
+        return tuple(
+            tuple(self.coordinates[place] for place in motion.coordinates)
+            for motion in self.motions
+            if type(motion).rates is not Motion.rates
+        )
+
+    @cached_property
     def _ends(self) -> tuple[RelativeMotion, RelativeMotion]:
         count = len(self.coordinates)
         return (

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,35 +17,6 @@ from osimlite.multibody.spatial import Array, carried, cross, skew, transform, t
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
-
-
-class CoordinateState(Protocol):
-    """Values and speeds of the coordinates of a mechanism at a time; what its bodies do is not asked for."""
-
-    @property
-    def mechanism(self) -> Mechanism:
-        """Whose state."""
-
-    @property
-    def q(self) -> Array:
-        """Coordinate values (n,)."""
-
-    @property
-    def u(self) -> Array:
-        """Generalized speeds (n,)."""
-
-    @property
-    def time(self) -> float:
-        """What prescribed motions go by (s)."""
-
-
-class Coordinates(NamedTuple):
-    """A state of which nobody asks what the bodies do."""
-
-    mechanism: Mechanism
-    q: Array
-    u: Array
-    time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +81,7 @@ def kinematics(
 ) -> Kinematics:
     """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,) and `time` (s).
 
-    With `bodies`, which must follow those that carry them, the rows of all others mean nothing.
+    With `bodies`, each of which must follow the one that carries it, the rows of all others mean nothing.
     """
     count, size = len(mechanism.bodies), len(q)
     rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))

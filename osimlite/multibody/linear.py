@@ -38,3 +38,11 @@ def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     left, strengths, right = np.linalg.svd(rows)
     rank = int(np.sum(strengths > _REDUNDANT * strengths[0]))
     return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T
+
+
+def shortest(rows: Array, values: Array, tolerance: float) -> Array:
+    """The shortest x (n,) for which `rows` (m, n) x comes nearest to `values` (m,).
+
+    What the rows say in directions weaker than `tolerance` times the strongest counts for nothing.
+    """
+    return np.asarray(np.linalg.lstsq(rows, values, rcond=tolerance)[0], dtype=np.float64)

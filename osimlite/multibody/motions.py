@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.multibody.functions import IDENTITY, Function
+from osimlite.multibody.functions import IDENTITY, Constant, Function
 from osimlite.multibody.spatial import (
     Array,
     RelativeMotion,
@@ -129,23 +129,62 @@ class SimbodyDrift(Motion):
     def relative(self, q: Array, u: Array) -> RelativeMotion:
         """A frame at rest that all the same has the error as its angular acceleration."""
         motion = RelativeMotion.fixed(np.eye(4), len(q))
-        axes, shares, rotation = [], np.zeros((3, len(q))), np.eye(3)
+        motion.block[:3, -1] = np.einsum("iab,a,b->i", self.curvature(q), u, u)
+        return motion
+
+    def curvature(self, q: Array) -> Array:
+        """H (3, k, k) of the error: its component i is uᵀ H[i] u."""
+        count = len(q)
+        # By coordinate: what a unit speed of it does to each angle.
+        axes, shares, rotation = [], np.zeros((3, count)), np.eye(3)
         for row, turn in enumerate(self.turns):
             own = list(turn.coordinates)
             amount, gradient, _ = turn.function.evaluate(q[own])
-            shares[row, own] = gradient * u[own]
+            shares[row, own] = gradient
             axes.append(rotation @ turn.axis)
             rotation = rotation @ rotation_about(turn.axis, amount)
-        along, rates = np.array(axes).T, shares.sum(axis=1)
+        along, curvature = np.array(axes).T, np.zeros((3, count, count))
         for row in (1, 2):
-            theirs = along @ shares[:, :row].sum(axis=1)
-            right = along[:, :row] @ rates[:row]
-            motion.block[:3, -1] += cross(theirs - right, axes[row]) * rates[row]
-        return motion
+            # (3, k): the rate of this axis by what Simbody takes for the rates of the angles before it, less the true.
+            theirs = np.zeros((3, count))
+            theirs[:, :row] = along @ shares[:, :row]
+            wrong = -skew(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
+            curvature += wrong[:, :, None] * shares[row]
+        return curvature
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """Nothing."""
-        return ()
+        """Three turns that stay at zero and accelerate all the same; nothing where there is no error."""
+        turned = [set() if isinstance(turn.function, Constant) else set(turn.coordinates) for turn in self.turns]
+        if (not turned[1] or (turned[0] <= {0} and not turned[1] & {0} and not turned[2] & {0})) and (
+            not turned[2] or (turned[0] | turned[1] <= {0, 1} and not turned[2] & {0, 1})
+        ):
+            return ()
+        places = tuple(sorted(set().union(*(turn.coordinates for turn in self.turns))))
+        return tuple(
+            AxisMotion("rotate", np.array(axis), places, DriftAngle(self, places, row))
+            for row, axis in enumerate((X, Y, Z))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DriftAngle(Function):
+    """An angle that is zero with a rate of zero, whose second derivative is one component of a `SimbodyDrift`.
+
+    Attributes:
+        places: of its arguments among the coordinates of the joint.
+    """
+
+    drift: SimbodyDrift
+    places: tuple[int, ...]
+    component: int
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """Zero, zeros, and a Hessian (k, k) that is no derivative of these."""
+        size, own = len(arguments), list(self.places)
+        q = np.zeros(max(own, default=-1) + 1)
+        q[own] = arguments
+        hessian = self.drift.curvature(q)[self.component][np.ix_(own, own)]
+        return 0.0, np.zeros(size), 0.5 * (hessian + hessian.T)
 
 
 @dataclass(frozen=True, eq=False)

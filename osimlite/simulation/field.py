@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.errors import UnsupportedError
 from osimlite.forces import (
     bushing,
     coordinate_limit,
@@ -80,10 +79,10 @@ class Writer:
 
     def coordinate(self, place: int) -> tuple[Scalar, Scalar]:
         """Value and generalized speed of a coordinate; numbers if it is locked."""
-        joint = self.field.joint_of.get(place)
-        if joint is None:
+        number = self.field.number_of.get(place)
+        if number is None:
             return self.field.mechanism.coordinates[place].default_value, 0.0
-        return f"q{joint}", f"u{joint}" if self.field.separate else f"r{joint}"
+        return (f"x{number}", f"u{number}") if self.field.separate else (f"q{number}", f"r{number}")
 
     def call(self, law: str, *arguments: Scalar, results: int = 1) -> Any:
         """Call a law: the name of its result, or a list of names if there are more."""
@@ -125,8 +124,8 @@ class Writer:
 
     def push_coordinate(self, place: int, force: Scalar) -> None:
         """Apply a generalized force, conjugate to the generalized speed, on a coordinate; none if it is locked."""
-        if not self.reporting and place in self.field.joint_of:
-            self._add(f"{'s' if self.field.separate else 't'}{self.field.joint_of[place]}", force)
+        if not self.reporting and place in self.field.number_of:
+            self._add(f"{'s' if self.field.separate else 't'}{self.field.number_of[place]}", force)
 
     def keep(self, place: int, *values: Scalar) -> None:
         """Keep some values for the report in one of the element's places."""
@@ -149,32 +148,32 @@ class ForceField:
     """The forces of a model on the joints of a robot.
 
     Args:
-        robot: without fixed joints; every joint's value is a coordinate of its own.
-        joints: its joints in the order of the degrees of freedom.
+        robot: without fixed joints.
+        joints: its joints in the order of an engine's joints.
         elements: the forces.
+        order: place in the mechanism of each coordinate of the state. If left out, the coordinates of the state are
+            those that the values of the joints are, one by one, and the generalized speeds are the rates of the joints.
 
     Attributes:
-        order: the coordinate of each degree of freedom.
-        joint_of: the degree of freedom of each coordinate that is not locked.
-        separate: whether the generalized speeds are not the rates of the joints.
+        order: place in the mechanism of each coordinate of the state.
+        number_of: the number in the state of each coordinate that moves.
+        separate: whether the state is told apart from the values and rates of the joints.
         contacts: names of the contacts, by their number.
-
-    Raises:
-        UnsupportedError: a joint's value is not a coordinate of its own.
     """
 
-    def __init__(self, robot: Robot, joints: Sequence[RobotJoint], elements: Sequence[ForceElement]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        joints: Sequence[RobotJoint],
+        elements: Sequence[ForceElement],
+        order: Sequence[int] | None = None,
+    ) -> None:
         self.mechanism: Mechanism = robot.mechanism
         self.chain = Chain(robot, joints)
         self.elements = tuple(elements)
-        self.order = tuple(_coordinate(joint) for joint in joints)
-        self.joint_of = {place: joint for joint, place in enumerate(self.order)}
-        if len(self.joint_of) < len(self.order):
-            raise UnsupportedError(
-                f"'{self.mechanism.name}' has a coordinate that moves several axes, which the simulation cannot "
-                "do; replace its joint by one with a coordinate for each axis"
-            )
-        self.separate = not all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
+        self.separate = order is not None
+        self.order = tuple(own_coordinates(joints) if order is None else order)
+        self.number_of = {place: number for number, place in enumerate(self.order)}
         self.contacts = tuple(
             element.pair_name(place)
             for element in self.elements
@@ -184,16 +183,17 @@ class ForceField:
 
     @cached_property
     def generalized(self) -> Callable[..., tuple[float, ...]]:
-        """The function of time, q, rates, loads (with u before loads if `separate`) that gives the forces on n joints.
+        """The function of time, q, r, loads that gives the forces on the n joints at values q and rates r.
 
-        If `separate`, n more follow, which are conjugate to the generalized speeds. `loads` is a list: its last entry
-        becomes a number whose bits tell which contacts touch, an entry before it becomes the force (N, in ground) on
-        the second surface of a contact that does; the others are left as they are.
+        If `separate`, the values x and speeds u of the state come after r, and forces conjugate to the generalized
+        speeds follow those on the joints. `loads` is a list: its last entry becomes a number whose bits tell which
+        contacts touch, an entry before it becomes the force (N, in ground) on the second surface of a contact that
+        does; the others are left as they are.
         """
         script = self._script("generalized", "loads")
-        names = [f"t{joint}" for joint in range(len(self.order))]
+        names = [f"t{joint}" for joint in range(len(self.chain.joints))]
         if self.separate:
-            names += [f"s{joint}" for joint in range(len(self.order))]
+            names += [f"s{number}" for number in range(len(self.order))]
         if names:
             script.line(f"{' = '.join(names)} = 0.0")
         script.line("touching = 0")
@@ -208,38 +208,37 @@ class ForceField:
         """Labels of the rows that :meth:`records` gives; surfaces on one body have the same ones, and values."""
         return tuple(label for element in self.elements for label in element.columns)
 
-    def records(self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> list[float]:
-        """One row of the forces in effect, at the state of the joints."""
+    def records(self, t: float, *state: Sequence[float]) -> list[float]:
+        """One row of the forces in effect at a state: q, r, and x, u if `separate`."""
         row: list[float] = []
-        for element, values, origins in self._reported(t, q, rates, u):
+        for element, values, origins in self._reported(t, *state):
             row += element.record(values, origins)
         return row
 
-    def stored_energy(self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]) -> float:
+    def stored_energy(self, t: float, *state: Sequence[float]) -> float:
         """Potential energy of all force elements, J."""
         return sum(
-            float(value[-1]) for _, values, _ in self._reported(t, q, rates, u) for value in values if value is not None
+            float(value[-1]) for _, values, _ in self._reported(t, *state) for value in values if value is not None
         )
 
-    def energies(
-        self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]
-    ) -> tuple[float, float, float]:
+    def energies(self, t: float, *state: Sequence[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, and energy stored in the force elements, J."""
-        kinetic, gravity = self._mechanical(t, q, rates, u) if self.separate else self._mechanical(t, q, rates)
-        return kinetic, gravity, self.stored_energy(t, q, rates, u)
+        kinetic, gravity = self._mechanical(t, *state)
+        return kinetic, gravity, self.stored_energy(t, *state)
 
     # --------------------------------------------------------------------------------------------- helpers
     def _script(self, name: str, *more: str) -> Script:
-        script = Script(name, [TIME, "q", "r", *(["u"] if self.separate else []), *more])
-        for letter in "qru" if self.separate else "qr":
-            if self.order:
-                script.line(f"{''.join(f'{letter}{joint}, ' for joint in range(len(self.order)))}= {letter}")
+        counts = {"q": len(self.chain.joints), "r": len(self.chain.joints)}
+        if self.separate:
+            counts |= {"x": len(self.order), "u": len(self.order)}
+        script = Script(name, [TIME, *counts, *more])
+        for letter, count in counts.items():
+            if count:
+                script.line(f"{''.join(f'{letter}{number}, ' for number in range(count))}= {letter}")
         return script
 
-    def _reported(
-        self, t: float, q: Sequence[float], rates: Sequence[float], u: Sequence[float]
-    ) -> Iterator[tuple[ForceElement, list[Any], list[Triple]]]:
-        kept, origins = self._report(t, q, rates, u) if self.separate else self._report(t, q, rates)
+    def _reported(self, t: float, *state: Sequence[float]) -> Iterator[tuple[ForceElement, list[Any], list[Triple]]]:
+        kept, origins = self._report(t, *state)
         slot = 0
         for element in self.elements:
             yield element, kept[slot : slot + slots(element)], origins
@@ -304,10 +303,6 @@ def slots(element: ForceElement) -> int:
     return len(element.pairs) if isinstance(element, PairContact) else 1
 
 
-def _coordinate(joint: RobotJoint) -> int:
-    if joint.coordinate is None:
-        raise UnsupportedError(
-            f"the joint '{joint.source}' has an axis that moves by a function of its coordinates, which the "
-            "simulation cannot do; replace it by a joint whose coordinates move its axes directly"
-        )
-    return joint.coordinate
+def own_coordinates(joints: Sequence[RobotJoint]) -> list[int]:
+    """The coordinate that the value of each joint is; fewer than joints if one is another function."""
+    return [joint.coordinate for joint in joints if joint.coordinate is not None]

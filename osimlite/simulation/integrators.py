@@ -11,17 +11,41 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from math import inf, isfinite, sqrt
+from typing import Protocol
 
 from osimlite.errors import SettingError, SimulationError
 
 Derivative = Callable[[float, list[float]], Sequence[float]]
 Observer = Callable[[float, list[float]], object]
 
+
+class Projection(Protocol):
+    """Moves states to where constraints hold."""
+
+    def project(
+        self, t: float, y: list[float], errors: list[float] | None, tolerance: float
+    ) -> tuple[list[float], list[float] | None] | None:
+        """The nearest state that fulfils the constraints, if it is near.
+
+        Args:
+            t: time, s.
+            y: a state.
+            errors: how far off each entry of it may be, or None.
+            tolerance: what the constraints may be off.
+
+        Returns:
+            The state, and the errors without what lies across the constraints; None if no such state is near.
+        """
+
+
 DEFAULT_ACCURACY = 1e-3
 """What OpenSim's Manager uses where no accuracy was set."""
 
 INITIAL_STEP = 0.01
 """First step tried, s: a tenth of Simbody's default time scale."""
+
+FIXED_STEP_TOLERANCE = 1e-9
+"""What constraints may be off after a fixed step, before they are mended."""
 
 _ROUNDING = 2.0**-52
 
@@ -189,6 +213,7 @@ class RungeKuttaMerson(Stepper):
         count_u: the same for u, without the one more.
         observe: called with (time, state) after each step taken.
         names: what the entries of y are called in messages.
+        projection: what moves the end of a step to where the constraints hold, to a tenth of the accuracy.
 
     Attributes:
         attempted: steps tried so far, of which `taken` were accepted.
@@ -209,6 +234,7 @@ class RungeKuttaMerson(Stepper):
         count_u: int | None = None,
         observe: Observer | None = None,
         names: Sequence[str] | None = None,
+        projection: Projection | None = None,
     ) -> None:
         if not 0.0 < accuracy < 1.0:
             raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
@@ -226,6 +252,7 @@ class RungeKuttaMerson(Stepper):
         self._count_q = nq if count_q is None else count_q
         self._count_u = nu if count_u is None else count_u
         self._accuracy = accuracy
+        self._projection = projection
         self._maximum_step = maximum_step
         self._minimum_step = minimum_step
         self._next_step = min(max(INITIAL_STEP, minimum_step), maximum_step)
@@ -253,7 +280,12 @@ class RungeKuttaMerson(Stepper):
             cause: ArithmeticError | None = None
             try:
                 y1, companion = merson_step(f, t0, y0, f0, t1)
-                error = self._error(y1, companion, weights)
+                # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
+                errors = [0.2 * (y - z) for y, z in zip(y1, companion, strict=True)]
+                error = self._norm(errors, weights)
+                # As in Simbody: what half a step would not mend, neither does the projection.
+                if self._projection is not None and error <= 16.0 * self._accuracy:
+                    y1, error = self._projected(t1, y1, errors, weights)
             except ArithmeticError as failure:
                 error, cause = inf, failure
             self._next_step = min(next_step_size(h, error, self._accuracy, cut), self._maximum_step)
@@ -265,14 +297,34 @@ class RungeKuttaMerson(Stepper):
             self._next_step = max(self._next_step, smallest)
 
     def interpolant(self) -> Callable[[float], list[float]]:
-        """The cubic Hermite polynomial through the ends of the last step."""
-        return partial(_cubic, *self._previous, self.time, self.state, self.derivative)
+        """The cubic Hermite polynomial through the ends of the last step, to where the constraints hold."""
+        cubic = partial(_cubic, *self._previous, self.time, self.state, self.derivative)
+        projection, tolerance = self._projection, self._accuracy / 10.0
+        if projection is None:
+            return cubic
 
-    def _error(self, y1: list[float], companion: list[float], weights: list[float]) -> float:
+        def held(t: float) -> list[float]:
+            y = cubic(t)
+            found = projection.project(t, y, None, tolerance)
+            return y if found is None else found[0]
+
+        return held
+
+    def _projected(
+        self, t1: float, y1: list[float], errors: list[float], weights: list[float]
+    ) -> tuple[list[float], float]:
+        """The end of the step where the constraints hold, and the norm of the error there."""
+        assert self._projection is not None
+        found = self._projection.project(t1, y1, [abs(e) for e in errors], self._accuracy / 10.0)
+        if found is None:
+            return y1, inf
+        y, rest = found
+        assert rest is not None
+        return y, self._norm(rest, weights)
+
+    def _norm(self, error: list[float], weights: list[float]) -> float:
         """Largest of three root mean squares: errors of q as they are, of u and of z weighted."""
         nq, nu = self._end_q, self._end_u - self._end_q
-        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
-        error = [0.2 * (y - z) for y, z in zip(y1, companion, strict=True)]
         of_q = sum([e * e for e in error[:nq]]) / max(self._count_q, 1)
         weighted = [w * e for w, e in zip(weights, error[nq:], strict=True)]
         of_u = sum([e * e for e in weighted[:nu]]) / max(self._count_u, 1)
@@ -322,6 +374,7 @@ class SemiImplicitEuler(Stepper):
         rates: qdot as a function of (q, u); by default qdot = u.
         observe: called with (time, state) after each step taken.
         names: what the entries of y are called in messages.
+        projection: what moves the end of a step to where the constraints hold.
     """
 
     def __init__(
@@ -335,6 +388,7 @@ class SemiImplicitEuler(Stepper):
         rates: Callable[[list[float], list[float]], Sequence[float]] | None = None,
         observe: Observer | None = None,
         names: Sequence[str] | None = None,
+        projection: Projection | None = None,
     ) -> None:
         if not 0.0 < h < inf:
             raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
@@ -344,6 +398,7 @@ class SemiImplicitEuler(Stepper):
         self._nq = nq
         self._h = h
         self._rates = rates
+        self._projection = projection
         self._origin, self._since = t, 0
 
     def step(self, limit: float = inf) -> None:
@@ -361,7 +416,17 @@ class SemiImplicitEuler(Stepper):
         q = self.state[: self._nq]
         u = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
         rates = u if self._rates is None else self._rates(q, u)
-        self._advance(t, [x + h * v for x, v in zip(q, rates, strict=True)] + u)
+        y = [x + h * v for x, v in zip(q, rates, strict=True)] + u
+        if self._projection is not None:
+            found = self._projection.project(t, y, None, FIXED_STEP_TOLERANCE)
+            if found is None:
+                raise IntegrationError(
+                    f"the constraints cannot be kept up at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
+                    "or control the error (--accuracy)",
+                    t,
+                )
+            y, _ = found
+        self._advance(t, y)
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The straight line between the ends of the last step."""

@@ -13,8 +13,9 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
+from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines import engine_factory
+from osimlite.simulation.engines import KEEP_CONSTRAINTS, engine_factory
 from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson, Stepper
 from osimlite.simulation.recorder import Recorder
@@ -38,10 +39,15 @@ def simulate(
     route: str = "auto",
     skip_unsupported: bool = False,
     simbody_early_return: bool = False,
+    opensim_derivatives: bool = False,
+    rolling: bool = False,
     show: bool = False,
     progress: Progress | None = None,
 ) -> Trajectory:
     """Simulate a model forward in time, from its default pose and speeds.
+
+    Constraints, prescribed coordinates and loops are kept up to a tenth of the accuracy. Where the start does not
+    fulfil them, it is changed as little as they demand; what `initial` and `initial_speeds` say stays.
 
     Args:
         model: what moves.
@@ -52,17 +58,22 @@ def simulate(
         report_interval: time between the recorded moments, s; the last one is `to` in any case.
         initial: values (rad, m) of coordinates by name or path that do not start at their default.
         initial_speeds: generalized speeds that do not start at their default, likewise.
-        route: how Bullet computes accelerations: "mass-matrix", "articulated-body", or "auto" for the better one.
+        route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
+            osimlite's own "recursion", or "auto" for the quickest that is possible.
         skip_unsupported: leave out forces that cannot be computed; the summary lists them.
         simbody_early_return: reproduce a defect of Simbody in contact forces of several surfaces: the first contact
             that separates too fast to push takes the force of those after it.
+        opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
+            :func:`osimlite.multibody.build_mechanism`.
+        rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
         show: show the motion in Bullet's window, in real time; needs `fixed_step`.
         progress: called with the simulated time at every recorded moment.
 
     Raises:
-        ModelError: the model is not a mechanism, a name does not exist, or a coordinate is locked.
+        ModelError: the model is not a mechanism, or a name does not exist.
         UnsupportedError: the model has a joint, constraint or force that cannot be computed.
-        SimulationError: the motion cannot be computed any further; a setting has no meaning.
+        SimulationError: the motion cannot be computed any further, no pose or speeds fulfil the constraints with what
+            was set, or a coordinate that was set is locked or prescribed; a setting has no meaning.
         MissingDependency: PyBullet is not installed.
     """
     with Simulation(
@@ -71,6 +82,8 @@ def simulate(
         route=route,
         skip_unsupported=skip_unsupported,
         simbody_early_return=simbody_early_return,
+        opensim_derivatives=opensim_derivatives,
+        rolling=rolling,
         show=show,
     ) as simulation:
         return simulation.run(
@@ -84,13 +97,13 @@ def simulate(
         )
 
 
-def _refuse_constraints(mechanism: Mechanism) -> None:
-    """Stop at what holds besides joints and locks: no engine keeps it up."""
+def _refuse_constraints(mechanism: Mechanism, engine: str) -> None:
+    """Stop at what holds besides joints and locks, if the engine cannot keep it up."""
     kept = [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
-    if kept:
+    if kept and engine not in KEEP_CONSTRAINTS:
         raise UnsupportedError(
-            f"the simulation cannot keep up {listed(kept)}; set isEnforced of a constraint and prescribed of a "
-            "coordinate to false, or lock the coordinate"
+            f"the {engine} engine cannot keep up {listed(kept)}; take the engine {' or '.join(KEEP_CONSTRAINTS)}, or "
+            "set isEnforced of a constraint and prescribed of a coordinate to false"
         )
 
 
@@ -108,11 +121,13 @@ class Simulation:
         route: str = "auto",
         skip_unsupported: bool = False,
         simbody_early_return: bool = False,
+        opensim_derivatives: bool = False,
+        rolling: bool = False,
         show: bool = False,
     ) -> None:
         make = engine_factory(engine)
-        self.mechanism: Mechanism = build_mechanism(model)
-        _refuse_constraints(self.mechanism)
+        self.mechanism: Mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives, rolling=rolling)
+        _refuse_constraints(self.mechanism, engine)
         self.forces = force_elements(
             model, self.mechanism, skip_unsupported=skip_unsupported, simbody_early_return=simbody_early_return
         )
@@ -123,7 +138,13 @@ class Simulation:
             visuals = collect_visuals(model, self.mechanism)
         self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
         self.state = FreeState(self.mechanism, self.engine.order)
-        self._settings = {"skip_unsupported": skip_unsupported, "simbody_early_return": simbody_early_return}
+        self._constraints = Constrained(self.mechanism, self.engine.order).names
+        self._settings = {
+            "skip_unsupported": skip_unsupported,
+            "simbody_early_return": simbody_early_return,
+            "opensim_derivatives": opensim_derivatives,
+            "rolling": rolling,
+        }
         self._show = show
 
     def run(
@@ -179,7 +200,9 @@ class Simulation:
     def _initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
         infos = self.mechanism.coordinates
         q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
+        places: list[list[int]] = []
         for given, row, what in ((initial, q, "value"), (speeds, u, "speed")):
+            places.append([])
             for name, value in given.items():
                 place = self.mechanism.coordinate_index(name)
                 if infos[place].locked:
@@ -187,9 +210,18 @@ class Simulation:
                         f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
                         "be set; unlock it in the model"
                     )
+                if infos[place].prescribed is not None:
+                    raise SimulationError(
+                        f"coordinate '{name}' is prescribed, so that its {what} cannot be set; "
+                        "set its prescribed to false in the model"
+                    )
                 if not isfinite(value):
                     raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
                 row[place] = float(value)
+                places[-1].append(place)
+        if self._constraints:
+            values, rates = kept_state(self.mechanism, q, u, *places)
+            return self.state.pack(values.tolist(), rates.tolist())
         return self.state.pack(q, u)
 
     def _trajectory(
@@ -234,6 +266,7 @@ class Simulation:
                     name: {"force_N": size, "time_s": t} for name, (size, t) in recorder.largest_forces().items()
                 },
                 "skipped_forces": list(self.forces.skipped),
+                "constraints": self._constraints,
                 "versions": _versions(engine),
             }
 

@@ -14,7 +14,7 @@ How it corresponds to the mechanism it was built from:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -164,7 +164,7 @@ class Robot:
 def build_robot(
     mechanism: Mechanism,
     *,
-    locked: Literal["fixed", "joint"] = "fixed",
+    locked: Literal["fixed", "joint"] | Collection[int] = "fixed",
     body_frames: bool = True,
     at: Values | None = None,
     visuals: Mapping[str, Sequence[Visual]] | None = None,
@@ -174,7 +174,8 @@ def build_robot(
 
     Args:
         mechanism: what to spread out.
-        locked: whether a locked coordinate becomes a fixed joint or stays a joint that moves.
+        locked: whether a locked coordinate becomes a fixed joint or stays a joint that moves; or which coordinates
+            become fixed joints, by their places in the mechanism.
         body_frames: give every body a link whose frame is the body's own. Where the body's frame is off the axis of
             its joint, that takes a massless link at the axis and a fixed joint; without it the body's link has its
             frame at the joint, which saves a link, and `Link.bodies` tells where the body is.
@@ -183,15 +184,17 @@ def build_robot(
         collisions: what bodies touch others with, likewise.
     """
     values = mechanism.values({} if at is None else at)
-    return _Builder(mechanism, locked == "fixed", body_frames, values).robot(visuals or {}, collisions or {})
+    if isinstance(locked, str):
+        locked = [k for k, info in enumerate(mechanism.coordinates) if info.locked and locked == "fixed"]
+    return _Builder(mechanism, locked, body_frames, values).robot(visuals or {}, collisions or {})
 
 
 class _Builder:
-    def __init__(self, mechanism: Mechanism, fix_locked: bool, body_frames: bool, values: Array) -> None:
+    def __init__(self, mechanism: Mechanism, still: Collection[int], body_frames: bool, values: Array) -> None:
         self.mechanism = mechanism
         self.body_frames = body_frames
         self.values = values
-        self.still = {k for k, info in enumerate(mechanism.coordinates) if fix_locked and info.locked}
+        self.still = frozenset(still)
         # Bodies and coordinates have the first call on their own names; what has to be invented steps aside.
         self.taken = {WORLD}
         self.body_names = [self._unique(body.name) for body in mechanism.bodies]

@@ -16,7 +16,7 @@ from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, Coordina
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.bullet import BulletEngine, engine_class
 
 ROUTES = ("mass-matrix", "articulated-body")
 
@@ -202,17 +202,16 @@ def test_route_follows_the_number_of_joints():
 
 
 # ------------------------------------------------------------------------------------------ what is refused
-def test_a_function_on_an_axis_is_refused(fixtures):
+def test_what_takes_the_other_engine_is_refused_by_this_one(fixtures):
     mechanism = build_mechanism(osimlite.read(fixtures / "kinematics" / "mixed_joint_tree.osim"))
-    with pytest.raises(UnsupportedError, match="function of its coordinates"):
+    with pytest.raises(ValueError, match="several axes"):
         BulletEngine(mechanism, Forces(()))
-
-
-def test_partly_locked_ball_joint_is_refused():
+    assert engine_class(mechanism, "auto") is not BulletEngine
     model = chain("BallJoint")
     next(iter(model.components(Coordinate))).locked = True
     with pytest.raises(UnsupportedError, match="lock all of them or none"):
         BulletEngine(build_mechanism(model), Forces(()))
+    assert engine_class(build_mechanism(model), "auto") is not BulletEngine
 
 
 def test_wholly_locked_mechanism_stands_still():

@@ -22,7 +22,7 @@ from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.functions import Function, Linear, Scaled
 from osimlite.multibody.joints import TransformAxis, custom
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.motions import EllipsoidPoint
+from osimlite.multibody.motions import DriftAngle, EllipsoidPoint
 from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.contact import ContactGeometry
@@ -163,7 +163,8 @@ def test_no_function_is_forgotten():
         return found.union(*(below(item) for item in cls.__subclasses__()))
 
     ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.multibody")}
-    assert ours == {type(function) for function, _ in FUNCTIONS}
+    # An error of Simbody's accelerations is no part of a pose.
+    assert ours - {DriftAngle} == {type(function) for function, _ in FUNCTIONS}
 
     class Other(Function):
         def evaluate(self, arguments):

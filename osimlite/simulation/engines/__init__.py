@@ -17,6 +17,9 @@ ENGINES = {
 }
 """Module of each engine, whose `make` makes one."""
 
+KEEP_CONSTRAINTS = ("bullet",)
+"""The engines that keep up constraints."""
+
 
 def engine_factory(name: str) -> EngineFactory:
     """The function that makes an engine.

@@ -3,7 +3,8 @@
 Two routes lead to the accelerations. "mass-matrix" takes M and the bias from Bullet's inverse dynamics and solves for
 them; it is the quicker one for small mechanisms. "articulated-body" lets Bullet take a step of one second from the
 state and reads the change of the speeds, which is exactly the acceleration, since Bullet's step is semi-implicit
-Euler; it grows more slowly with the number of joints, and takes inertias that the other refuses.
+Euler; it grows more slowly with the number of joints, and takes inertias that the other refuses. Coordinates that move
+several axes, and constraints, take the engine of :mod:`osimlite.simulation.engines.bullet_reduced`.
 
 Bullet is made for games; what has to be changed so that it computes mechanics is in `_Body`, one method or constant
 for each.
@@ -27,8 +28,8 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet_file import excess, require_masses, robot_text, temporary_file
 from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.protocol import FreeState, Settings
-from osimlite.simulation.field import ForceField
-from osimlite.simulation.integrators import Observer, RungeKuttaMerson, Stepper
+from osimlite.simulation.field import ForceField, own_coordinates
+from osimlite.simulation.integrators import Observer, Projection, RungeKuttaMerson, Stepper
 from osimlite.simulation.solver import SingularMassError, tree_solver
 from osimlite.simulation.speeds import Speeds
 from osimlite.translate.passes.merge_fixed import merge_fixed
@@ -63,8 +64,8 @@ with _muted():
     require("pybullet", extra="sim", purpose="the PyBullet engine")
     import pybullet as bullet
 
-MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
-ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
+MASS_MATRIX, ARTICULATED_BODY, RECURSION = "mass-matrix", "articulated-body", "recursion"
+ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY, RECURSION)
 
 FEW_JOINTS = 12
 """Up to here the mass matrix is quicker, on the machine it was measured on."""
@@ -74,7 +75,31 @@ NO_LIMIT = 1e9
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
     """Make the engine."""
-    return BulletEngine(mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals)
+    return engine_class(mechanism, settings.route)(
+        mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals
+    )
+
+
+def engine_class(mechanism: Mechanism, route: str) -> type[BulletEngine]:
+    """The engine for a mechanism: the quick one where each coordinate moves one axis and nothing constrains it."""
+    plain = all(isinstance(constraint, Lock) for constraint in mechanism.constraints) and route != RECURSION
+    if plain and _moves_single_axes(mechanism):
+        return BulletEngine
+    from osimlite.simulation.engines.bullet_reduced import ReducedBulletEngine
+
+    return ReducedBulletEngine
+
+
+def _moves_single_axes(mechanism: Mechanism) -> bool:
+    """Whether the value of each one-axis joint is a coordinate of its own, where the coordinate is not locked."""
+    locked = [info.locked for info in mechanism.coordinates]
+    for body in mechanism.bodies:
+        of_joint = {locked[place] for place in body.mobilizer.coordinates}
+        if not body.mobilizer.speeds_are_rates and len(of_joint) > 1:
+            return False
+    moving = build_robot(mechanism).moving
+    places = [joint.coordinate for joint in moving]
+    return None not in places and len(set(places)) == len(places)
 
 
 class BulletEngine:
@@ -88,8 +113,7 @@ class BulletEngine:
         visuals: what the bodies look like.
 
     Raises:
-        UnsupportedError: the mechanism has a constraint other than locked coordinates, or a joint that cannot be
-            said with one-axis joints; or its inertias rule out the route asked for.
+        UnsupportedError: the inertias or the joints of the mechanism rule out the route asked for.
         SimulationError: a body at the end of a chain has no mass; or there is no screen to show the motion on.
     """
 
@@ -107,15 +131,10 @@ class BulletEngine:
     ) -> None:
         if route not in ROUTES:
             raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
-        for constraint in mechanism.constraints:
-            if not isinstance(constraint, Lock):
-                raise UnsupportedError(
-                    f"the constraint '{constraint.name}' cannot be simulated with PyBullet yet; "
-                    "switch it off or remove it"
-                )
         shapes = {} if visuals is None else visuals.by_body
-        robot = legal_names(merge_fixed(build_robot(mechanism, body_frames=False, visuals=shapes)))
-        require_masses(robot)
+        fixed = self._fixed(mechanism)
+        robot = legal_names(merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes)))
+        self._check(robot)
         files = {} if visuals is None else visuals.files
         self._body = _Body(robot, mechanism.gravity.tolist(), show=show, files=files)
         try:
@@ -124,10 +143,25 @@ class BulletEngine:
             self.close()
             raise
 
+    @staticmethod
+    def _fixed(mechanism: Mechanism) -> list[int]:
+        """Places of the coordinates that are no joints in Bullet."""
+        return [place for place, info in enumerate(mechanism.coordinates) if info.locked]
+
+    @staticmethod
+    def _check(robot: Robot) -> None:
+        require_masses(robot)
+
     def _prepare(self, mechanism: Mechanism, forces: Forces, robot: Robot, route: str) -> None:
         body = self._body
         self.mechanism = mechanism
-        self.field = ForceField(robot, body.joints, forces.elements)
+        places = own_coordinates(body.joints)
+        if len(set(places)) < len(body.joints):
+            raise ValueError(
+                f"'{mechanism.name}' has coordinates that move several axes; engine_class() tells its engine"
+            )
+        plain = all(item.mobilizer.speeds_are_rates for item in mechanism.bodies)
+        self.field = ForceField(robot, body.joints, forces.elements, None if plain else places)
         self.order = self.field.order
         self.state = FreeState(mechanism, self.order)
         self.contacts = self.field.contacts
@@ -139,11 +173,8 @@ class BulletEngine:
         if route == "auto":
             few = self._count <= FEW_JOINTS
             route = MASS_MATRIX if few and body.mass_matrix_works else ARTICULATED_BODY
-        if route == MASS_MATRIX and not body.mass_matrix_works:
-            raise UnsupportedError(
-                f"Bullet refuses a mass matrix with the inertia of '{body.impossible[0]}', which no real body has "
-                "(one principal moment exceeds the sum of the others); take the route articulated-body"
-            )
+        if route == MASS_MATRIX:
+            self._require_mass_matrix(ARTICULATED_BODY)
         self.route = route
         if route == MASS_MATRIX:
             self._solve = tree_solver([self.field.chain.parent(joint) for joint in range(self._count)])
@@ -153,6 +184,13 @@ class BulletEngine:
             self.derivative = self._derivative_with_speeds  # type: ignore[method-assign]
         elif route == ARTICULATED_BODY:
             self.derivative = self._derivative_by_step  # type: ignore[method-assign]
+
+    def _require_mass_matrix(self, other: str) -> None:
+        if not self._body.mass_matrix_works:
+            raise UnsupportedError(
+                f"Bullet refuses a mass matrix with the inertia of '{self._body.impossible[0]}', which no real body "
+                f"has (one principal moment exceeds the sum of the others); take the route {other}"
+            )
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: list[float]) -> list[float]:
@@ -194,7 +232,7 @@ class BulletEngine:
         """Forces on the one-axis joints; `rates` are theirs, `u` the generalized speeds."""
         if not self.field.separate:
             return self._forces(t, q, rates, self.loads)
-        both, count = self._forces(t, q, rates, u, self.loads), self._count
+        both, count = self._forces(t, q, rates, q, u, self.loads), self._count
         converted = self._speeds.joint_forces(q, both[count:])
         return [a + b for a, b in zip(both[:count], converted, strict=True)]
 
@@ -222,20 +260,28 @@ class BulletEngine:
 
     def force_records(self, t: float, y: list[float]) -> list[float]:
         """One number for each of the columns."""
-        q, u = y[: self._count], y[self._count :]
-        return self.field.records(t, q, self._speeds.rates(q, u), u)
+        return self.field.records(t, *self._joints(y))
 
     def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
+        return self.field.energies(t, *self._joints(y))
+
+    def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
+        """Values and rates of the joints, and the state where it is told apart from these."""
         q, u = y[: self._count], y[self._count :]
-        return self.field.energies(t, q, self._speeds.rates(q, u), u)
+        rates = self._speeds.rates(q, u)
+        return (q, rates, q, u) if self.field.separate else (q, rates)
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on: Runge-Kutta-Merson, or Bullet's own fixed steps."""
         if settings.fixed_step is not None:
             return BulletStepper(self, t, y, settings.fixed_step, observe, paced=settings.show)
-        infos = [self.mechanism.coordinates[place] for place in self.order]
+        return self._merson(t, y, settings, observe, None)
+
+    def _merson(
+        self, t: float, y: list[float], settings: Settings, observe: Observer, projection: Projection | None
+    ) -> RungeKuttaMerson:
         # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
         spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
         return RungeKuttaMerson(
@@ -247,8 +293,15 @@ class BulletEngine:
             count_q=len(self.mechanism.coordinates) + spare,
             count_u=len(self.mechanism.coordinates),
             observe=observe,
-            names=[info.name for info in infos] + [f"the speed of {info.name}" for info in infos],
+            names=self._names,
+            projection=projection,
         )
+
+    @property
+    def _names(self) -> list[str]:
+        """What the entries of the state are called in messages."""
+        names = [self.mechanism.coordinates[place].name for place in self.order]
+        return names + [f"the speed of {name}" for name in names]
 
     def close(self) -> None:
         """Leave Bullet; any number of times."""
@@ -361,8 +414,12 @@ class _Body:
 
     def bias(self, q: list[float], rates: list[float]) -> Sequence[float]:
         """Forces (n,) on the joints without which they would accelerate."""
-        bias: Sequence[float] = bullet.calculateInverseDynamics(self.id, q, rates, self.zeros, 0, self.client)
-        return bias
+        return self.joint_forces(q, rates, self.zeros)
+
+    def joint_forces(self, q: list[float], rates: list[float], accelerations: list[float]) -> Sequence[float]:
+        """Forces (n,) that give the joints these accelerations (n,) against gravity."""
+        forces: Sequence[float] = bullet.calculateInverseDynamics(self.id, q, rates, accelerations, 0, self.client)
+        return forces
 
     def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
         """Put the joints into a state, and all links where they then are."""

@@ -1,0 +1,214 @@
+"""Motion under constraints, whatever computes the motion without them.
+
+What is needed of an engine are the mass matrix M and the forces f of M udot = f. The accelerations fulfil the
+constraints, those of a redundant or contradictory kind in the sense of least squares; what integration lets positions
+and speeds drift, a projection takes back. When that is done, how exactly, and by which measure of nearness, is as in
+Simbody, so that the steps are those of OpenSim: positions and speeds are left alone as long as the root mean square of
+the errors of all constraints is below the tolerance, and brought to a tenth of it otherwise; a change of a speed above
+1 counts relative to it; and what lies across the constraints counts as no error of the integration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+
+from osimlite.multibody.constraints import Constraint, Lock, Prescribed
+from osimlite.multibody.dynamics import constrained_accelerations
+from osimlite.multibody.functions import Constant
+from osimlite.multibody.kinematics import Kinematics, kinematics
+from osimlite.multibody.linear import shortest, stacked
+from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.spatial import Array
+
+_OVERSHOOT = 0.1
+_FINEST = 2.0 ** (-52.0 * 7.0 / 8.0)
+"""What counts as exact."""
+_REDUNDANT = 2.0**-26
+"""Times the number of equations: how nearly one must follow from others to be dropped."""
+
+
+def free_coordinates(mechanism: Mechanism) -> list[int]:
+    """Places of the coordinates that are not simply at rest.
+
+    A locked angle of a ball joint whose other angles are free is one of them: the speeds of the joint are not those of
+    its angles, so that it takes a constraint to hold it.
+    """
+    turning = [
+        set(motion_places)
+        for body in mechanism.bodies
+        for motion_places in body.mobilizer.turning
+        if not all(mechanism.coordinates[place].locked for place in motion_places)
+    ]
+    held = set().union(*turning)
+    return [place for place, info in enumerate(mechanism.coordinates) if not info.locked or place in held]
+
+
+class Constrained:
+    """The constraints of a mechanism on the coordinates of an engine's state.
+
+    Args:
+        mechanism: whose constraints.
+        order: place in the mechanism of each coordinate of the state; the others are locked, and stay at their
+            defaults.
+    """
+
+    def __init__(self, mechanism: Mechanism, order: Sequence[int]) -> None:
+        self.mechanism = mechanism
+        self.order = tuple(order)
+        self._order = np.array(order, dtype=int)
+        self._q = np.array([info.default_value for info in mechanism.coordinates])
+        self._constraints: list[Constraint] = []
+        # Simbody's mean is over the equations of locks too, which have no errors.
+        self._locks = 0
+        for item in mechanism.constraints:
+            if not isinstance(item, Lock):
+                self._constraints.append(item)
+            elif item.coordinate in order:
+                self._constraints.append(Prescribed(item.coordinate, Constant(self._q[item.coordinate]), item.name))
+            else:
+                self._locks += 1
+        needed: set[int] = set()
+        for item in self._constraints:
+            for body in item.bodies:
+                while body != GROUND and body not in needed:
+                    needed.add(body)
+                    body = mechanism.bodies[body].parent
+        self._bodies = sorted(needed)
+
+    @property
+    def names(self) -> list[str]:
+        """Of what is kept up, apart from coordinates at rest."""
+        return [item.name for item in self._constraints]
+
+    def accelerations(self, t: float, x: Array, u: Array, matrix: Array, right: Array) -> Array:
+        """Udot (n,) at coordinates x (n,) and speeds u (n,), for M (n, n) and f (n,) of the motion without constraints.
+
+        Raises:
+            SimulationError: a motion that nothing forbids moves no mass.
+        """
+        if not self._constraints:
+            return constrained_accelerations(self.mechanism, matrix, right, None, self.order)
+        state = self._state(t, x, u)
+        rows, values = stacked([item.acceleration_equations(state) for item in self._constraints])
+        equations = rows[:, self._order], values
+        return constrained_accelerations(self.mechanism, matrix, right, equations, self.order)
+
+    # -------------------------------------------------------------------------------------------- projection
+    def project(
+        self, t: float, y: list[float], errors: list[float] | None, tolerance: float
+    ) -> tuple[list[float], list[float] | None] | None:
+        """The nearest state where the constraints hold, see :class:`osimlite.simulation.integrators.Projection`."""
+        if not self._constraints:
+            return y, errors
+        size = len(self._order)
+        x, u = np.array(y[:size]), np.array(y[size:])
+        off = None if errors is None else (np.array(errors[:size]), np.array(errors[size:]))
+        limit = max(2.0 * tolerance, sqrt(tolerance))
+        if not (
+            self._project_values(t, x, off and off[0], tolerance, limit)
+            and self._project_speeds(t, x, u, off and off[1], tolerance, limit)
+        ):
+            return None
+        rest = None if off is None else off[0].tolist() + off[1].tolist()
+        return x.tolist() + u.tolist(), rest
+
+    def _project_values(self, t: float, x: Array, off: Array | None, tolerance: float, limit: float) -> bool:
+        """Change x, and the errors with it; tell whether that worked."""
+        still = np.zeros(len(x))
+
+        def errors_at(x: Array) -> tuple[Kinematics, Array]:
+            state = self._state(t, x, still)
+            return state, np.concatenate([item.position_errors(state) for item in self._constraints])
+
+        state, errors = errors_at(x)
+        norm = self._norm(errors)
+        if norm <= tolerance:
+            return True
+        if not norm <= limit:
+            return False
+        rows = np.zeros((0, len(x)))
+        for iteration in range(20):
+            rows = self._rows_by_values(state)
+            step = shortest(rows, errors, _REDUNDANT * len(errors))
+            state, errors = errors_at(x - step)
+            before, norm = norm, self._norm(errors)
+            if iteration > 0 and not norm <= before:
+                norm = before
+                break
+            x -= step
+            if norm <= max(_OVERSHOOT * tolerance, _FINEST):
+                break
+        if not norm <= tolerance:
+            return False
+        if off is not None:
+            off -= shortest(rows, rows @ off, _REDUNDANT * len(errors))
+        return True
+
+    def _project_speeds(self, t: float, x: Array, u: Array, off: Array | None, tolerance: float, limit: float) -> bool:
+        """Change u, and the errors with it; tell whether that worked."""
+        state = self._state(t, x, u)
+        all_rows, wanted = stacked([item.velocity_equations(state) for item in self._constraints])
+        rows = all_rows[:, self._order]
+        errors = rows @ u - wanted
+        norm = self._norm(errors)
+        if norm <= tolerance:
+            return True
+        if not norm <= limit:
+            return False
+        scales = np.maximum(np.abs(u), 1.0)
+        rank = _REDUNDANT * len(errors)
+        # The rows do not depend on the speeds: one step does, a second one mends its rounding.
+        for _ in range(2):
+            u -= scales * shortest(rows * scales, errors, rank)
+            errors = rows @ u - wanted
+            norm = self._norm(errors)
+            if norm <= max(_OVERSHOOT * tolerance, _FINEST):
+                break
+        if not norm <= tolerance:
+            return False
+        if off is not None:
+            off -= scales * shortest(rows * scales, rows @ off, rank)
+        return True
+
+    # --------------------------------------------------------------------------------------------- helpers
+    def _state(self, t: float, x: Array, u: Array) -> Kinematics:
+        q, speeds = self._q.copy(), np.zeros(len(self._q))
+        q[self._order], speeds[self._order] = x, u
+        return kinematics(self.mechanism, q, speeds, t, bodies=self._bodies)
+
+    def _rows_by_values(self, state: Kinematics) -> Array:
+        """Derivatives (p, n) of the errors of the positions by the coordinates."""
+        rows = []
+        for item in self._constraints:
+            count = len(item.position_errors(state))
+            rows.append(item.velocity_equations(state)[0][:count])
+        by_speeds = np.concatenate(rows)
+        if not all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies):
+            by_speeds = np.asarray(np.linalg.solve(self.mechanism.rate_matrix(state.q).T, by_speeds.T).T)
+        return by_speeds[:, self._order]
+
+    def _norm(self, errors: Array) -> float:
+        """Root mean square over all equations, those of locked coordinates included."""
+        return sqrt(float(errors @ errors) / max(len(errors) + self._locks, 1))
+
+
+def kept_state(
+    mechanism: Mechanism, q: Sequence[float], u: Sequence[float], set_values: Sequence[int], set_speeds: Sequence[int]
+) -> tuple[Array, Array]:
+    """The state at time 0 nearest to q (n,) and u (n,) in which the constraints hold.
+
+    Args:
+        mechanism: whose state.
+        q: values of all coordinates.
+        u: generalized speeds of all coordinates.
+        set_values: places of the coordinates whose values stay.
+        set_speeds: places of those whose speeds do.
+
+    Raises:
+        SimulationError: there is none.
+    """
+    values = mechanism.assemble(np.array(q), kept=set_values)
+    return values, mechanism.project_speeds(values, np.array(u), kept=set_speeds)

@@ -1,0 +1,153 @@
+"""The PyBullet engine for what joints of one axis cannot say: axes that follow functions, and constraints.
+
+Bullet carries the expanded chain, each axis a joint of its own, and gives its mass matrix and bias; these are projected
+on the coordinates of the model, and the constraints are kept up by :mod:`osimlite.simulation.constrained`. Where Bullet
+refuses an inertia, osimlite's own recursion takes its place, on the route "recursion".
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import UnsupportedError
+from osimlite.multibody.dynamics import MassCentres
+from osimlite.multibody.kinematics import kinematics
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.constrained import Constrained, free_coordinates
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RECURSION, BulletEngine
+from osimlite.simulation.engines.protocol import FreeState, Settings
+from osimlite.simulation.field import ForceField
+from osimlite.simulation.integrators import Observer, SemiImplicitEuler, Stepper
+from osimlite.simulation.reduction import Reduced, Reduction
+from osimlite.translate.robot import Robot
+
+
+class ReducedBulletEngine(BulletEngine):
+    """The accelerations of any mechanism; see :class:`BulletEngine` for arguments and errors."""
+
+    @staticmethod
+    def _fixed(mechanism: Mechanism) -> list[int]:
+        free = set(free_coordinates(mechanism))
+        return [place for place in range(len(mechanism.coordinates)) if place not in free]
+
+    @staticmethod
+    def _check(robot: Robot) -> None:
+        """Bodies without mass may do at the end of a chain: a constraint may decide how they move."""
+
+    def _prepare(self, mechanism: Mechanism, forces: Forces, robot: Robot, route: str) -> None:
+        body = self._body
+        self.mechanism = mechanism
+        self.order = tuple(free_coordinates(mechanism))
+        self._places = np.array(self.order, dtype=int)
+        self._still = np.array([info.default_value for info in mechanism.coordinates])
+        self._count = len(self.order)
+        self.field = ForceField(robot, body.joints, forces.elements, self.order)
+        self.state = FreeState(mechanism, self.order)
+        self.contacts, self.columns = self.field.contacts, self.field.columns
+        self.loads: list[Any] = [None] * len(self.contacts) + [0]
+        self.reduction = Reduction(mechanism, body.joints, self.order)
+        self.constrained = Constrained(mechanism, self.order)
+        self._forces = self.field.generalized
+        if route == ARTICULATED_BODY:
+            raise UnsupportedError(
+                f"the route {ARTICULATED_BODY} is for models without constraints whose coordinates move one axis each; "
+                f"take {MASS_MATRIX} for '{mechanism.name}'"
+            )
+        if route == MASS_MATRIX:
+            self._require_mass_matrix(RECURSION)
+        self.route = (MASS_MATRIX if body.mass_matrix_works else RECURSION) if route == "auto" else route
+        self.derivative = self._derivative if self._count else self._nothing_moves  # type: ignore[method-assign]
+
+    # ---------------------------------------------------------------------------------------- accelerations
+    def equations(self, t: float, y: list[float]) -> tuple[Array, Array, Reduced]:
+        """M (n, n) and f (n,) of the motion M udot = f without constraints, and the joints."""
+        x, u = np.array(y[: self._count]), np.array(y[self._count :])
+        joints = self.reduction.at(x, u)
+        jacobian = joints.jacobian
+        q, rates = joints.values.tolist(), joints.rates.tolist()
+        both = np.array(self._forces(t, q, rates, y[: self._count], y[self._count :], self.loads))
+        applied = both[: len(q)] @ jacobian + both[len(q) :]
+        if self.route == MASS_MATRIX:
+            body = self._body
+            matrix = jacobian.T @ np.array(body.mass_matrix(q)) @ jacobian
+            bias = np.array(body.joint_forces(q, rates, joints.bias.tolist())) @ jacobian
+            return matrix, applied - bias, joints
+        values, speeds = self._still.copy(), np.zeros(len(self._still))
+        values[self._places], speeds[self._places] = x, u
+        state = kinematics(self.mechanism, values, speeds, t)
+        bodies = MassCentres.of(state)
+        inner = bodies.gravity_forces() - bodies.inertia_forces(state.biases)
+        matrix = bodies.mass_matrix()[np.ix_(self._places, self._places)]
+        return matrix, applied + inner[self._places], joints
+
+    def _derivative(self, t: float, y: list[float]) -> list[float]:
+        matrix, right, joints = self.equations(t, y)
+        x, u = np.array(y[: self._count]), np.array(y[self._count :])
+        udot = self.constrained.accelerations(t, x, u, matrix, right)
+        found: list[float] = joints.coordinate_rates.tolist() + udot.tolist()
+        return found
+
+    # ---------------------------------------------------------------------------------------------- reports
+    def touching(self, t: float, y: list[float]) -> int:
+        """The bits of the contacts that touch; sets `loads`."""
+        self._forces(t, *self._joints(y), self.loads)
+        return int(self.loads[-1])
+
+    def force_records(self, t: float, y: list[float]) -> list[float]:
+        """One number for each of the columns."""
+        return self.field.records(t, *self._joints(y))
+
+    def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
+        """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
+        return self.field.energies(t, *self._joints(y))
+
+    def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
+        """Values and rates of the joints, values and speeds of the state."""
+        x, u = y[: self._count], y[self._count :]
+        joints = self.reduction.at(np.array(x), np.array(u))
+        return joints.values.tolist(), joints.rates.tolist(), x, u
+
+    # ---------------------------------------------------------------------------------------------- motion
+    def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
+        """What integrates from a state on: Runge-Kutta-Merson, or fixed steps as Bullet takes them."""
+        if settings.fixed_step is None:
+            return self._merson(t, y, settings, observe, self.constrained)
+        if settings.show:
+            observe = _Shown(self, t, observe)
+        return SemiImplicitEuler(
+            self.derivative,
+            t,
+            y,
+            self._count,
+            settings.fixed_step,
+            rates=self._rates,
+            observe=observe,
+            names=self._names,
+            projection=self.constrained,
+        )
+
+    def _rates(self, x: list[float], u: list[float]) -> list[float]:
+        rates: list[float] = self.reduction.coordinate_rates(np.array(x), np.array(u)).tolist()
+        return rates
+
+
+class _Shown:
+    """Puts Bullet's robot where the motion is, in real time."""
+
+    def __init__(self, engine: ReducedBulletEngine, t: float, observe: Observer) -> None:
+        self._engine, self._observe = engine, observe
+        self._start = t, time.perf_counter()
+
+    def __call__(self, t: float, y: list[float]) -> None:
+        self._observe(t, y)
+        values, rates, _, _ = self._engine._joints(y)
+        self._engine._body.set_state(values, rates)
+        ahead = (t - self._start[0]) - (time.perf_counter() - self._start[1])
+        if ahead > 0.0:
+            time.sleep(ahead)
