@@ -25,6 +25,7 @@ COMMANDS = (
     "sweep",
     "kinematics",
     "inverse-dynamics",
+    "lsp",
     "doctor",
     "demo",
 )

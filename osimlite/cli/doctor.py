@@ -22,6 +22,9 @@ PURPOSES = {
     "plot": "simulate --plot, --animate",
     "yaml": "models as YAML",
     "frame": "trajectory.to_frame()",
+    "sweep": "sweep",
+    "optimize": "optimize",
+    "lsp": "lsp: the language server for editors",
     "oracle": "comparisons with OpenSim itself, in tests and benchmarks",
 }
 """What each extra is for; "" is the plain installation. `all` and `dev` gather the others and the tools of tests."""

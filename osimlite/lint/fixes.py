@@ -56,6 +56,14 @@ def without_text(source: Source, start: int, end: int) -> Fix:
 
 def apply(text: str, findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[str, int]:
     """The text with every mend in it that does not touch another, and how many these are."""
+    chosen, count = edits_of(findings, unsafe=unsafe)
+    for edit in sorted(chosen, key=lambda edit: edit.start, reverse=True):
+        text = text[: edit.start] + edit.text + text[edit.end :]
+    return text, count
+
+
+def edits_of(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list[Edit], int]:
+    """The edits of every mend that does not touch another before it, and how many mends these are."""
     chosen: list[Edit] = []
     count = 0
     for finding in findings:
@@ -66,9 +74,7 @@ def apply(text: str, findings: Iterable[Finding], *, unsafe: bool = False) -> tu
             continue
         chosen.extend(fix.edits)
         count += 1
-    for edit in sorted(chosen, key=lambda edit: edit.start, reverse=True):
-        text = text[: edit.start] + edit.text + text[edit.end :]
-    return text, count
+    return chosen, count
 
 
 def mended(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object
+from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, Tree, Use
 from osimlite.text import listed
@@ -28,13 +29,17 @@ def rename(model: Model, component: Component, name: str) -> None:
     taken = tree.by_path.get(wanted)
     if parent is not None and taken is not None and taken is not component:
         raise ModelError(f"cannot rename '{path}': its parent has a '{name}' already")
-    texts = [(use, tree.resolve(use).target) for use in tree.uses() if isinstance(use.value, str)]
+    texts = [(use, _target(tree, use)) for use in tree.uses() if isinstance(use.value, str)]
     component.name = name
     tree = model.tree()
     for use, target in texts:
-        if target is None or not isinstance(use.value, str) or use.reference.rule in _NAME_NOTHING:
+        if target is None or _target(tree, use) is target:
             continue
-        if tree.lookup(use.reference, use.value, use.owner).target is not target:
+        assert isinstance(use.value, str)
+        if use.reference.rule == "input":
+            _, bar, output = use.value.partition("|")
+            _assign(use, f"{tree.text_for(use.owner, _OF_INPUT, target)}{bar}{output}")
+        else:
             _assign(use, tree.text_for(use.owner, use.reference, target))
 
 
@@ -52,9 +57,7 @@ def remove(model: Model, component: Component) -> None:
         {
             tree.path_of(use.owner) or use.owner.name
             for use in tree.uses()
-            if id(use.holder) not in doomed
-            and use.reference.rule not in _NAME_NOTHING
-            and _is_at_or_below(_target_path(tree, use), path)
+            if id(use.holder) not in doomed and _is_at_or_below(_target_path(tree, use), path)
         }
     )
     if users:
@@ -68,7 +71,10 @@ def remove(model: Model, component: Component) -> None:
     raise ModelError(f"cannot remove '{path}': every model has one")
 
 
-_NAME_NOTHING = ("input", "file", "column", "positional", "point-index")
+_NAME_NOTHING = ("file", "column", "positional", "point-index")
+
+_OF_INPUT = Reference("socket", "Component")
+"""How the text of an input names a component, before the bar and the output."""
 
 
 def _path_in(model: Model, component: Object) -> str:
@@ -78,8 +84,18 @@ def _path_in(model: Model, component: Object) -> str:
     return path
 
 
+def _target(tree: Tree, use: Use) -> Component | None:
+    """What a reference names; of an input, the component that has the output."""
+    if use.reference.rule in _NAME_NOTHING:
+        return None
+    if use.reference.rule == "input" and isinstance(use.value, str):
+        path, bar, _ = use.value.partition("|")
+        return tree.lookup(_OF_INPUT, path, use.owner).target if bar else None
+    return tree.resolve(use).target
+
+
 def _target_path(tree: Tree, use: Use) -> str | None:
-    target = tree.resolve(use).target
+    target = _target(tree, use)
     return None if target is None else tree.path_of(target)
 
 

@@ -113,3 +113,15 @@ def test_a_part_that_opensim_makes_for_itself_keeps_its_owner() -> None:
     model.add(osimlite.MeyerFregly2016Force(name="f", socket_station="/forceset/s/path/p/station"))
     with pytest.raises(ModelError, match="/forceset/f names it"):
         model.remove(spring)
+
+
+def test_inputs_follow_a_name() -> None:
+    model = dynamic_walker()
+    knee = "/jointset/RightShankToThigh/RKnee_rz"
+    assert isinstance(model[knee], Coordinate)
+    table = osimlite.TableReporter__double_(name="table", input_inputs=(f"{knee}|speed(flexion)", "/none|value"))
+    model.subcomponents.append(table)
+    model.rename(model["/jointset/RightShankToThigh"], "knee")
+    assert table.input_inputs == ("/jointset/knee/RKnee_rz|speed(flexion)", "/none|value")
+    with pytest.raises(ModelError, match="RKneeLimitTorque and /table name it"):
+        osimlite.schema.editing.remove(model, model["/jointset/knee"])

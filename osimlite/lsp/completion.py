@@ -1,0 +1,155 @@
+"""What may be written at a place: tags of classes and properties, the names a reference may take, words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+
+from lsprotocol import types
+
+from osimlite.document.lexical import formatter
+from osimlite.lsp.analysis import Analysis
+from osimlite.lsp.cursor import Cursor, Element, cursor_at, single_objects
+from osimlite.lsp.hover import is_list
+from osimlite.schema.base import Component, FieldSpec, Object, field_specs
+from osimlite.schema.descriptions import described, meaning_of, value_of
+from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.registry import class_for, tags
+from osimlite.schema.tree import Use
+
+_OPAQUE = ("input", "file", "column", "positional", "point-index")
+"""Rules of references whose texts are no names of components."""
+
+
+def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list[types.CompletionItem]:
+    """What may stand at an offset.
+
+    Args:
+        analysis: of the text as it is, half-typed.
+        known: of the last version that could be read: what names there are.
+        offset: of the cursor.
+    """
+    cursor = cursor_at(analysis.text.content, offset)
+    around = cursor.inner
+    if cursor.kind == "closing tag" and around is not None:
+        return [_item(analysis, cursor, around.tag, f"{around.tag}>", types.CompletionItemKind.Keyword)]
+    if cursor.kind == "tag":
+        return [*_tags(analysis, cursor, around, bracket="")]
+    if cursor.kind == "attribute" and cursor.attribute == "name" and cursor.element is not None:
+        cls = cursor.element.cls
+        if cls is not None and cls.name_reference is not None:
+            return [*_names(analysis, known, cursor, cls.name_reference, cursor.element)]
+    if cursor.kind != "text" or around is None:
+        return []
+    if around.cls is not None or (around.spec is not None and is_list(around.spec)):
+        return [*_tags(analysis, cursor, around, bracket="<")]
+    if around.spec is None:
+        return []
+    kind = around.spec.kind
+    if isinstance(kind, Value):
+        words = ("true", "false") if kind.scalar == "bool" else kind.choices
+        return [_item(analysis, cursor, str(word), str(word), types.CompletionItemKind.Value) for word in words]
+    if isinstance(kind, Reference):
+        return [*_names(analysis, known, cursor, kind, cursor.around[-2] if len(cursor.around) > 1 else None)]
+    return []
+
+
+def _names(
+    analysis: Analysis, known: Analysis | None, cursor: Cursor, reference: Reference, holder: Element | None
+) -> Iterator[types.CompletionItem]:
+    """The texts that a reference may take."""
+    if known is None or known.tree is None or reference.rule in _OPAQUE:
+        return
+    tree = known.tree
+    item = known.objects.get(holder.number) if holder is not None and known is analysis else None
+    if item is None and holder is not None and holder.given:
+        # Elements before it may have come and gone since; its name tells which it is.
+        item = next((c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None)
+    owner: Component = tree.model if item is None else tree.owner_of(item)
+    spec = FieldSpec("", "", reference, None, None, None, type(owner))
+    for text in tree.spellings(Use(owner, owner, spec, "")):
+        target = tree.lookup(reference, text, owner).target
+        detail = "" if target is None else f"{type(target).tag} {tree.path_of(target)}"
+        yield _item(analysis, cursor, text, text, types.CompletionItemKind.Reference, detail)
+
+
+def _tags(analysis: Analysis, cursor: Cursor, around: Element | None, bracket: str) -> Iterator[types.CompletionItem]:
+    """The elements that may stand inside the one around."""
+    if around is None:
+        return
+    if around.cls is None:
+        if around.tag == "OpenSimDocument":
+            yield _object(analysis, cursor, "Model", bracket, "")
+        elif around.spec is not None and is_list(around.spec) and around.spec.accepts is not None:
+            for tag in _concrete(around.spec.accepts):
+                yield _object(analysis, cursor, tag, bracket, "")
+        return
+    given = _given_in(analysis, around)
+    for spec in field_specs(around.cls).values():
+        if spec in single_objects(around.cls):
+            assert spec.accepts is not None
+            for tag in _concrete(spec.accepts):
+                yield _object(analysis, cursor, tag, bracket, spec.tag)
+        elif spec.tag not in given:
+            yield _property(analysis, cursor, spec, bracket)
+
+
+def _given_in(analysis: Analysis, around: Element) -> set[str]:
+    """The tags of the properties that an object has in the text."""
+    item = analysis.objects.get(around.number) if analysis.is_certain else None
+    if item is None:
+        return set()
+    return {spec.tag for spec in field_specs(type(item)).values() if spec.name in item.model_fields_set}
+
+
+def _property(analysis: Analysis, cursor: Cursor, spec: FieldSpec, bracket: str) -> types.CompletionItem:
+    if isinstance(spec.kind, Held):
+        inner = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
+        text = f"{bracket}{spec.tag}{inner}</{spec.tag}>"
+    else:
+        default = ""
+        if isinstance(spec.kind, Value) and spec.default is not None:
+            default = formatter(spec.kind, "shortest")(spec.default)
+        choices = ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
+        place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escaped(default)}}}"
+        text = f"{bracket}{spec.tag}>{place}</{spec.tag}>"
+    item = _item(analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, value_of(spec))
+    item.documentation = meaning_of(spec) or None
+    item.insert_text_format = types.InsertTextFormat.Snippet
+    return item
+
+
+def _object(analysis: Analysis, cursor: Cursor, tag: str, bracket: str, name: str) -> types.CompletionItem:
+    named = f'name="{name}"' if name else 'name="$1"'
+    text = f"{bracket}{tag} {named}>\n\t$0\n</{tag}>"
+    item = _item(analysis, cursor, tag, text, types.CompletionItemKind.Class, name)
+    cls = class_for(tag)
+    item.documentation = described(cls) if cls is not None else None
+    item.insert_text_format = types.InsertTextFormat.Snippet
+    return item
+
+
+def _item(
+    analysis: Analysis, cursor: Cursor, label: str, text: str, kind: types.CompletionItemKind, detail: str = ""
+) -> types.CompletionItem:
+    place = analysis.text.range(cursor.start, cursor.end)
+    # Editors look for what was typed in the text that is to be filtered by; that has the bracket where one is put in.
+    return types.CompletionItem(
+        label, kind=kind, detail=detail or None, text_edit=types.TextEdit(place, text),
+        filter_text=f"<{label}" if text.startswith("<") else label,
+    )  # fmt: skip
+
+
+@cache
+def _concrete(cls: type[Object]) -> tuple[str, ...]:
+    """The tags of a class and of those derived from it, that may stand in a file."""
+    found = []
+    for tag in tags():
+        known = class_for(tag)
+        if known is not None and issubclass(known, cls):
+            found.append(tag)
+    return tuple(found)
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", "\\\\").replace("$", "\\$").replace("}", "\\}")

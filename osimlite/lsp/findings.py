@@ -1,0 +1,99 @@
+"""Findings of the linter as an editor shows them, with their mends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from lsprotocol import types
+
+from osimlite.lint.diagnostic import Edit, Finding, Severity
+from osimlite.lint.fixes import edits_of
+from osimlite.lsp.analysis import Analysis
+
+SOURCE = "osimlite"
+"""What an editor names as the origin of a diagnostic."""
+
+_SEVERITIES = {
+    Severity.ERROR: types.DiagnosticSeverity.Error,
+    Severity.WARNING: types.DiagnosticSeverity.Warning,
+    Severity.INFO: types.DiagnosticSeverity.Information,
+}
+
+
+def diagnostics(analysis: Analysis) -> list[types.Diagnostic]:
+    """Every finding."""
+    return [_diagnostic(analysis, finding) for finding in analysis.report]
+
+
+def _diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
+    hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion is not None else ""
+    return types.Diagnostic(
+        analysis.text.range(*_offsets(analysis, finding)),
+        f"{finding.message}{hint}",
+        severity=_SEVERITIES[finding.severity],
+        code=finding.code,
+        source=SOURCE,
+    )
+
+
+def _offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
+    if finding.line is None or finding.column is None:
+        return 0, 0
+    start = analysis.source.line_start(finding.line) + finding.column - 1
+    start = min(start, len(analysis.text.content))
+    return start, min(start + finding.length, len(analysis.text.content))
+
+
+def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
+    """What can be done about the findings in a range: their mends, and to ignore them; and to mend all of the file."""
+    found = []
+    first, last = analysis.text.offset(wanted.start), analysis.text.offset(wanted.end)
+    for finding in analysis.report:
+        start, end = _offsets(analysis, finding)
+        if start > last or end < first:
+            continue
+        concerned = [_diagnostic(analysis, finding)]
+        if finding.fix is not None:
+            edits = _edits(analysis, finding.fix.edits)
+            found.append(
+                types.CodeAction(
+                    _title(finding), kind=types.CodeActionKind.QuickFix, diagnostics=concerned,
+                    is_preferred=finding.fix.safe, edit=types.WorkspaceEdit({uri: edits}),
+                )
+            )  # fmt: skip
+        if finding.line is not None and finding.code[4] != "0":
+            found.append(
+                types.CodeAction(
+                    f"Ignore {finding.code} ({finding.name}) on this line", kind=types.CodeActionKind.QuickFix,
+                    diagnostics=concerned, edit=types.WorkspaceEdit({uri: [_ignoring(analysis, finding)]}),
+                )
+            )  # fmt: skip
+    safe = _edits(analysis, edits_of(analysis.report)[0])
+    if safe:
+        found.append(
+            types.CodeAction(
+                "Mend everything that is certain", kind=types.CodeActionKind.SourceFixAll,
+                edit=types.WorkspaceEdit({uri: safe}),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _title(finding: Finding) -> str:
+    assert finding.fix is not None
+    doubt = "" if finding.fix.safe else " (look at the result)"
+    if finding.suggestion is not None:
+        return f"Change to '{finding.suggestion}'{doubt}"
+    return f"Mend {finding.code} ({finding.name}){doubt}"
+
+
+def _edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
+    return [types.TextEdit(analysis.text.range(edit.start, edit.end), edit.text) for edit in edits]
+
+
+def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit:
+    """A comment at the end of the line that ignores the finding."""
+    assert finding.line is not None
+    line = analysis.source.lines[finding.line - 1]
+    end = analysis.source.line_start(finding.line) + len(line)
+    return types.TextEdit(analysis.text.range(end, end), f" <!-- osimlite: ignore {finding.code} -->")

@@ -1,0 +1,53 @@
+"""What classes and properties mean, in words: their docstrings, read when somebody asks."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from functools import cache
+from importlib import import_module
+
+from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.fields import Held, Reference, Value
+
+
+def meaning_of(spec: FieldSpec) -> str:
+    """What a property means: the text below its declaration; "" if there is none."""
+    declared = spec.declared_in
+    return _described(declared.__module__).get((declared.__name__, spec.name), "")
+
+
+def value_of(spec: FieldSpec) -> str:
+    """What may stand in a property, in a few words: ``one number in N/m, > 0``."""
+    kind = spec.kind
+    if isinstance(kind, Value):
+        words = kind.words()
+        if kind.choices:
+            words = "one of " + ", ".join(map(str, kind.choices))
+        words += f" in {kind.unit}" if kind.unit else ""
+        return words + (f", {kind.domain}" if kind.domain else "")
+    if isinstance(kind, Reference):
+        many = kind.shape == "list"
+        return f"names of {kind.target} components" if many else f"the name of a {kind.target}"
+    assert isinstance(kind, Held) and spec.accepts is not None
+    return f"objects of class {spec.accepts.tag}" if kind.form == "list" else f"one {spec.accepts.tag}"
+
+
+def described(cls: type[Object]) -> str:
+    """What a class is: its docstring."""
+    return inspect.cleandoc(cls.__doc__ or "")
+
+
+@cache
+def _described(module: str) -> dict[tuple[str, str], str]:
+    """The texts below the declarations of a module, by class and property. Python itself drops them."""
+    found: dict[tuple[str, str], str] = {}
+    for node in ast.parse(inspect.getsource(import_module(module))).body:
+        if not isinstance(node, ast.ClassDef):
+            continue
+        for field, text in zip(node.body, node.body[1:], strict=False):
+            is_field = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+            if is_field and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                assert isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+                found[node.name, field.target.id] = inspect.cleandoc(str(text.value.value))
+    return found

@@ -1,0 +1,191 @@
+"""The language server as a client sees it, over standard input and output."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
+from lsprotocol import types
+
+pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
+pytest.importorskip("pytest_lsp", reason="needs pytest-lsp (extra 'dev')")
+
+import pytest_lsp
+
+Edit = Callable[[str, str], "asyncio.Future[None]"]
+
+
+@pytest_lsp.fixture(
+    config=pytest_lsp.ClientServerConfig(server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"])
+)
+async def client(lsp_client: pytest_lsp.LanguageClient) -> AsyncIterator[None]:
+    capabilities = pytest_lsp.client_capabilities("visual-studio-code")
+    await lsp_client.initialize_session(types.InitializeParams(capabilities=capabilities))
+    yield
+    await lsp_client.shutdown_session()
+
+
+class File:
+    """An open file, and the changes that its user makes."""
+
+    def __init__(self, client, path: Path, text: str) -> None:
+        self.client, self.uri, self.text, self.version = client, path.as_uri(), text, 1
+
+    @property
+    def document(self) -> types.TextDocumentIdentifier:
+        return types.TextDocumentIdentifier(self.uri)
+
+    def place(self, text: str, within: int = 0, nth: int = 0) -> types.Position:
+        offset = -1
+        for _ in range(nth + 1):
+            offset = self.text.index(text, offset + 1)
+        offset += within
+        return types.Position(self.text.count("\n", 0, offset), offset - self.text.rfind("\n", 0, offset) - 1)
+
+    async def open(self) -> list[types.Diagnostic]:
+        item = types.TextDocumentItem(self.uri, "osim", self.version, self.text)
+        self.client.text_document_did_open(types.DidOpenTextDocumentParams(item))
+        return await self.checked()
+
+    async def type(self, old: str, new: str) -> list[types.Diagnostic]:
+        """Replace the first `old` by `new`, as an editor tells it."""
+        start, end = self.place(old), self.place(old, len(old))
+        change = types.TextDocumentContentChangePartial(types.Range(start, end), new)
+        self.text = self.text.replace(old, new, 1)
+        self.version += 1
+        document = types.VersionedTextDocumentIdentifier(self.version, self.uri)
+        self.client.text_document_did_change(types.DidChangeTextDocumentParams(document, [change]))
+        return await self.checked()
+
+    async def checked(self) -> list[types.Diagnostic]:
+        await self.client.wait_for_notification(types.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)
+        return list(self.client.diagnostics[self.uri])
+
+    def after(self, edits: list[types.TextEdit]) -> str:
+        lines = self.text.splitlines(keepends=True)
+
+        def offset(position: types.Position) -> int:
+            return sum(map(len, lines[: position.line])) + position.character
+
+        text = self.text
+        for edit in sorted(edits, key=lambda edit: offset(edit.range.start), reverse=True):
+            text = text[: offset(edit.range.start)] + edit.new_text + text[offset(edit.range.end) :]
+        return text
+
+    def words(self, place: types.Range) -> str:
+        assert place.start.line == place.end.line
+        return self.text.splitlines()[place.start.line][place.start.character : place.end.character]
+
+
+@pytest.fixture
+def walker(client, fixtures: Path, tmp_path: Path) -> File:
+    text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text()
+    return File(client, tmp_path / "walker.osim", text)
+
+
+@pytest.mark.asyncio
+async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker: File) -> None:
+    before = await walker.open()
+    assert not [found for found in before if found.severity == types.DiagnosticSeverity.Error]
+    found = [d for d in await walker.type("RFootContact Platform", "RFotContact Platform") if d.code == "OSIM301"]
+    assert [walker.words(d.range) for d in found] == ["RFotContact"]
+    assert "did you mean 'RFootContact'" in found[0].message
+    context = types.CodeActionContext(diagnostics=found, only=[types.CodeActionKind.QuickFix])
+    asked = types.CodeActionParams(walker.document, found[0].range, context)
+    actions = await client.text_document_code_action_async(asked)
+    mend = next(action for action in actions if "RFootContact" in action.title)
+    assert "RFootContact Platform" in walker.after(mend.edit.changes[walker.uri])
+
+
+@pytest.mark.asyncio
+async def test_a_file_that_is_broken_at_the_moment(client, walker: File) -> None:
+    await walker.open()
+    found = await walker.type("<mass>1</mass>", "<mass>1</mas")
+    assert next(d.code for d in found if d.severity == types.DiagnosticSeverity.Error) == "OSIM001"
+    hover = await client.text_document_hover_async(types.HoverParams(walker.document, walker.place("<mass>", 2)))
+    assert "**mass**: one number in kg" in hover.contents.value
+    await walker.type("<mass>1</mas", "<mass>1</mass>")
+    assert not [d for d in client.diagnostics[walker.uri] if d.severity == types.DiagnosticSeverity.Error]
+
+
+@pytest.mark.asyncio
+async def test_what_a_word_means(client, walker: File) -> None:
+    await walker.open()
+
+    async def hover(text: str, within: int) -> str:
+        asked = types.HoverParams(walker.document, walker.place(text, within))
+        found = await client.text_document_hover_async(asked)
+        return "" if found is None else found.contents.value
+
+    assert "/forceset/RFootForce" in await hover('<HuntCrossleyForce name="RFootForce"', 3)
+    assert "Hertz" in await hover('<HuntCrossleyForce name="RFootForce"', 3)
+    assert "one number in m/s, > 0; by default `0.01`" in await hover("<transition_velocity>", 4)
+    assert "ContactSphere `/contactgeometryset/RFootContact`" in await hover("RFootContact Platform", 4)
+    assert await hover("<?xml", 2) == ""
+
+
+@pytest.mark.asyncio
+async def test_where_a_name_leads_and_who_uses_it(client, walker: File) -> None:
+    await walker.open()
+    here = walker.place("RFootContact Platform", 4)
+    found = await client.text_document_definition_async(types.DefinitionParams(walker.document, here))
+    assert walker.words(found.range) == "RFootContact"
+    assert '<ContactSphere name="' in walker.text.splitlines()[found.range.start.line]
+    context = types.ReferenceContext(include_declaration=False)
+    asked = types.ReferenceParams(context, walker.document, found.range.start)
+    uses = await client.text_document_references_async(asked)
+    assert uses and all("RFootContact" in walker.words(use.range) for use in uses)
+    assert any("<geometry>" in walker.text.splitlines()[use.range.start.line] for use in uses)
+
+
+@pytest.mark.asyncio
+async def test_a_name_is_changed_everywhere(client, walker: File) -> None:
+    await walker.open()
+    here = walker.place('<ContactSphere name="RFootContact"', 23)
+    shown = await client.text_document_prepare_rename_async(types.PrepareRenameParams(walker.document, here))
+    assert (walker.words(shown.range), shown.placeholder) == ("RFootContact", "RFootContact")
+    edit = await client.text_document_rename_async(types.RenameParams(walker.document, here, "heel"))
+    after = walker.after(edit.changes[walker.uri])
+    assert '<ContactSphere name="heel"' in after and "heel Platform" in after
+    assert "RFootContact Platform" not in after
+    with pytest.raises(Exception, match="its parent has a 'LFootContact' already"):
+        await client.text_document_rename_async(types.RenameParams(walker.document, here, "LFootContact"))
+
+
+@pytest.mark.asyncio
+async def test_what_may_be_written_here(client, walker: File) -> None:
+    await walker.open()
+
+    async def labels(within: str, offset: int) -> list[str]:
+        asked = types.CompletionParams(walker.document, walker.place(within, offset))
+        found = await client.text_document_completion_async(asked)
+        return [item.label for item in found.items]
+
+    names = await labels("RFootContact Platform", 2)
+    assert {"RFootContact", "LFootContact"} <= {*names} and "Pelvis" not in names
+    await walker.type("<transition_velocity>", "<a/>\n<transition_velocity>")
+    await walker.type("<a/>", "<")
+    tags = await labels("<\n", 1)
+    assert "appliesForce" in tags and "stiffness" not in tags
+    await walker.type("<\n", "</\n")
+    assert await labels("</\n", 2) == ["HuntCrossleyForce"]
+
+
+@pytest.mark.asyncio
+async def test_outline_folds_and_layout(client, walker: File) -> None:
+    await walker.open()
+    (model,) = await client.text_document_document_symbol_async(types.DocumentSymbolParams(walker.document))
+    assert model.name == "DynamicWalkerModel"
+    sets = {child.name: child for child in model.children}
+    assert {"Pelvis", "RightThigh"} <= {body.name for body in sets["bodyset"].children}
+    folds = await client.text_document_folding_range_async(types.FoldingRangeParams(walker.document))
+    start = walker.place('<ContactSphere name="RFootContact"').line
+    fold = next(fold for fold in folds if fold.start_line == start)
+    assert walker.text.splitlines()[fold.end_line].strip() == "</ContactSphere>"
+    options = types.FormattingOptions(tab_size=4, insert_spaces=False)
+    await walker.type("\t\t\t<objects>", "<objects>")
+    edits = await client.text_document_formatting_async(types.DocumentFormattingParams(walker.document, options))
+    assert "\t\t\t<objects>" in walker.after(edits)
