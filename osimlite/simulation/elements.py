@@ -109,6 +109,7 @@ def force_elements(
     *,
     skip_unsupported: bool = False,
     simbody_early_return: bool = False,
+    external_loads: str | Path | None = None,
     folder: str | Path | None = None,
 ) -> Forces:
     """Gather the forces of a model.
@@ -120,11 +121,13 @@ def force_elements(
         mechanism: of the same model.
         skip_unsupported: leave out what cannot be computed instead of raising.
         simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
+        external_loads: a file of ExternalLoads, which follow the forces of the model.
         folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
 
     Raises:
         UnsupportedError: some forces cannot be computed; the message names them.
         ModelError: a force names what does not exist, or a parameter has no meaning.
+        OsimliteError: a file that is named cannot be read.
     """
     builder = ElementBuilder(model, mechanism, simbody_early_return, Path(folder or "."))
     elements: list[ForceElement] = []
@@ -139,6 +142,10 @@ def force_elements(
             f"osimlite cannot compute {listed(skipped)}; switch off their appliesForce, "
             "or leave them out with --skip-unsupported (skip_unsupported=True)"
         )
+    if external_loads is not None:
+        from osimlite.simulation.external_loads import read_external_loads
+
+        elements += read_external_loads(mechanism, external_loads)
     return Forces(tuple(elements), tuple(skipped))
 
 

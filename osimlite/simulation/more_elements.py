@@ -13,7 +13,7 @@ from osimlite.schema.actuators import (
     TorqueActuator,
 )
 from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
-from osimlite.schema.prescribed import PrescribedForce
+from osimlite.schema.prescribed import ExternalForce, PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedBushingForce,
@@ -33,6 +33,7 @@ from osimlite.simulation.actuator_elements import (
 )
 from osimlite.simulation.bushing_elements import Bushing
 from osimlite.simulation.elements import ElementBuilder, ForceElement
+from osimlite.simulation.external_loads import load_in_model
 from osimlite.simulation.mesh_contact import elastic_foundation
 from osimlite.simulation.path_elements import PATH_MAKERS
 from osimlite.simulation.smooth_contact_element import SmoothContact
@@ -51,6 +52,7 @@ MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
     ExpressionBasedBushingForce: Bushing.by_formulas,
     ExpressionBasedCoordinateForce: CoordinateFormula.of,
     ExpressionBasedPointToPointForce: PointSpring.of_formula,
+    ExternalForce: load_in_model,
     FunctionBasedBushingForce: Bushing.by_functions,
     PointToPointSpring: PointSpring.of,
     SmoothSphereHalfSpaceForce: SmoothContact.of,

@@ -5,9 +5,11 @@ The quantities, their names and their order are those of OpenSim's BodyKinematic
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +20,9 @@ from osimlite.multibody.smoothing_spline import rates_of_samples
 from osimlite.multibody.spatial import Array, angles_xyz
 from osimlite.simulation.storage import StoTable, read_sto
 from osimlite.text import listed
+
+if TYPE_CHECKING:
+    from osimlite.simulation.external_loads import ExternalLoad
 
 _HALF_ORDER = 3
 """OpenSim differentiates coordinates by splines of fifth degree."""
@@ -129,8 +134,8 @@ class RecordedMotion:
             row[:] = [number for place in places.values() for number in state.point(*place)]
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)
 
-    def inverse_dynamics(self) -> StoTable:
-        """Generalized forces (N, N·m) that make the bodies move so against gravity.
+    def inverse_dynamics(self, external_loads: Sequence[ExternalLoad] = ()) -> StoTable:
+        """Generalized forces (N, N·m) that make the bodies move so against gravity and external loads.
 
         Locks and other constraints are left aside, as in OpenSim. The forces belong to the generalized speeds: for
         ball and free joints a moment about an axis of the joint's parent frame. There OpenSim's tool takes the
@@ -139,10 +144,14 @@ class RecordedMotion:
         mechanism = self.mechanism
         first, second = self.rates
         rows = np.empty_like(self.values)
-        for row, q, qdot, qddot in zip(rows, self.values, first, second, strict=True):
+        for time, row, q, qdot, qddot in zip(self.times.tolist(), rows, self.values, first, second, strict=True):
             u = mechanism.speeds_from_rates(q, qdot)
             udot = mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u))
             row[:] = mechanism.inverse_dynamics(q, u, udot)
+            if external_loads:
+                state = mechanism.at(q)
+                for load in external_loads:
+                    row -= load.generalized(state, time)
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from math import floor, isfinite
+from pathlib import Path
 from typing import Any
 
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
@@ -41,6 +42,8 @@ def simulate(
     simbody_early_return: bool = False,
     opensim_derivatives: bool = False,
     rolling: bool = False,
+    external_loads: str | Path | None = None,
+    folder: str | Path | None = None,
     show: bool = False,
     progress: Progress | None = None,
 ) -> Trajectory:
@@ -66,6 +69,9 @@ def simulate(
         opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
             :func:`osimlite.multibody.build_mechanism`.
         rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
+        external_loads: a file of ExternalLoads: measured forces over time that act too.
+        folder: where the model's file is; files that the model names (of contact meshes) are looked for there. The
+            folder that the program runs in if left out.
         show: show the motion in Bullet's window, in real time; needs `fixed_step`.
         progress: called with the simulated time at every recorded moment.
 
@@ -84,6 +90,8 @@ def simulate(
         simbody_early_return=simbody_early_return,
         opensim_derivatives=opensim_derivatives,
         rolling=rolling,
+        external_loads=external_loads,
+        folder=folder,
         show=show,
     ) as simulation:
         return simulation.run(
@@ -123,13 +131,20 @@ class Simulation:
         simbody_early_return: bool = False,
         opensim_derivatives: bool = False,
         rolling: bool = False,
+        external_loads: str | Path | None = None,
+        folder: str | Path | None = None,
         show: bool = False,
     ) -> None:
         make = engine_factory(engine)
         self.mechanism: Mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives, rolling=rolling)
         _refuse_constraints(self.mechanism, engine)
         self.forces = force_elements(
-            model, self.mechanism, skip_unsupported=skip_unsupported, simbody_early_return=simbody_early_return
+            model,
+            self.mechanism,
+            skip_unsupported=skip_unsupported,
+            simbody_early_return=simbody_early_return,
+            external_loads=external_loads,
+            folder=folder,
         )
         visuals = None
         if show:
@@ -144,6 +159,7 @@ class Simulation:
             "simbody_early_return": simbody_early_return,
             "opensim_derivatives": opensim_derivatives,
             "rolling": rolling,
+            **({} if external_loads is None else {"external_loads": str(external_loads)}),
         }
         self._show = show
 

@@ -1,0 +1,158 @@
+"""Measured forces against a live OpenSim 4.6: in a model, and in its InverseDynamicsTool."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.document.reader import read_text
+from osimlite.multibody import build_mechanism
+from osimlite.schema.prescribed import ExternalForce, ExternalLoads
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.external_loads import read_external_loads
+from osimlite.simulation.recorded import RecordedMotion
+from osimlite.simulation.storage import read_sto, write_sto
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytestmark = pytest.mark.oracle
+
+from tests.oracle.test_forces import JOINTS, carrier  # noqa: E402
+
+LABELS = [f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"]
+
+
+def write_data(path, rows, start=0.0, end=1.0):
+    times = np.linspace(start, end, rows)
+    columns = [np.sin((1.0 + 0.4 * k) * times + k) * (3.0 + k) for k in range(len(LABELS))]
+    write_sto(path, "data", times.tolist(), LABELS, np.column_stack(columns).tolist())
+
+
+def loads(names):
+    """Every combination of what there may be, in some bodies and frames."""
+    first, second, third, framed = names
+    ids = {"force_identifier": "f_v", "point_identifier": "f_p", "torque_identifier": "m_"}
+    forces = [
+        ExternalForce(name="all", applied_to_body=first, **ids),
+        ExternalForce(
+            name="elsewhere",
+            applied_to_body=second,
+            force_expressed_in_body=third,
+            point_expressed_in_body=first,
+            **{what: f"1_{start}" for what, start in ids.items()},
+        ),
+        ExternalForce(name="at_the_origin", applied_to_body=third, force_identifier="1_f_v"),
+        ExternalForce(name="turning", applied_to_body=third, force_expressed_in_body=second, torque_identifier="m_"),
+        ExternalForce(name="framed", applied_to_body=framed, force_expressed_in_body=framed, **ids),
+        ExternalForce(name="off", applied_to_body=first, appliesForce=False, force_identifier="f_v"),
+    ]
+    forces[-2].point_expressed_in_body = framed
+    return ExternalLoads(name="loads", objects=forces, datafile="data.mot")
+
+
+def write_loads(path, names):
+    text = "".join(
+        f'<ExternalForce name="{force.name}"><appliesForce>{str(force.appliesForce).lower()}</appliesForce>'
+        + "".join(
+            f"<{tag}>{getattr(force, tag)}</{tag}>"
+            for tag in (
+                "applied_to_body",
+                "force_expressed_in_body",
+                "point_expressed_in_body",
+                "force_identifier",
+                "point_identifier",
+                "torque_identifier",
+            )
+            if getattr(force, tag) is not None
+        )
+        + "</ExternalForce>"
+        for force in loads(names).objects
+    )
+    path.write_text(
+        f'<?xml version="1.0"?><OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects>{text}</objects>'
+        "<groups/><datafile>data.mot</datafile></ExternalLoads></OpenSimDocument>"
+    )
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 300])
+@pytest.mark.parametrize("kinds", list(JOINTS.values()), ids=list(JOINTS))
+def test_accelerations_and_records(kinds, rows, tmp_path, monkeypatch):
+    from osimlite.simulation.engines.bullet import BulletEngine
+
+    monkeypatch.chdir(tmp_path)
+    opensim.Logger.setLevelString("off")
+    model = carrier(kinds)
+    osimlite.write(model, "model.osim")
+    write_data("data.mot", rows)
+    write_loads(tmp_path / "loads.xml", ("b2", "b0", "b1", "/bodyset/b1/f1"))
+    theirs = opensim.Model("model.osim")
+    added = opensim.ExternalLoads("loads.xml", True)
+    theirs.addModelComponent(added)
+    state = theirs.initSystem()
+    mechanism = build_mechanism(model)
+    names = mechanism.coordinate_names
+    rng = np.random.default_rng(rows)
+    with BulletEngine(mechanism, force_elements(model, mechanism, external_loads="loads.xml")) as engine:
+        # Within the data, and before and after it.
+        for time in (0.0, 0.37, 0.93, -0.2, 1.3):
+            q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
+            for name, value, speed in zip(names, q, u, strict=True):
+                coordinate = theirs.updCoordinateSet().get(name)
+                coordinate.setValue(state, value, False)
+                coordinate.setSpeedValue(state, speed)
+            state.setTime(time)
+            theirs.realizeAcceleration(state)
+            expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]
+            ours = engine.acceleration(time, q.tolist(), u.tolist())
+            assert np.abs(np.subtract(ours, expected)).max() <= 1e-9 * max(1.0, np.abs(expected).max())
+            labels, values = [], []
+            for number in range(added.getSize()):
+                force = added.get(number)
+                if force.get_appliesForce():
+                    found, row = force.getRecordLabels(), force.getRecordValues(state)
+                    labels += [found.get(place) for place in range(found.getSize())]
+                    values += [row.get(place) for place in range(found.getSize())]
+            assert list(engine.columns) == labels
+            recorded = engine.force_records(time, engine.state.pack(q, u))
+            assert recorded == pytest.approx(values, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["m0005", "m0013"])
+def test_inverse_dynamics(corpus, name, tmp_path, monkeypatch, capfd):
+    converted = next(model.converted for model in corpus if model.id == name)
+    text = gzip.decompress(converted.read_bytes()).decode()
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.osim").write_text(text)
+    mechanism = build_mechanism(read_text(text), opensim_derivatives=True)
+    times = np.linspace(0.0, 1.0, 120)
+    values = np.array([0.2 * np.sin(3.0 * times + place) for place in range(len(mechanism.coordinates))]).T
+    values += mechanism.values({})
+    write_sto("motion.mot", "motion", times, mechanism.coordinate_names, values.tolist())
+    write_data("data.mot", 700, -0.05, 1.02)
+    bodies = [body.name for body in mechanism.bodies]
+    write_loads(tmp_path / "loads.xml", (bodies[-1], bodies[0], bodies[len(bodies) // 2], f"/bodyset/{bodies[-2]}"))
+    opensim.Logger.setLevelString("off")
+    tool = opensim.InverseDynamicsTool()
+    tool.setModelFileName("model.osim")
+    tool.setCoordinatesFileName("motion.mot")
+    tool.setExternalLoadsFileName("loads.xml")
+    tool.setStartTime(0.0)
+    tool.setEndTime(1.0)
+    tool.setOutputGenForceFileName("forces.sto")
+    tool.setResultsDir(".")
+    excluded = opensim.ArrayStr()
+    excluded.append("ALL")
+    tool.setExcludedForces(excluded)
+    assert tool.run()
+    capfd.readouterr()
+    theirs = read_sto("forces.sto")
+    motion = RecordedMotion.read(mechanism, "motion.mot")
+    ours = motion.inverse_dynamics(read_external_loads(mechanism, "loads.xml"))
+    assert ours.columns == theirs.columns
+    # The tool writes eight digits after the point.
+    assert np.abs(ours.rows - theirs.rows).max() < 1e-8 * np.abs(theirs.rows).max() + 1e-8
+    without = motion.inverse_dynamics()
+    assert np.abs(ours.rows - without.rows).max() > 1.0
