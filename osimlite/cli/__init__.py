@@ -23,6 +23,7 @@ COMMANDS = (
     "translate",
     "simulate",
     "sweep",
+    "optimize",
     "kinematics",
     "inverse-dynamics",
     "lsp",

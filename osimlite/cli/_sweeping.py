@@ -80,7 +80,7 @@ def make_plan(
             raise SettingError(f"'{source}' is a file and takes no parameters; vary its properties by their paths")
         return plan(read(source), ranges, **choices)
     given = _words(parameter or [], "-p")
-    known = [name for name in parameters_of(source) if name not in given]
+    known = {name: default for name, default in parameters_of(source).items() if name not in given}
     return plan(partial(_make, make_model, source, given), ranges, parameters=known, **choices)
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pickle
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
+from types import MappingProxyType
 from typing import Any
 
 from osimlite.document.printer import to_text
@@ -117,7 +118,7 @@ def plan(
     source: Model | Maker,
     vary: Mapping[str, Range],
     *,
-    parameters: Sequence[str] = (),
+    parameters: Mapping[str, Any] = MappingProxyType({}),
     **choices: Any,
 ) -> Plan:
     """Make a plan.
@@ -125,7 +126,7 @@ def plan(
     Args:
         source: the model, or what makes it from the parameters that it is given.
         vary: ranges by name, see :mod:`osimlite.sweep.variables`.
-        parameters: names of the parameters that `source` takes.
+        parameters: that `source` takes, with their defaults.
         choices: further attributes of :class:`Plan`.
 
     Raises:

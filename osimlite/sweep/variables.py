@@ -15,8 +15,9 @@ A parameter of that name is meant by `slope` if there is one. A locked coordinat
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,6 +58,7 @@ class Parameter:
     """An argument of the function that makes the model."""
 
     name: str
+    default: float | None = None
 
 
 @dataclass(frozen=True)
@@ -88,13 +90,16 @@ class Variable:
     is_log: bool = False
 
     def at(self, fraction: Floats) -> Floats:
-        """The values at fractions of the way from low to high; exact at either end."""
+        """The values at fractions of the way from low to high, none of which is beyond them; exact at either end."""
+        found = np.clip(self.beyond(fraction), self.low, self.high)
+        return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, found))
+
+    def beyond(self, fraction: Floats) -> Floats:
+        """The values at fractions of the way from low to high, or farther."""
         if self.is_log:
             a, b = math.log(self.low), math.log(self.high)
-            found = np.exp(a + fraction * (b - a))
-        else:
-            found = self.low + fraction * (self.high - self.low)
-        return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, found))
+            return np.exp(a + fraction * (b - a))
+        return self.low + fraction * (self.high - self.low)
 
     def fraction(self, value: float) -> float:
         """Where a value lies, 0 at low and 1 at high."""
@@ -133,7 +138,10 @@ def parse(words: Sequence[str]) -> dict[str, Range]:
 
 
 def variables(
-    ranges: Mapping[str, Range], model: Model, mechanism: Mechanism, parameters: Collection[str] = ()
+    ranges: Mapping[str, Range],
+    model: Model,
+    mechanism: Mechanism,
+    parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[Variable, ...]:
     """Find what is meant by names, and read their ranges.
 
@@ -141,7 +149,7 @@ def variables(
         ranges: by name.
         model: that is varied.
         mechanism: of it.
-        parameters: of the function that makes it.
+        parameters: of the function that makes it, with their defaults.
 
     Raises:
         SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
@@ -159,7 +167,7 @@ def variables(
     return tuple(found)
 
 
-def _target(name: str, model: Model, mechanism: Mechanism, parameters: Collection[str]) -> tuple[Target, str]:
+def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> tuple[Target, str]:
     """What a name means, and in what unit."""
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     front, _, last = name.rpartition("/")
@@ -167,7 +175,8 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Collectio
     if key in infos:
         return _coordinate(name, infos[key], is_speed, model)
     if name in parameters:
-        return Parameter(name), "parameter"
+        default = parameters[name]
+        return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
     if name.startswith("/"):
         found = places(model, name)
         unit = found[0].unit

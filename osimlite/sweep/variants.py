@@ -106,6 +106,21 @@ class Variants:
             row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
         return row
 
+    def present(self) -> list[float | None]:
+        """The values of the variables in the model as it is given; None where nothing tells it."""
+        found: list[float | None] = []
+        engine = self.given.engine
+        setters = dict(self._setters)
+        for place, item in enumerate(self._plan.variables):
+            if isinstance(item.target, Start):
+                info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinate)]
+                found.append(info.default_speed if item.target.is_speed else info.default_value)
+            elif isinstance(item.target, Property):
+                found.append(setters[place][0].get())
+            else:
+                found.append(0.0 if isinstance(item.target, Slope) else item.target.default)
+        return found
+
     def set_start(self, values: Sequence[float]) -> None:
         """Make the initial state of a sample the default state of `model`."""
         coordinates: Any = self.model.tree().by_path

@@ -1,0 +1,99 @@
+"""``osimlite optimize``: the start, or the numbers, that serve a model best."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from osimlite.cli import _sweeping as options
+
+if TYPE_CHECKING:
+    from osimlite.sweep.optimize import Optimum
+
+
+def optimize(
+    source: options.Source,
+    objective: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|module:function",
+            help="What is wanted: distance, steps, time_to_fall (the more, the better), largest_force, scuffs, energy "
+            "or a function (the less, the better).",
+            show_default=False,
+        ),
+    ],
+    vary: options.Vary = None,
+    budget: Annotated[int, typer.Option(help="How many runs are allowed.")] = 1000,
+    method: Annotated[str, typer.Option(help="'cma', 'differential-evolution' or 'nelder-mead'.")] = "cma",
+    popsize: Annotated[
+        int | None, typer.Option(help="Runs between two decisions.", show_default="what suits the method")
+    ] = None,
+    sigma: Annotated[
+        float, typer.Option(help="How far from the start to look at first, as a fraction of the ranges.")
+    ] = 0.25,
+    seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
+    maximize: Annotated[
+        bool | None, typer.Option("--maximize/--minimize", help="What is better.", show_default="see --objective")
+    ] = None,
+    unbounded: Annotated[
+        bool, typer.Option("--unbounded", help="The ranges say where to begin, and may be left.")
+    ] = False,
+    tolerance: Annotated[
+        float | None, typer.Option(help="At which the search has converged.", show_default="that of the method")
+    ] = None,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option("--measure", metavar="NAME", help="What else to keep in the history.", show_default=False),
+    ] = None,
+    to: options.To = 2.0,
+    engine: options.Engine = "compiled",
+    accuracy: options.Accuracy = None,
+    stop_below: options.Below = None,
+    stop_above: options.Above = None,
+    parameter: options.Parameters = None,
+    workers: options.Workers = None,
+    cluster: options.Cluster = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json.")
+    ] = Path("optimum"),
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted or finished search.")] = False,
+    skip_unsupported: options.SkipUnsupported = False,
+) -> None:
+    """Look for the start, or the numbers, with which a model does best; writes it with them, ready to simulate.
+
+    Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
+    """
+    from rich.console import Console
+
+    from osimlite.cli._progress import progress_bar
+    from osimlite.sweep.optimize import Objective
+    from osimlite.sweep.optimize import optimize as search
+
+    plan = options.make_plan(
+        source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
+        accuracy=accuracy, skip_unsupported=skip_unsupported,
+    )  # fmt: skip
+    console = Console()
+    with progress_bar(console, "searching", budget) as progress:
+        found = search(
+            plan, Objective(objective, maximize), output, method=method, budget=budget, popsize=popsize, seed=seed,
+            sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, workers=workers,
+            cluster=cluster, progress=progress,
+        )  # fmt: skip
+    console.print(_table(objective, found))
+
+
+def _table(objective: str, found: Optimum) -> Any:
+    from rich.table import Table
+
+    table = Table(title=f"{objective} {found.value:.6g}", title_justify="left", show_header=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, value in found.values.items():
+        table.add_row(name, f"{value:.6g}")
+    table.add_row("runs", f"{found.evaluations}, the best was number {found.evaluation}")
+    table.add_row("ended", found.ended)
+    table.add_row("files", f"{found.model}, {found.history}")
+    return table

@@ -1,0 +1,323 @@
+"""The best start, or the best numbers, of a model: a search whose points are run like those of a sweep."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.document.printer import write
+from osimlite.errors import SettingError, SimulationError
+from osimlite.files import make_folder, write_atomically
+from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
+from osimlite.sweep.plan import Plan
+from osimlite.sweep.pools import Pool, pool
+from osimlite.sweep.results import Partial, differences, schema, settings_of
+from osimlite.sweep.run import Interrupted
+from osimlite.sweep.runner import FAILED, Block
+from osimlite.sweep.search import Enough, Search, method_named
+from osimlite.sweep.variables import Floats
+from osimlite.sweep.variants import Variants
+from osimlite.text import listed
+
+HISTORY, BEST, SUMMARY = "history.parquet", "best.osim", "summary.json"
+"""What a search writes into its folder."""
+
+Progress = Callable[[float, float], object]
+"""Called with the number of evaluations that are done, and of all that are allowed."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What is wanted of a run.
+
+    Attributes:
+        measure: name of a measure, ``module:function``, or a function.
+        is_maximized: whether more is better; by default for distance, steps and time_to_fall.
+    """
+
+    measure: Any
+    is_maximized: bool | None = None
+
+    @property
+    def sign(self) -> float:
+        """What makes a cost of the measure."""
+        wanted = measure_name(self.measure) in LARGER_IS_BETTER if self.is_maximized is None else self.is_maximized
+        return -1.0 if wanted else 1.0
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best that was found.
+
+    Attributes:
+        value: of the objective.
+        values: of the variables, by name.
+        evaluations: that the search took, with those of before.
+        evaluation: number of the best.
+        ended: why the search ended.
+        model: file of the model, with its start as default values and speeds.
+        history: file of all evaluations.
+    """
+
+    value: float
+    values: dict[str, float]
+    evaluations: int
+    evaluation: int
+    ended: str
+    model: Path
+    history: Path
+
+
+def optimize(
+    plan: Plan,
+    objective: Objective,
+    folder: str | Path,
+    *,
+    method: str = "cma",
+    budget: int = 1000,
+    popsize: int | None = None,
+    seed: int = 0,
+    sigma: float = 0.25,
+    tolerance: float | None = None,
+    is_bounded: bool = True,
+    start: Sequence[float] | None = None,
+    resume: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+) -> Optimum:
+    """Look for the values of the variables that serve an objective best.
+
+    Args:
+        plan: what is run; its measures are kept in the history too.
+        objective: what is wanted.
+        folder: where `history.parquet`, `best.osim` and `summary.json` are written.
+        method: one of `METHODS`.
+        budget: runs that are allowed.
+        popsize: runs between two decisions of the method.
+        seed: what makes the search the same again.
+        sigma: how far from the start to look at first, as a fraction of the ranges.
+        tolerance: of the cost and of the points (as fractions of the ranges), at which the search ends.
+        is_bounded: whether the ranges are bounds, or say only where to begin.
+        start: values to begin at; by default those of the model where they are within the ranges, else the middle.
+        resume: go on with an interrupted search, or with a finished one and a larger budget.
+        workers: as of a sweep.
+        cluster: as of a sweep.
+        progress: called as runs are done.
+
+    Raises:
+        Interrupted: by the keyboard; the search can be resumed.
+        SimulationError: no run came to its end.
+        OsimliteError: as of a sweep.
+    """
+    look = method_named(method)
+    free = [place for place, item in enumerate(plan.variables) if not item.is_fixed]
+    if not free:
+        raise SettingError("there is nothing to search: every variable has one value only")
+    if budget < 1 or (popsize is not None and popsize < 2):
+        raise SettingError("a search has a budget of at least one run, and a population of at least two")
+    if not (isfinite(sigma) and sigma > 0.0):
+        raise SettingError(f"the first search distance is positive, not {sigma:g}")
+    names = [measure_name(spec) for spec in (objective.measure, *plan.measures)]
+    measures = tuple(dict(zip(names, (objective.measure, *plan.measures), strict=True)).values())
+    plan = replace(plan, measures=measures)
+    variants = Variants(plan)
+    point = _start(plan, variants, free, start, is_bounded)
+    wanted = {
+        **plan.settings(), "objective": names[0], "sign": objective.sign, "method": method, "popsize": popsize,
+        "seed": seed, "sigma": sigma, "tolerance": tolerance, "bounded": is_bounded, "start": point.tolist(),
+    }  # fmt: skip
+    where = make_folder(folder)
+    with pool(plan, workers=workers, cluster=cluster) as workforce:
+        evaluations = _Evaluations(plan, free, objective.sign, is_bounded, budget, workforce, progress)
+        partial = _open(where / HISTORY, schema(_columns(plan), wanted), resume, evaluations)
+        evaluations.partial = partial
+        try:
+            ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
+        except Enough:
+            ended = f"as many runs as were allowed: {evaluations.count}"
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"interrupted after {partial.rows} runs, which are in '{partial.partial}'; go on with --resume"
+            ) from None
+        finally:
+            partial.close()
+        partial.finish()
+    return _finish(where, plan, variants, evaluations, wanted, ended)
+
+
+def _columns(plan: Plan) -> dict[str, str]:
+    return {
+        "evaluation": "int64",
+        "batch": "int64",
+        **{item.name: "float64" for item in plan.variables},
+        "status": "string",
+        "reason": "string",
+        "time": "float64",
+        **{measure_name(spec): "float64" for spec in plan.measures},
+    }
+
+
+def _start(
+    plan: Plan, variants: Variants, free: Sequence[int], start: Sequence[float] | None, is_bounded: bool
+) -> Floats:
+    given: Sequence[float | None] = variants.present() if start is None else start
+    if len(given) != len(plan.variables):
+        raise SettingError(
+            f"the start has one number for each of the {len(plan.variables)} variables, not {len(given)}"
+        )
+    found = []
+    for place in free:
+        item, value = plan.variables[place], given[place]
+        within = value is not None and (item.low <= value <= item.high or not is_bounded)
+        if start is not None and not within:
+            raise SettingError(f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}")
+        if value is not None and item.is_log and value <= 0.0:
+            within = False
+        found.append(item.fraction(value) if value is not None and within else 0.5)
+    return np.array(found)
+
+
+def _open(path: Path, table: Any, resume: bool, evaluations: _Evaluations) -> Partial:
+    """The history, and what is in it already."""
+    partial_is_there = path.with_name(f"{path.name}.partial").exists()
+    if resume and path.exists() and not partial_is_there:
+        before = settings_of(path)
+        unlike = differences(before, json.loads(table.metadata[b"osimlite"]))
+        if unlike:
+            raise SettingError(f"the search in '{path.parent}' has other settings: {listed(unlike)}; ask for the same")
+        pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
+        batches = pq.read_table(path).to_batches()
+        partial = Partial(path, table)
+        for batch in batches:
+            partial.add(batch.columns)
+            evaluations.remember(batch)
+        return partial
+    partial = Partial(path, table, resume=resume)
+    partial.read(evaluations.remember)
+    return partial
+
+
+class _Evaluations:
+    """Answers what a method asks: from the history while there is one, then by running."""
+
+    partial: Partial
+
+    def __init__(
+        self,
+        plan: Plan,
+        free: Sequence[int],
+        sign: float,
+        is_bounded: bool,
+        budget: int,
+        workforce: Pool,
+        progress: Progress | None,
+    ) -> None:
+        self.plan, self.free, self.sign, self.is_bounded = plan, list(free), sign, is_bounded
+        self.budget, self.pool, self.progress = budget, workforce, progress
+        self.objective = measure_name(plan.measures[0])
+        self.count = self.batches = 0
+        self.worst = 0.0
+        self.best: tuple[float, int, list[float]] | None = None
+        self.reasons: list[str] = []
+        self._history: list[tuple[list[float], str, float]] = []
+
+    def remember(self, batch: Any) -> None:
+        """Take what was found before."""
+        columns = batch.to_pydict()
+        values = [columns[item.name] for item in self.plan.variables]
+        found = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
+        self._history += [(list(row), status, value) for row, status, value in found]
+
+    def ask(self, points: Floats) -> Floats:
+        """Costs (k,) of points (k, d) of the cube of the free variables."""
+        if self.count + len(points) > self.budget:
+            raise Enough
+        values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
+        for column, place in enumerate(self.free):
+            item = self.plan.variables[place]
+            values[:, place] = (item.at if self.is_bounded else item.beyond)(points[:, column])
+        known = self._history[self.count : self.count + len(points)]
+        if any(row != list(new) for (row, _, _), new in zip(known, values.tolist(), strict=False)):
+            raise SettingError(
+                "the search takes another way than before, so that it cannot go on; another version of its library "
+                "may be installed, so start it anew in another folder"
+            )
+        rest = values[len(known) :]
+        if len(rest):
+            known = known + self._run(rest, self.count + len(known))
+        costs = [self._cost(status, value) for _, status, value in known]
+        for number, (cost, row) in enumerate(zip(costs, values.tolist(), strict=True)):
+            if known[number][1] != FAILED and (self.best is None or cost < self.best[0]):
+                self.best = cost, self.count + number, row
+        self.count += len(points)
+        self.batches += 1
+        if self.progress is not None:
+            self.progress(self.count, self.budget)
+        return np.array(costs)
+
+    def _cost(self, status: str, value: float) -> float:
+        """Of a run; what fails is worse than anything before."""
+        if status == FAILED or not isfinite(value):
+            return self.worst + max(1.0, abs(self.worst))
+        cost = self.sign * value
+        self.worst = max(self.worst, cost)
+        return cost
+
+    def _run(self, values: Floats, first: int) -> list[tuple[list[float], str, float]]:
+        size = max(1, -(-len(values) // (2 * self.pool.workers)))
+        starts = range(0, len(values), size)
+        for place in starts:
+            self.pool.submit(place, values[place : place + size])
+        blocks: dict[int, Block] = dict(self.pool.result() for _ in starts)
+        ordered = [blocks[place] for place in starts]
+        status = [word for block in ordered for word in block.status]
+        reasons = [word for block in ordered for word in block.reasons]
+        measures = {name: np.concatenate([block.measures[name] for block in ordered]) for name in ordered[0].measures}
+        self.partial.add(
+            [
+                np.arange(first, first + len(values)),
+                np.full(len(values), self.batches),
+                *values.T,
+                status,
+                reasons,
+                np.concatenate([block.times for block in ordered]),
+                *measures.values(),
+            ]
+        )
+        self.reasons += [word for word in reasons if word][: 10 - len(self.reasons)]
+        return list(zip(values.tolist(), status, measures[self.objective].tolist(), strict=True))
+
+
+def _finish(
+    where: Path, plan: Plan, variants: Variants, evaluations: _Evaluations, wanted: dict[str, Any], ended: str
+) -> Optimum:
+    if evaluations.best is None:
+        raise SimulationError(
+            f"none of {evaluations.count} runs came to its end; {listed(evaluations.reasons, most=1)}"
+        )
+    cost, number, row = evaluations.best
+    variants.put(row)
+    variants.set_start(row)
+    write(variants.model, where / BEST)
+    value = evaluations.sign * cost
+    named = {item.name: x for item, x in zip(plan.variables, row, strict=True)}
+    found = Optimum(value, named, evaluations.count, number, ended, where / BEST, where / HISTORY)
+    summary = {
+        "objective": wanted["objective"],
+        "value": value,
+        "values": named,
+        "evaluation": number,
+        "evaluations": evaluations.count,
+        "ended": ended,
+        "settings": wanted,
+    }
+    write_atomically(where / SUMMARY, json.dumps(summary, indent=2) + "\n")
+    return found

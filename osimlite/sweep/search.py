@@ -1,0 +1,125 @@
+"""Methods that look for the least cost, each as a function that asks for the costs of points of the unit cube.
+
+All are deterministic: with the same seed and the same answers they ask the same questions, which is how an interrupted
+search goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import SettingError
+from osimlite.sweep.variables import Floats
+from osimlite.text import did_you_mean, listed
+
+Ask = Callable[[Floats], Floats]
+"""Costs (k,) of points (k, d); raises `Enough` when no more are wanted."""
+
+
+class Enough(Exception):
+    """There have been as many evaluations as were allowed."""
+
+
+class Search(NamedTuple):
+    """How to search.
+
+    Attributes:
+        start: first point (d,).
+        sigma: how far from it to look at first, as a fraction of the ranges.
+        popsize: points that are asked for together, or None for what suits the method.
+        seed: what makes it the same again.
+        is_bounded: whether points stay within the cube.
+        budget: evaluations that are allowed.
+        tolerance: of cost and points, at which the search ends; None for that of the method.
+    """
+
+    start: Floats
+    sigma: float
+    popsize: int | None
+    seed: int
+    is_bounded: bool
+    budget: int
+    tolerance: float | None = None
+
+
+def cma(ask: Ask, search: Search) -> str:
+    """Covariance matrix adaptation (Hansen's pycma); why it ended."""
+    strategy = require("cma", extra="optimize", purpose="the search by cma")
+    source = np.random.RandomState(search.seed)
+    options: dict[str, Any] = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "randn": source.randn, "seed": np.nan}
+    if search.popsize is not None:
+        options["popsize"] = search.popsize
+    if search.is_bounded:
+        options["bounds"] = [0.0, 1.0]
+    if search.tolerance is not None:
+        options |= {"tolfun": search.tolerance, "tolx": search.tolerance}
+    es = strategy.CMAEvolutionStrategy(search.start, search.sigma, options)
+    while not es.stop():
+        points = es.ask()
+        es.tell(points, ask(np.array(points)).tolist())
+    return "converged: " + ", ".join(str(reason) for reason in es.stop())
+
+
+def differential_evolution(ask: Ask, search: Search) -> str:
+    """Differential evolution (scipy's); why it ended."""
+    optimize = require("scipy.optimize", extra="sweep", purpose="the search by differential evolution")
+    _needs_bounds(search)
+    rng, size = np.random.default_rng(search.seed), len(search.start)
+    first = rng.random((max(5, search.popsize or 10 * size), size))
+    first[0] = search.start
+    found = optimize.differential_evolution(
+        lambda points: ask(np.atleast_2d(points.T)),
+        [(0.0, 1.0)] * size,
+        init=first,
+        maxiter=search.budget,
+        tol=search.tolerance if search.tolerance is not None else 0.01,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
+        rng=rng,
+    )
+    return f"converged: {found.message}"
+
+
+def nelder_mead(ask: Ask, search: Search) -> str:
+    """The simplex of Nelder and Mead (scipy's); why it ended. One run at a time."""
+    optimize = require("scipy.optimize", extra="sweep", purpose="the search by Nelder and Mead")
+    size, tolerance = len(search.start), search.tolerance if search.tolerance is not None else 1e-6
+    simplex = np.tile(search.start, (size + 1, 1))
+    for k in range(size):
+        simplex[k + 1, k] += search.sigma if simplex[k + 1, k] + search.sigma <= 1.0 else -search.sigma
+    found = optimize.minimize(
+        lambda point: float(ask(point[None])[0]),
+        search.start,
+        method="Nelder-Mead",
+        bounds=[(0.0, 1.0)] * size if search.is_bounded else None,
+        options={"initial_simplex": simplex, "maxfev": 10**9, "maxiter": 10**9, "xatol": tolerance, "fatol": tolerance},
+    )
+    return f"converged: {found.message}"
+
+
+METHODS: dict[str, Callable[[Ask, Search], str]] = {
+    "cma": cma,
+    "differential-evolution": differential_evolution,
+    "nelder-mead": nelder_mead,
+}
+
+
+def method_named(name: str) -> Callable[[Ask, Search], str]:
+    """A method by its name.
+
+    Raises:
+        SettingError: there is none.
+    """
+    if name not in METHODS:
+        raise SettingError(f"there is no method '{name}'{did_you_mean(name, METHODS)}; there is {listed(METHODS)}")
+    return METHODS[name]
+
+
+def _needs_bounds(search: Search) -> None:
+    if not search.is_bounded:
+        raise SettingError("differential evolution stays within the ranges; take --method cma to leave them")
