@@ -128,17 +128,8 @@ def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[Externa
         DocumentError: a file is missing, or holds something else.
         ModelError: the mechanism has no body of a name, or the data file no three columns for an identifier.
     """
-    loads = read_object(path, ExternalLoads)
-    return external_loads(mechanism, loads, Path(path).parent, str(path))
-
-
-def external_loads(mechanism: Mechanism, loads: ExternalLoads, folder: Path, file: str) -> tuple[ExternalLoad, ...]:
-    """The loads of a set; its data file is looked for in a folder. `file` is for messages."""
-    if not loads.datafile.strip():
-        raise ModelError("it names no data file; give it a <datafile>", file=file)
-    name = loads.datafile.strip()
-    beside = folder / name
-    columns = _Columns(read_sto(beside if beside.is_file() or not Path(name).is_file() else name))
+    loads, file = read_object(path, ExternalLoads), str(path)
+    columns = _data(loads, Path(path).parent, file)
     forces = (force for force in loads.objects if force.appliesForce)
     return tuple(_load(mechanism, force, columns, f"/componentset/{loads.name}/{force.name}", file) for force in forces)
 
@@ -152,8 +143,17 @@ def load_in_model(builder: ElementBuilder, force: ExternalForce) -> ExternalLoad
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
         raise builder.unsupported(force, " outside of ExternalLoads, so that it has no data file")
-    alone = loads.model_copy(update={"objects": [force]})
-    return external_loads(builder.mechanism, alone, builder.folder, builder.path(loads))[0]
+    columns = _data(loads, builder.folder, builder.path(loads))
+    return _load(builder.mechanism, force, columns, builder.path(force), builder.path(loads))
+
+
+def _data(loads: ExternalLoads, folder: Path, file: str) -> _Columns:
+    """The data of some loads, looked for in a folder first."""
+    name = loads.datafile.strip()
+    if not name:
+        raise ModelError("it names no data file; give it a <datafile>", file=file)
+    beside = folder / name
+    return _Columns(read_sto(beside if beside.is_file() or not Path(name).is_file() else name))
 
 
 def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, path: str, file: str) -> ExternalLoad:

@@ -78,24 +78,33 @@ def write_loads(path, names):
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 300])
+@pytest.mark.parametrize("within", [False, True], ids=["beside the model", "in the model"])
 @pytest.mark.parametrize("kinds", list(JOINTS.values()), ids=list(JOINTS))
-def test_accelerations_and_records(kinds, rows, tmp_path, monkeypatch):
+def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
     from osimlite.simulation.engines.bullet import BulletEngine
 
     monkeypatch.chdir(tmp_path)
     opensim.Logger.setLevelString("off")
     model = carrier(kinds)
+    places = ("b2", "b0", "b1", "/bodyset/b1/f1")
+    if within:
+        model.subcomponents.append(loads(places))
     osimlite.write(model, "model.osim")
     write_data("data.mot", rows)
-    write_loads(tmp_path / "loads.xml", ("b2", "b0", "b1", "/bodyset/b1/f1"))
+    write_loads(tmp_path / "loads.xml", places)
     theirs = opensim.Model("model.osim")
-    added = opensim.ExternalLoads("loads.xml", True)
-    theirs.addModelComponent(added)
+    if within:
+        # OpenSim gives sets within a model a name of its own.
+        added = opensim.ExternalLoads.safeDownCast(theirs.getComponent("/externalloads"))
+    else:
+        added = opensim.ExternalLoads("loads.xml", True)
+        theirs.addModelComponent(added)
     state = theirs.initSystem()
     mechanism = build_mechanism(model)
     names = mechanism.coordinate_names
     rng = np.random.default_rng(rows)
-    with BulletEngine(mechanism, force_elements(model, mechanism, external_loads="loads.xml")) as engine:
+    forces = force_elements(model, mechanism, external_loads=None if within else "loads.xml")
+    with BulletEngine(mechanism, forces) as engine:
         # Within the data, and before and after it.
         for time in (0.0, 0.37, 0.93, -0.2, 1.3):
             q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))

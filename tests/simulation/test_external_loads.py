@@ -1,0 +1,132 @@
+"""Measured forces: their splines, what they do in a simulation, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from osimlite.errors import DocumentError, MissingFileError, ModelError, UnsupportedError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.schema.frames import Body
+from osimlite.schema.functions import Constant, FunctionSet
+from osimlite.schema.joints import FreeJoint
+from osimlite.schema.model import Model
+from osimlite.schema.prescribed import ExternalForce, PrescribedForce
+from osimlite.simulation import simulate, write_sto
+from osimlite.simulation.external_loads import natural_cubics, read_external_loads
+
+LABELS = ["grf_vx", "grf_vy", "grf_vz", "grf_px", "grf_py", "grf_pz", "grf_mx", "grf_my", "grf_mz"]
+
+
+@pytest.fixture
+def model():
+    model = Model(name="block")
+    body = model.add(Body(name="block", mass=2.0, inertia=(0.2, 0.3, 0.4, 0, 0, 0)))
+    model.add(FreeJoint(name="free").between(model.ground, body))
+    return model
+
+
+def document(folder: Path, body: str, datafile: str = "grf.mot", version: int = 40600) -> Path:
+    path = folder / "loads.xml"
+    path.write_text(
+        f'<?xml version="1.0"?><OpenSimDocument Version="{version}"><ExternalLoads name="loads"><objects>'
+        f'<ExternalForce name="plate">{body}</ExternalForce></objects><datafile>{datafile}</datafile>'
+        "</ExternalLoads></OpenSimDocument>"
+    )
+    return path
+
+
+def force(**tags: str) -> str:
+    given = {"applied_to_body": "block", "force_identifier": "grf_v", "point_identifier": "grf_p", **tags}
+    return "".join(f"<{tag}>{value}</{tag}>" for tag, value in given.items() if value)
+
+
+def data(folder: Path, rows: np.ndarray, times=(0.0, 1.0)) -> None:
+    write_sto(folder / "grf.mot", "grf", times, LABELS, rows.tolist())
+
+
+@pytest.mark.parametrize("count", [4, 5, 40])
+def test_splines_are_those_of_opensim(count):
+    rng = np.random.default_rng(count)
+    times = np.cumsum(rng.uniform(0.1, 1.0, count))
+    columns = rng.normal(size=(count, 3))
+    for column, ours in zip(columns.T, natural_cubics(times, columns), strict=True):
+        theirs = smoothing_spline(times, column, 2, 0.0)
+        for x in np.concatenate([times, rng.uniform(times[0] - 1.0, times[-1] + 1.0, 50)]):
+            for a, b in zip(ours.evaluate(np.array([x])), theirs.evaluate(np.array([x])), strict=True):
+                assert a == pytest.approx(b, abs=1e-9)
+
+
+def test_the_same_as_a_prescribed_force(model, tmp_path):
+    row = [1.0, 25.0, -2.0, 0.1, 0.2, -0.1, 0.3, 0.4, -0.5]
+    data(tmp_path, np.array([row, row]))
+    path = document(tmp_path, force(point_expressed_in_body="block", torque_identifier="grf_m"))
+    loaded = simulate(model, 0.3, external_loads=path, accuracy=1e-8)
+    assert loaded.summary["settings"]["external_loads"] == str(path)
+    parts = [[Constant(value=value) for value in row[start : start + 3]] for start in (0, 3, 6)]
+    names = ("forceFunctions", "pointFunctions", "torqueFunctions")
+    sets = {name: FunctionSet(name=name, objects=part) for name, part in zip(names, parts, strict=True)}
+    model.add(PrescribedForce(name="same", socket_frame="/bodyset/block", **sets))
+    same = simulate(model, 0.3, accuracy=1e-8)
+    assert loaded.values[-1] == pytest.approx(same.values[-1], abs=1e-12)
+    assert loaded.forces["block_plate_Fy"][-1] == 25.0
+    assert loaded.forces["block_plate_py"][-1] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("tags", "error", "words"),
+    [
+        ({"applied_to_body": "blok"}, ModelError, r"the applied_to_body of 'plate' is 'blok', .*did you mean 'block'"),
+        ({"force_expressed_in_body": "/bodyset/blocks"}, ModelError, "did you mean '/bodyset/block'"),
+        ({"force_identifier": "gfr_v"}, ModelError, "the force_identifier of 'plate' is 'gfr_v'; .* mean 'grf_v'"),
+        ({"force_identifier": "grf_"}, ModelError, "exactly three columns must begin so, and .* has grf_vx, grf_vy"),
+        ({"force_identifier": ""}, ModelError, "has no force_identifier and no torque_identifier"),
+        ({"force_identifier": "", "torque_identifier": "grf_m"}, ModelError, "leave it out"),
+        ({"force_identifer": "grf_v"}, DocumentError, "<force_identifer> means nothing"),
+    ],
+)
+def test_misspellings(model, tmp_path, tags, error, words):
+    data(tmp_path, np.ones((2, 9)))
+    path = document(tmp_path, force(**tags))
+    with pytest.raises(error, match=words) as caught:
+        read_external_loads(build_mechanism(model), path)
+    assert caught.value.file == str(path)
+
+
+def test_data_that_cannot_be_used(model, tmp_path):
+    mechanism = build_mechanism(model)
+    path = document(tmp_path, force())
+    with pytest.raises(MissingFileError) as caught:
+        read_external_loads(mechanism, path)
+    assert caught.value.file == str(tmp_path / "grf.mot")
+    gap = np.ones((2, 9))
+    gap[1, 1] = np.nan
+    data(tmp_path, gap)
+    with pytest.raises(DocumentError, match="'grf_vy' is nan at 1 s; fill the gap"):
+        read_external_loads(mechanism, path)
+    data(tmp_path, np.ones((2, 9)), (0.5, 0.5))
+    with pytest.raises(DocumentError, match=r"the time 0\.5 does not come after 0\.5"):
+        read_external_loads(mechanism, path)
+    data(tmp_path, np.ones((0, 9)), ())
+    with pytest.raises(DocumentError, match="no rows"):
+        read_external_loads(mechanism, path)
+    with pytest.raises(ModelError, match="names no data file"):
+        read_external_loads(mechanism, document(tmp_path, force(), datafile=""))
+    (tmp_path / "model.xml").write_text('<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>')
+    with pytest.raises(DocumentError, match="this holds <Model>, not <ExternalLoads>"):
+        read_external_loads(mechanism, tmp_path / "model.xml")
+
+
+def test_older_documents(model, tmp_path):
+    data(tmp_path, np.ones((2, 9)))
+    path = document(tmp_path, force(), version=20302)
+    assert len(read_external_loads(build_mechanism(model), path)) == 1
+
+
+def test_a_measured_force_without_data_is_refused(model):
+    model.force_set.objects.append(ExternalForce(name="lost", applied_to_body="block", force_identifier="f"))
+    with pytest.raises(UnsupportedError, match=r"'/forceset/lost' \(ExternalForce outside of ExternalLoads"):
+        simulate(model, 0.01)
