@@ -24,18 +24,26 @@ def opened(file: Path, motion: Path) -> RecordedMotion:
     return recorded
 
 
-def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path) -> None:
-    """Write tables into a folder and say what they are made from."""
+def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False) -> None:
+    """Write tables into a folder, that of markers as markers.trc too, and say what they are made from."""
     make_folder(folder)
     for name, table in tables.items():
         write_sto(
             folder / name, table.name, table.times, table.columns, table.rows.tolist(), in_degrees=table.in_degrees
         )
+    names = list(tables)
+    if trc:
+        from osimlite.simulation.trc import write_trc
+
+        markers = tables["markers.sto"]
+        labels = [label.removesuffix("_X") for label in markers.columns[::3]]
+        write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
+        names.append("markers.trc")
     console = Console(highlight=False, soft_wrap=True)
     if recorded.missing:
         console.print(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
     if recorded.ignored:
         console.print(f"columns that name no coordinate, ignored: {listed(recorded.ignored)}")
     times = recorded.times
-    paths = listed([str(folder / name) for name in tables])
+    paths = listed([str(folder / name) for name in names])
     console.print(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from osimlite.simulation.external_loads import ExternalLoad
 
 
 def inverse_dynamics(
@@ -15,16 +18,25 @@ def inverse_dynamics(
         Path,
         typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
     ] = Path("."),
+    external_loads: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Measured forces: a file of ExternalLoads.", show_default=False),
+    ] = None,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
 
     One generalized force (N or N·m) for each coordinate: what it takes beyond gravity to make the bodies move so. The
-    coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. Forces of the model and measured
-    loads are not taken into account.
+    coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. Forces of the model are not taken
+    into account.
 
-    Example: osimlite inverse-dynamics gait2392.osim walk.mot -o results
+    Example: osimlite inverse-dynamics gait2392.osim walk.mot --external-loads grf.xml -o results
     """
     from osimlite.cli._recorded import opened, written
 
     recorded = opened(file, motion)
-    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics()}, output)
+    loads: tuple[ExternalLoad, ...] = ()
+    if external_loads is not None:
+        from osimlite.simulation.external_loads import read_external_loads
+
+        loads = read_external_loads(recorded.mechanism, external_loads)
+    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, output)

@@ -18,6 +18,7 @@ def kinematics(
     assemble: Annotated[
         bool, typer.Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
     ] = False,
+    trc: Annotated[bool, typer.Option("--trc", help="Write the markers as markers.trc too.")] = False,
 ) -> None:
     """Follow a recorded motion: writes bodies.sto and markers.sto.
 
@@ -31,4 +32,4 @@ def kinematics(
     recorded = opened(file, motion)
     if assemble:
         recorded = recorded.assembled()
-    written(recorded, {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}, output)
+    written(recorded, {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}, output, trc=trc)

@@ -53,6 +53,10 @@ def simulate(
     skip_unsupported: Annotated[
         bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")
     ] = False,
+    external_loads: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
+    ] = None,
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
@@ -71,7 +75,7 @@ def simulate(
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
-        require("PIL", extra="plot", purpose="drawing")
+        require("PIL", extra="view", purpose="an animation")
     model = read(file)
     from osimlite.simulation.engines import engine_factory
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
@@ -79,7 +83,14 @@ def simulate(
 
     engine_factory(engine)
     console = Console()
-    with Simulation(model, engine, skip_unsupported=skip_unsupported, show=gui) as simulation:
+    with Simulation(
+        model,
+        engine,
+        skip_unsupported=skip_unsupported,
+        external_loads=external_loads,
+        folder=file.parent,
+        show=gui,
+    ) as simulation:
         initial = quantities(start or [], simulation.mechanism, "--set")
         speeds = quantities(start_speed or [], simulation.mechanism, "--set-speed")
         with progress_bar(console, "simulating", to) as progress:

@@ -133,14 +133,15 @@ def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind
 def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -> Iterator[str]:
     """Lines of numbers, of which `size` make a value."""
     for time, row in zip(times, rows, strict=True):
-        words = list(map(_number, row))
+        words = list(map(number_text, row))
         if size > 1:
             if len(words) % size:
                 raise OsimliteError(f"a row has {len(words)} numbers, which makes no whole values of {size} each")
             words = [",".join(words[start : start + size]) for start in range(0, len(words), size)]
-        yield "\t".join((_number(time), *words)) + "\n"
+        yield "\t".join((number_text(time), *words)) + "\n"
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
+    """All digits of a number, without a needless point."""
     text = repr(float(value))
     return text[:-2] if text.endswith(".0") else text

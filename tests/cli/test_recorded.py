@@ -37,3 +37,44 @@ def test_the_walker_in_a_recorded_motion(fixtures: Path, tmp_path: Path) -> None
     done = _run(tmp_path, "kinematics", walker, "nothing.mot")
     assert done.returncode == 2
     assert "nothing.mot: cannot read the file" in done.stderr
+
+
+LOADS = """<OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects><ExternalForce name="push">
+<applied_to_body>{body}</applied_to_body><force_identifier>f_</force_identifier></ExternalForce></objects>
+<datafile>push.sto</datafile></ExternalLoads></OpenSimDocument>
+"""
+
+
+def test_measured_forces(fixtures: Path, tmp_path: Path) -> None:
+    walker = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    times = [0.01 * k for k in range(20)]
+    write_sto(tmp_path / "still.mot", "still", times, ("Pelvis_tx",), [[0.1] for _ in times])
+    write_sto(tmp_path / "push.sto", "push", [0.0, 1.0], ("f_x", "f_y", "f_z"), [[0.0, 7.0, 0.0]] * 2)
+    (tmp_path / "loads.xml").write_text(LOADS.format(body="Pelvis"))
+    lifted = []
+    for words in ((), ("--external-loads", "loads.xml")):
+        done = _run(tmp_path, "inverse-dynamics", walker, "still.mot", "-o", "out", *words)
+        assert (done.returncode, done.stderr) == (0, "")
+        lifted.append(read_sto(tmp_path / "out" / "inverse_dynamics.sto")["Pelvis_ty_force"])
+    # The platform is tilted by 10 degrees.
+    assert lifted[0] - lifted[1] == pytest.approx(7.0 * 0.984807753, rel=1e-6)
+    done = _run(tmp_path, "simulate", walker, "--to", "0.01", "-o", "out", "--external-loads", "loads.xml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert read_sto(tmp_path / "out" / "forces.sto")["Pelvis_push_Fy"] == pytest.approx(7.0)
+    (tmp_path / "loads.xml").write_text(LOADS.format(body="Pelvic"))
+    for command in (("simulate", walker), ("inverse-dynamics", walker, "still.mot")):
+        done = _run(tmp_path, *command, "-o", "out", "--external-loads", "loads.xml")
+        assert done.returncode == 1
+        assert "loads.xml: the applied_to_body of 'push' is 'Pelvic'" in done.stderr
+        assert "did you mean 'Pelvis'?" in done.stderr
+
+
+def test_markers_as_trc(fixtures: Path, tmp_path: Path) -> None:
+    walker = fixtures / "walker" / "DynamicWalkerModel.osim"
+    write_sto(tmp_path / "still.mot", "still", [0.0, 0.5], ("Pelvis_tx",), [[0.1], [0.2]])
+    done = _run(tmp_path, "kinematics", str(walker), "still.mot", "-o", "out", "--trc")
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = (tmp_path / "out" / "markers.trc").read_text().splitlines()
+    assert lines[0] == "PathFileType\t4\t(X/Y/Z)\tmarkers.trc"
+    assert lines[2].split("\t")[:4] == ["2", "2", "2", "0"]
+    assert "markers.trc" in done.stdout

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.simulation import read_sto, write_sto
+from osimlite.simulation.trc import write_trc
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -53,3 +54,15 @@ def test_degrees_of_older_files(suffix, version, said, tmp_path):
     assert ours.name == theirs.getName()
     labels = theirs.getColumnLabels()
     assert ours.columns == tuple(labels.get(k) for k in range(1, labels.getSize()))
+
+
+def test_opensim_reads_our_markers(tmp_path):
+    times, rows = [0.0, 0.01, 0.02], np.random.default_rng(1).normal(size=(3, 6))
+    rows[1, 3:] = np.nan
+    write_trc(tmp_path / "markers.trc", times, ["knee.med", "heel"], rows.tolist())
+    table = opensim.TimeSeriesTableVec3(str(tmp_path / "markers.trc"))
+    assert tuple(table.getColumnLabels()) == ("knee.med", "heel")
+    assert list(table.getIndependentColumn()) == times
+    found = [[table.getRowAtIndex(row)[k][axis] for k in range(2) for axis in range(3)] for row in range(3)]
+    assert np.array_equal(found, rows, equal_nan=True)
+    assert table.getTableMetaDataAsString("DataRate") == "100" and table.getTableMetaDataAsString("Units") == "m"
