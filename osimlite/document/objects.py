@@ -324,6 +324,8 @@ class ObjectReader:
         if inner:
             extra.late.append(("child-in-value", number, inner[0].tag, spec, None))
             self.count += sum(size(node) for node in inner)
+        elif sum(1 for piece in (element.text, *(node.tail for node in element)) if piece and piece.strip()) > 1:
+            extra.late.append(("child-in-value", number, "!--", spec, None))
         return "".join([element.text or "", *(node.tail or "" for node in element)])
 
     def _block(self, block: etree._Element) -> list[Object]:

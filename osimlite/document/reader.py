@@ -187,7 +187,9 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
     data = without_colons(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark before them.
     unmarked = data.removeprefix(BOM_UTF8)
-    body = data if unmarked.startswith(BOM_UTF8) else unmarked.lstrip()
+    body = unmarked.lstrip()
+    if body.startswith(BOM_UTF8):
+        body = data
     blank = data[: len(data) - len(body)].count(b"\n")
     parser = etree.XMLParser(
         encoding="utf-8",

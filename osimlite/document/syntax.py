@@ -17,7 +17,7 @@ _PLAIN = (
     (r"Specification mandates value for attribute (\S+)", r"the attribute \1 has no value"),
     (r"AttValue: \" or ' expected", "the value of an attribute stands in quotes"),
     (r"AttValue: ' expected", "the value of an attribute has no closing quote"),
-    (r"Unescaped '<' not allowed in attributes values", "no '<' may stand in an attribute; is a quote missing?"),
+    (r"Unescaped '<' not allowed in attributes values", "no '<' may stand in an attribute, nor a quote be left out"),
     (r"attributes construct error", "blanks belong between attributes"),
     (
         r"(?:PCDATA i|I|xmlParse\w+: i)nvalid (?:xml)?Char(?: value)? (\d+).*",
