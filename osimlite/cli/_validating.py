@@ -50,8 +50,10 @@ def run(
         changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
         return int(any(changed))
     if fix or unsafe_fixes:
-        count = sum(_mend(path, given, unsafe=unsafe_fixes) for path in files)
-        print(f"Mended {count} {'place' if count == 1 else 'places'}.", file=sys.stderr)
+        mended = [_mend(path, given, unsafe=unsafe_fixes) for path in files]
+        count, left = sum(count for count, _ in mended), sum(left for _, left in mended)
+        more = f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
+        print(f"Mended {_places(count)}{more}.", file=sys.stderr)
     with Bar(len(files)) as bar:
         report = check_files(files, given, cached=cached, progress=bar.show)
     if write_baseline is not None:
@@ -149,32 +151,39 @@ def _fail_on_of(files: list[str]) -> Severity:
     return settings_of(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
 
 
-def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int]:
-    """A document, its bytes once everything is mended, and how many mends that took."""
+def _places(count: int) -> str:
+    return f"{count} {'place' if count == 1 else 'places'}"
+
+
+def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int, int]:
+    """A document, its bytes once everything is mended, how many mends that took, and how many guesses are left."""
     from osimlite.document.source import Source
     from osimlite.lint.fixes import mended
 
     source = _source(path)
-    data, total = source.data, 0
+    data, total, left = source.data, 0, 0
     # A mend may bring another to light, as a misspelt set does with all that is in it.
     for _ in range(10):
         current = Source(data, source.file)
-        data, count = mended(current, _check(current, given), unsafe=unsafe)
+        report = _check(current, given)
+        data, count = mended(current, report, unsafe=unsafe)
         total += count
         if not count:
+            left = sum(finding.fix is not None for finding in report.findings)
             break
-    return source, data, total
+    return source, data, total, left
 
 
-def _mend(path: str, given: Config, unsafe: bool) -> int:
+def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
+    """Mend a file; how many mends that took, and how many guesses are left."""
     from osimlite.files import write_atomically
 
     if path == "-":
         raise OsimliteError("standard input cannot be mended in place; use --diff")
-    _, data, count = _mended(path, given, unsafe)
+    _, data, count, left = _mended(path, given, unsafe)
     if count:
         write_atomically(path, data)
-    return count
+    return count, left
 
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
@@ -183,7 +192,10 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
 
     from osimlite.document.source import Source
 
-    source, data, count = _mended(path, given, unsafe)
+    source, data, count, left = _mended(path, given, unsafe)
+    if not count:
+        guess = f"can be mended with certainty; --unsafe-fixes would mend {_places(left)}" if left else "to mend"
+        print(f"{path}: nothing {guess}.", file=sys.stderr)
     new = Source(data).text.splitlines(keepends=True)
     sys.stdout.writelines(difflib.unified_diff(source.text.splitlines(keepends=True), new, path, path))
     return bool(count)

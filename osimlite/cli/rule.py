@@ -24,9 +24,9 @@ def rule(
     from osimlite.text import did_you_mean
 
     rules = all_rules()
+    columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80
     if code is None:
         width = max(len(known.name) for known in rules)
-        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
         for known in rules:
             head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
             typer.echo(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)))
@@ -35,4 +35,24 @@ def rule(
     if found is None:
         names = [word for known in rules for word in (known.code, known.name)]
         raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)}; 'osimlite rule' lists all rules")
-    typer.echo(f"# {found.name} ({found.code}, {found.severity.value})\n\n{found.page}")
+    from osimlite.lint.pages import page_of
+
+    typer.echo(_wrapped(page_of(found), columns))
+
+
+def _wrapped(page: str, columns: int) -> str:
+    """The page with its prose in lines that fit; examples stay as they are."""
+    rows: list[str] = []
+    prose: list[str] = []
+    code = False
+    for line in [*page.splitlines(), ""]:
+        if not code and line and not line.startswith(("#", "```", "- ", "Severity:", "Fix:")):
+            prose.append(line)
+            continue
+        if prose:
+            rows.append(textwrap.fill(" ".join(prose), columns, break_on_hyphens=False))
+            prose = []
+        code ^= line.startswith("```")
+        lead = "  " if line.startswith("- ") else ""
+        rows.append(textwrap.fill(line, columns, subsequent_indent=lead, break_on_hyphens=False) if lead else line)
+    return "\n".join(rows[:-1])

@@ -35,10 +35,14 @@ def axes_refused(joint: CustomJoint) -> bool:
     OpenSim goes through the names in the order of :func:`names_on_axes` and makes up a coordinate for each that the
     joint does not declare. It fails if the one made up does not come right after those declared, if no axis names any,
     and if it would have to put declared coordinates in another order while their number is not that of the names.
-    Measured on 1,200 random joints. A name that no component may have is refused as well.
+    Measured on 1,200 random joints. A name that no component may have is refused as well, and one that a frame of the
+    joint has: OpenSim calls the frame otherwise then and does not find it.
     """
     declared = [coordinate.name for coordinate in joint.coordinates]
     names = names_on_axes(joint)
+    if any(frame.name in names and frame.name not in declared for frame in joint.frames):
+        # The coordinate that is made up takes the name of the frame.
+        return True
     if not names:
         return bool(declared)
     made = list(declared)

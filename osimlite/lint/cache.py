@@ -99,7 +99,8 @@ def folder_for(settings_file: Path | None) -> Path:
 def key_of(data: bytes, file: str, config: Config) -> str:
     """What an entry holds for: the text, its path as it was given, the configuration, and the code that checks."""
     severity = sorted((word, str(level)) for word, level in config.severity.items())
-    setting = (_code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths)
+    thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
+    setting = (_code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds)
     digest = blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16)
     digest.update(data)
     return digest.hexdigest()

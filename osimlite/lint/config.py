@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Severity
@@ -13,19 +14,35 @@ if TYPE_CHECKING:
     from osimlite.lint.engine import Rule
 
 
+class Threshold(NamedTuple):
+    """A number from which on a rule speaks: its name in the settings, its default, its unit, and what it is."""
+
+    name: str
+    default: float
+    unit: str
+    meaning: str
+
+
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Which rules run, and how bad their findings are.
+    """Which rules run, how bad their findings are, and from which numbers on they speak.
 
     `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of rules
     (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a rule. `mesh_paths` are
-    folders where meshes are looked for besides OpenSim's own places.
+    folders where meshes are looked for besides OpenSim's own places. `thresholds` are numbers by the names that
+    ``osimlite rule CODE`` shows.
     """
 
     select: tuple[str, ...] = ()
     ignore: tuple[str, ...] = ()
     severity: Mapping[str, Severity] = field(default_factory=dict)
     mesh_paths: tuple[str, ...] = ()
+    thresholds: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the names and numbers of the thresholds; OsimliteError if one makes no sense."""
+        if self.thresholds:
+            _check_thresholds(self.thresholds)
 
     def wants(self, rule: Rule) -> bool:
         """Whether a rule runs."""
@@ -38,6 +55,24 @@ class Config:
             if rule.matches(word):
                 return severity
         return own
+
+    def value_of(self, threshold: Threshold) -> float:
+        """The number that holds for a threshold."""
+        return self.thresholds.get(threshold.name, threshold.default) if self.thresholds else threshold.default
+
+
+def _check_thresholds(given: Mapping[str, float]) -> None:
+    from osimlite.lint.engine import all_rules
+    from osimlite.text import did_you_mean
+
+    known = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
+    for name, number in given.items():
+        if name not in known:
+            raise OsimliteError(
+                f"no rule has a threshold '{name}'{did_you_mean(name, known)} `osimlite rule CODE` shows what there is"
+            )
+        if isinstance(number, bool) or not isinstance(number, int | float) or not 0 <= number < math.inf:
+            raise OsimliteError(f"the threshold '{name}' must be a number, 0 or more, not '{number}'")
 
 
 def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, ...]:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from inspect import cleandoc
-from typing import Protocol
+from typing import Literal, Protocol
 
 from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
 from osimlite.document.survey import survey
-from osimlite.lint.config import Config
+from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
 from osimlite.lint.subject import Subject
 from osimlite.lint.suppressions import suppressions
@@ -38,6 +38,7 @@ FAMILIES = {
 
 _MODULES = (
     "text",
+    "markup",
     "structure",
     "leftovers",
     "values",
@@ -50,7 +51,9 @@ _MODULES = (
     "joints",
     "bodies",
     "physics",
+    "coordinates",
     "space",
+    "functions",
     "paths",
     "muscles",
     "files",
@@ -79,16 +82,24 @@ class Found(Protocol):
 
 
 Check = Callable[[Subject, Found], None]
+Mends = Literal["", "safe", "unsafe", "both"]
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One registered rule."""
+    """One registered rule.
+
+    `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
+    version, where OpenSim does something else with them. `mends` says of what kind its mends are.
+    """
 
     code: str
     name: str
     severity: Severity
     check: Check
+    before: tuple[int, Severity] | None = None
+    thresholds: tuple[Threshold, ...] = ()
+    mends: Mends = ""
 
     @property
     def family(self) -> str:
@@ -105,6 +116,12 @@ class Rule:
         """The first line of the page."""
         return self.page.partition("\n")[0].rstrip(".")
 
+    def severity_in(self, version: int | None) -> Severity:
+        """The severity of its findings in a document of a version; None stands for the current one."""
+        if self.before is not None and version is not None and version < self.before[0]:
+            return self.before[1]
+        return self.severity
+
     def matches(self, word: str) -> bool:
         """Whether `word` is this rule's code, the beginning of it, its name or its family."""
         return bool(word) and (self.code.startswith(word.upper()) or word in (self.name, self.family, "ALL"))
@@ -113,13 +130,21 @@ class Rule:
 _RULES: dict[str, Rule] = {}
 
 
-def rule(code: str, name: str, *, severity: Severity) -> Callable[[Check], Check]:
-    """Register a function as the rule `code`."""
+def rule(
+    code: str,
+    name: str,
+    *,
+    severity: Severity,
+    before: tuple[int, Severity] | None = None,
+    thresholds: tuple[Threshold, ...] = (),
+    mends: Mends = "",
+) -> Callable[[Check], Check]:
+    """Register a function as the rule `code`; the other arguments are those of :class:`Rule`."""
 
     def register(check: Check) -> Check:
         if code in _RULES or any(known.name == name for known in _RULES.values()):
             raise ValueError(f"rule {code} {name} is registered twice")
-        _RULES[code] = Rule(code, name, severity, check)
+        _RULES[code] = Rule(code, name, severity, check, before, thresholds, mends)
         return check
 
     return register
@@ -214,7 +239,7 @@ def _collector(known: Rule, subject: Subject, findings: list[Finding]) -> Found:
             Finding(
                 known.code,
                 known.name,
-                subject.config.severity_of(known, severity or known.severity),
+                subject.config.severity_of(known, severity or known.severity_in(subject.version)),
                 message,
                 subject.file,
                 line,

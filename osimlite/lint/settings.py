@@ -27,6 +27,7 @@ class Settings:
     severity: Mapping[str, Severity] = field(default_factory=dict)
     mesh_paths: tuple[str, ...] = ()
     fail_on: Severity | None = None
+    thresholds: Mapping[str, float] = field(default_factory=dict)
 
     def config_for(self, path: str | Path, overriding: Config) -> Config:
         """The configuration of one file; what `overriding` says comes before what the project says."""
@@ -35,6 +36,7 @@ class Settings:
             (*self.ignore, *self._ignored_in(Path(path)), *overriding.ignore),
             {**self.severity, **overriding.severity},
             (*overriding.mesh_paths, *self.mesh_paths),
+            {**self.thresholds, **overriding.thresholds},
         )
 
     def _ignored_in(self, path: Path) -> tuple[str, ...]:
@@ -82,7 +84,7 @@ def _table(file: Path, *, whole: bool) -> dict[str, Any] | None:
 
 
 def _settings(file: Path, table: dict[str, Any]) -> Settings:
-    known = ("select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on")
+    known = ("select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds")
     for key in table:
         if key not in known:
             raise OsimliteError(
@@ -97,6 +99,7 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
             {checked_words([code])[0]: _severity(word) for code, word in _mapping(table, "severity").items()},
             tuple(str(file.parent.resolve() / path) for path in _words(table, "mesh-paths")),
             _severity(table["fail-on"]) if "fail-on" in table else None,
+            Config(thresholds=_mapping(table, "thresholds")).thresholds,
         )
     except OsimliteError as error:
         raise OsimliteError(error.message, file=str(file)) from None

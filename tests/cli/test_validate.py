@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from osimlite.lint.engine import all_rules
+
 WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 
 
@@ -83,8 +85,27 @@ def test_the_table_and_the_page_of_a_rule():
     table = run("rule").stdout
     assert "OSIM301  unresolved-reference" in table
     page = run("rule", "osim301").stdout
-    assert page.startswith("# unresolved-reference (OSIM301, error)\n")
+    assert page.startswith("# unresolved-reference (OSIM301)\n\nSeverity: error\nFix: sometimes")
     assert "## Use instead" in page
+
+
+def test_the_table_of_rules_fits_a_terminal():
+    lines = run("rule").stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert sum(line.startswith("OSIM") for line in lines) == len(all_rules())
+
+
+def test_what_is_no_certain_mend_is_named(tmp_path):
+    path = tmp_path / "walker.osim"
+    path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "RFotContact PlatformContact"))
+    shown = run("validate", path, "--fix", "--diff")
+    assert shown.returncode == 0 and not shown.stdout
+    assert shown.stderr == f"{path}: nothing can be mended with certainty; --unsafe-fixes would mend 1 place.\n"
+    mended = run("validate", path, "--fix")
+    assert mended.stderr == "Mended 0 places; --unsafe-fixes would mend 1 place more.\n"
+    assert "1 more by --unsafe-fixes" in mended.stdout or "1 is mended by --unsafe-fixes" in mended.stdout
+    clean = run("validate", WALKER, "--diff")
+    assert clean.returncode == 0 and clean.stderr == f"{WALKER}: nothing to mend.\n"
 
 
 def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):

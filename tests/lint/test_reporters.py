@@ -64,7 +64,7 @@ def test_full(report):
           = did you mean 'true'?
           = in /markerset/asis
 
-        Found 2 errors, 1 warning in 1 model. 1 is mended by --fix.
+        Found 2 errors, 1 warning in 1 model. 1 is mended by --fix, 1 more by --unsafe-fixes.
         """)
 
 

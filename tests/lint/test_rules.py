@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from osimlite.document.source import Source
-from osimlite.lint import validate
+from osimlite.lint import Severity, validate
 from osimlite.lint.engine import FAMILIES, Rule, all_rules
+from osimlite.lint.pages import index, page_of
 
 HERE = Path(__file__).resolve().parent
 FIXTURES = HERE.parents[1] / "fixtures" / "lint"
@@ -73,6 +74,73 @@ def test_a_rule_has_fixtures_that_fail_and_that_pass(rule):
         assert dict(report.codes) == {rule.code: expected}, f"{path.name}:\n{report}"
     for path in passing:
         assert str(validate(path)) == "nothing found", path.name
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_rule_mends_as_its_page_says(rule):
+    kinds = {
+        "safe" if finding.fix.safe else "unsafe"
+        for path in (FIXTURES / rule.code).glob("fail-*.osim")
+        for finding in validate(path)
+        if finding.fix is not None
+    }
+    assert kinds == {"": set(), "both": {"safe", "unsafe"}}.get(rule.mends, {rule.mends})
+
+
+def test_the_index_of_rules_is_that_of_the_rules():
+    # python -c "from osimlite.lint.pages import index; print(index(), end='')" > docs/rules.md
+    assert (HERE.parents[1] / "docs" / "rules.md").read_text(encoding="utf-8") == index()
+
+
+def test_a_page_says_severity_mends_and_settings():
+    pages = {rule.code: page_of(rule) for rule in all_rules()}
+    assert pages["OSIM312"].startswith(
+        "# illegal-name (OSIM312)\n\nSeverity: error; warning in files of a version before 30500\nFix: none\n"
+    )
+    assert "Fix: sometimes, by --fix\n" in pages["OSIM104"]
+    assert "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other" in pages["OSIM521"]
+    assert "Settings" not in pages["OSIM104"]
+
+
+@pytest.mark.parametrize(
+    ("version", "name", "severity"),
+    [
+        (40600, "my hip", Severity.ERROR),
+        (30500, "my hip", Severity.ERROR),
+        # OpenSim takes the blank out by itself, and not out of the group.
+        (30000, "my hip", Severity.WARNING),
+        (30000, "my/hip", Severity.ERROR),
+    ],
+)
+def test_the_severity_of_an_illegal_name_depends_on_the_version(version, name, severity):
+    text = f"""<OpenSimDocument Version="{version}"><Model name="m"><MarkerSet>
+        <objects> <Marker name="{name}"/> </objects>
+        <groups> <ObjectGroup name="g"> <members>{name}</members> </ObjectGroup> </groups>
+    </MarkerSet></Model></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode()), select="OSIM312").findings
+    assert (finding.severity, finding.line, finding.column) == (severity, 2, 33)
+
+
+@pytest.mark.parametrize(
+    ("fragment", "tag", "words"),
+    [
+        ('<Marker name="a"><body>pelvis</body></Marker>', "socket_parent_frame", "before version 30501"),
+        ('<PinJoint name="hip"><parent_body>pelvis</parent_body></PinJoint>', "socket_parent_frame", "version 30505"),
+        ('<PinJoint name="hip"><location_in_parent>0 0 0</location_in_parent></PinJoint>', None, "PhysicalOffsetFrame"),
+        (
+            '<PinJoint name="hip"><socket_parent_frame_connectee_name>/ground</socket_parent_frame_connectee_name>'
+            "</PinJoint>",
+            "socket_parent_frame",
+            "version 30517",
+        ),
+        ('<PathSpring name="s"><isDisabled>true</isDisabled></PathSpring>', "appliesForce", "the opposite value"),
+    ],
+)
+def test_a_tag_of_an_old_format_is_called_so(fragment, tag, words):
+    report = validate(Source(skeleton.document(fragment).encode()), select="OSIM101")
+    (finding,) = report.findings
+    assert words in finding.message and "in one of version 40600 OpenSim ignores it" in finding.message
+    assert finding.suggestion == tag
 
 
 def test_fixture_folders_belong_to_rules():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -10,7 +11,11 @@ from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
 from osimlite.lint import Config, Severity, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
+from osimlite.lint.cache import key_of
+from osimlite.lint.engine import all_rules
 from osimlite.lint.settings import settings_for
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
 
 TEXT = """\
 <OpenSimDocument Version="40600">
@@ -39,6 +44,28 @@ def test_settings_come_from_the_nearest_file(tmp_path):
     assert [(f.code, f.severity.value) for f in report] == [("OSIM505", "info"), ("OSIM101", "error")]
 
 
+def test_thresholds_of_a_project_move_what_is_found(tmp_path):
+    (tmp_path / "pyproject.toml").write_text("[tool.osimlite.thresholds]\nlargest-gravity = 10000\n")
+    config = settings_for(tmp_path).config_for(tmp_path / "x.osim", Config())
+    assert dict(config.thresholds) == {"largest-gravity": 10000}
+    assert validate(Source(TEXT.encode()), config=config).codes == {"OSIM101": 1}
+    own = settings_for(tmp_path).config_for(tmp_path / "x.osim", Config(thresholds={"largest-gravity": 5}))
+    assert validate(Source(TEXT.encode()), config=own).codes == {"OSIM505": 1, "OSIM101": 1}
+    assert key_of(b"", "x.osim", config) != key_of(b"", "x.osim", own) != key_of(b"", "x.osim", Config())
+
+
+@pytest.mark.parametrize("rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code)
+def test_each_threshold_moves_the_findings_of_its_rule(rule):
+    """With every threshold as wide as can be, or as narrow, the failing fixtures of a rule give other findings."""
+    fixtures = sorted((FIXTURES / rule.code).glob("fail-*.osim")) + sorted((FIXTURES / rule.code).glob("pass-*.osim"))
+    for threshold in rule.thresholds:
+        seen = set()
+        for moved in ({}, {threshold.name: 0}, {threshold.name: threshold.default / 100}, {threshold.name: 1e300}):
+            config = Config((rule.code,), thresholds=moved)
+            seen.add(tuple(finding.line for path in fixtures for finding in validate(path, config=config)))
+        assert len(seen) > 1, f"{threshold.name} of {rule.code} changes nothing"
+
+
 def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed_over(tmp_path):
     (tmp_path / "osimlite.toml").write_text('select = ["references"]\n')
     (tmp_path / "sub").mkdir()
@@ -55,6 +82,14 @@ def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed
         ('severity = "error"', "'severity' must be a table"),
         ('[severity]\nOSIM101 = "fatal"', "a severity is one of error, warning and info, not 'fatal'"),
         ("select = [", "this is no TOML"),
+        (
+            "[thresholds]\nlargest-gravty = 3",
+            "no rule has a threshold 'largest-gravty'; did you mean 'largest-",
+        ),
+        ('[thresholds]\nlargest-gravity = "3"', "the threshold 'largest-gravity' must be a number, 0 or more, not '3'"),
+        ("[thresholds]\nlargest-gravity = true", "must be a number"),
+        ("[thresholds]\nlargest-gravity = -1", "must be a number, 0 or more, not '-1'"),
+        ("thresholds = 3", "'thresholds' must be a table"),
     ],
 )
 def test_a_setting_that_makes_no_sense_names_its_file(text, words, tmp_path):

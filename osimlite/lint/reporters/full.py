@@ -22,9 +22,14 @@ def render(report: Report, *, colour: bool = False, width: int = 80) -> str:
 
 
 def _fixes(report: Report) -> str:
-    """How many findings ``--fix`` mends."""
-    count = sum(finding.fixable for finding in report.findings)
-    return f" {'1 is' if count == 1 else f'{count} are'} mended by --fix." if count else ""
+    """How many findings ``--fix`` mends, and how many more are mended by a guess."""
+    safe = sum(finding.fixable for finding in report.findings)
+    rest = sum(finding.fix is not None for finding in report.findings) - safe
+    parts = [f"{'1 is' if safe == 1 else f'{safe} are'} mended by --fix"] if safe else []
+    if rest:
+        some = f"{rest} more" if safe else "1 is mended" if rest == 1 else f"{rest} are mended"
+        parts.append(f"{some} by --unsafe-fixes")
+    return f" {', '.join(parts)}." if parts else ""
 
 
 def _lines(report: Report, file: str | None) -> list[str] | None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TypedDict
 
+from osimlite.lint.config import Threshold
 from osimlite.lint.diagnostic import Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
@@ -14,8 +15,11 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.frames import Body
 
-_SLACK = 1e-6
-"""Relative excess below which an inertia counts as on the edge of what is possible; files have rounded numbers."""
+SLACK = Threshold(
+    "inertia-slack", 1e-6, "", "relative excess up to which an inertia counts as possible; files have rounded numbers"
+)
+GYRATION = Threshold("largest-radius-of-gyration", 5.0, "m", "the mass of a body cannot lie further from its centre")
+MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 
 
 @rule("OSIM501", "missing-mass", severity=ERROR)
@@ -44,7 +48,7 @@ def missing_mass(subject: Subject, found: Found) -> None:
             found(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
 
 
-@rule("OSIM502", "impossible-inertia", severity=WARNING)
+@rule("OSIM502", "impossible-inertia", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
 def impossible_inertia(subject: Subject, found: Found) -> None:
     """No distribution of mass has this inertia.
 
@@ -65,21 +69,23 @@ def impossible_inertia(subject: Subject, found: Found) -> None:
     <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
+    slack = subject.config.value_of(SLACK)
     for body, moments in _inertias(subject):
         small, middle, large = moments
-        if small >= 0 and large > (small + middle) * (1 + _SLACK):
+        if small >= 0 and large > (small + middle) * (1 + slack):
             excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
             found(
                 f"the inertia of {called(body)} is impossible: its largest principal moment, {quantity(large)}, is "
                 f"more than the sum of the others, {quantity(small + middle)}"
-                + (f", by {excess:.3g} %" if math.isfinite(excess) else ""),
+                + (f", by {excess:.3g} %" if math.isfinite(excess) else "")
+                + _closest(body),
                 body,
                 tag="inertia",
                 **_nearest(subject, body),
             )
 
 
-@rule("OSIM503", "inertia-not-positive", severity=WARNING)
+@rule("OSIM503", "inertia-not-positive", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
 def inertia_not_positive(subject: Subject, found: Found) -> None:
     """An inertia has a negative principal moment.
 
@@ -101,11 +107,13 @@ def inertia_not_positive(subject: Subject, found: Found) -> None:
     <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.003 0 0</inertia> </Body>
     ```
     """
+    slack = subject.config.value_of(SLACK)
     for body, moments in _inertias(subject):
-        if moments[0] < -_SLACK * max(map(abs, moments)):
+        if moments[0] < -slack * max(map(abs, moments)):
             cause = "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
             found(
-                f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}",
+                f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}"
+                + _closest(body),
                 body,
                 tag="inertia",
                 **_nearest(subject, body),
@@ -144,9 +152,67 @@ def no_inertia(subject: Subject, found: Found) -> None:
             )
 
 
+@rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))
+def mass_out_of_proportion(subject: Subject, found: Found) -> None:
+    """A mass, or an inertia for its mass, is larger than that of any body.
+
+    ## What it does
+    Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres from the mass
+    center (the radius of gyration, the square root of the largest moment over the mass).
+
+    ## Why is this bad
+    Most often the unit is wrong: grams for kilograms, or kg mm^2 (a million times as much) for kg m^2. The model moves
+    as if its limbs were cast in lead, and no force in it fits.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>100000 100000 20000 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    heaviest, widest = subject.config.value_of(MASS), subject.config.value_of(GYRATION)
+    for body in subject.each(Body):
+        if heaviest < body.mass < math.inf:
+            found(
+                f"the mass of {called(body)} is {quantity(body.mass, 'kg')}; in grams?",
+                body,
+                tag="mass",
+                suggestion=f"{body.mass / 1000:.6g}",
+            )
+    for body, moments in _inertias(subject):
+        if not 0 < body.mass < math.inf:
+            continue
+        radius = math.sqrt(max(moments[2], 0) / body.mass)
+        if radius > widest:
+            found(
+                f"the inertia of {called(body)} is as if its {quantity(body.mass, 'kg')} lay {quantity(radius, 'm')} "
+                "from its mass center; in kg mm^2?",
+                body,
+                tag="inertia",
+                suggestion=" ".join(f"{number / 1e6:.6g}" for number in body.inertia),
+            )
+
+
 class _Mend(TypedDict):
     suggestion: str
     fix: Fix | None
+
+
+def _closest(body: Body) -> str:
+    """How far the nearest possible inertia is from that of a body."""
+    nearest = possible_inertia(body.inertia)
+    parts = [new - old for new, old in zip(nearest, body.inertia, strict=True)]
+    # Each product stands in the matrix twice.
+    distance = math.sqrt(sum(part * part for part in parts[:3]) + 2 * sum(part * part for part in parts[3:]))
+    size = math.sqrt(sum(part * part for part in body.inertia[:3]) + 2 * sum(part * part for part in body.inertia[3:]))
+    return (
+        f"; the closest possible one, {' '.join(f'{number:.4g}' for number in nearest)}, is "
+        f"{quantity(distance, 'kg m^2')} ({100 * distance / size:.2g} % of it) away"
+    )
 
 
 def _nearest(subject: Subject, body: Body) -> _Mend:

@@ -7,13 +7,14 @@ import re
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
+from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object, field_specs
 from osimlite.text import nearest
 
 
-@rule("OSIM105", "unknown-attribute", severity=ERROR)
+@rule("OSIM105", "unknown-attribute", severity=ERROR, mends="safe")
 def unknown_attribute(subject: Subject, found: Found) -> None:
     """An element has an attribute that means nothing.
 
@@ -42,7 +43,7 @@ def unknown_attribute(subject: Subject, found: Found) -> None:
         found(message, owner, at=subject.attribute_name(note.number, note.word), suggestion=suggestion, fix=fix)
 
 
-@rule("OSIM106", "stray-text", severity=WARNING)
+@rule("OSIM106", "stray-text", severity=WARNING, mends="safe")
 def stray_text(subject: Subject, found: Found) -> None:
     """There is text between elements.
 
@@ -63,13 +64,10 @@ def stray_text(subject: Subject, found: Found) -> None:
     ```
     """
     source = subject.source
-    for note in subject.notes:
-        if note.kind == "stray-text" and source is not None:
-            start = source.text.find(note.word, source.line_start(note.line or 1))
-            found(f"OpenSim ignores the text '{note.word}' outside the document", at=source.position(max(start, 0)))
     if source is None or source.mixed is False:
         return
-    plain = _REMARKS.sub(lambda match: " " * len(match[0]), source.text)
+    plain = REMARKS.sub(lambda match: " " * len(match[0]), source.text)
+    plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), plain)
     texts = {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}
     in_values = [
         (source.spans[note.number].start, source.spans[note.number].end)
@@ -77,15 +75,17 @@ def stray_text(subject: Subject, found: Found) -> None:
         if note.kind == "child-in-value"
     ]
     for start, end in sorted(texts):
-        if any(first < start < last for first, last in in_values):
+        # Text outside the root is worse, and another rule speaks of it.
+        if any(first < start < last for first, last in in_values) or start >= source.spans[0].end:
             continue
         text = plain[start:end].strip().splitlines()[0]
+        shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
         begin = start + len(plain[start:end]) - len(plain[start:end].lstrip())
         whole = without_text(source, begin, begin + len(plain[start:end].strip()))
-        found(f"OpenSim ignores the text '{text}' between elements", at=source.position(start, len(text)), fix=whole)
+        found(f"OpenSim ignores the text {shown} between elements", at=source.position(start, len(text)), fix=whole)
 
 
-@rule("OSIM110", "defaults", severity=WARNING)
+@rule("OSIM110", "defaults", severity=WARNING, mends="safe")
 def defaults_block(subject: Subject, found: Found) -> None:
     """The file has a `<defaults>` block.
 
@@ -117,13 +117,9 @@ def defaults_block(subject: Subject, found: Found) -> None:
         found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
 
 
+_QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
-
-
 _BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")
-
-
-_REMARKS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
 
 
 def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 
+from osimlite.lint.config import Threshold
 from osimlite.lint.engine import WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 
+PENNATION = Threshold("largest-pennation", math.pi / 2, "rad", "fibres that turn as far pull on nothing")
+SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fibre starts shorter")
+LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fibre starts longer")
 
-@rule("OSIM621", "doubtful-muscle", severity=WARNING)
+
+@rule("OSIM621", "doubtful-muscle", severity=WARNING, thresholds=(PENNATION, SHORTEST, LONGEST))
 def doubtful_muscle(subject: Subject, found: Found) -> None:
     """A muscle has fibres that no muscle has.
 
@@ -54,11 +59,13 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
     </Millard2012EquilibriumMuscle>
     ```
     """
+    steepest, shortest, longest = (subject.config.value_of(known) for known in (PENNATION, SHORTEST, LONGEST))
     for muscle in subject.named("Muscle"):
         angle = muscle.pennation_angle_at_optimal
-        if math.pi / 2 <= angle < math.inf:
+        if steepest <= angle < math.inf:
             found(
-                f"the pennation angle of {called(muscle)} is {quantity(angle, 'rad')}, a quarter turn or more"
+                f"the pennation angle of {called(muscle)} is {quantity(angle, 'rad')}"
+                + (", a quarter turn or more" if angle >= math.pi / 2 else "")
                 + ("; in degrees?" if angle > math.pi else ""),
                 muscle,
                 tag="pennation_angle_at_optimal",
@@ -68,7 +75,7 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
         given = "default_fiber_length" in muscle.model_fields_set and length != 0.1
         if given and length is not None and optimal > 0 and 0 < length < math.inf:
             ratio = length / optimal
-            if not 0.2 <= ratio <= 2:
+            if not shortest <= ratio <= longest:
                 found(
                     f"the default fibre length of {called(muscle)}, {quantity(length, 'm')}, is {ratio:.3g} times its "
                     "optimal length",

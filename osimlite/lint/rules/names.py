@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
@@ -61,7 +61,7 @@ def duplicate_name(subject: Subject, found: Found) -> None:
         found(message, item, attribute="name", suggestion=None)
 
 
-@rule("OSIM312", "illegal-name", severity=ERROR)
+@rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING))
 def illegal_name(subject: Subject, found: Found) -> None:
     """The name of a component has a character that names cannot have.
 
@@ -69,7 +69,8 @@ def illegal_name(subject: Subject, found: Found) -> None:
     Reports white space, `/`, `\\`, `*` and `+` in the names of components.
 
     ## Why is this bad
-    Names are the parts of paths; OpenSim refuses to load the file.
+    Names are the parts of paths; OpenSim refuses to load the file. Of files older than version 30500 it takes white
+    space out of the names by itself, and not out of what refers to them: a muscle or a marker is then not found.
 
     ## Example
     ```xml
@@ -93,7 +94,24 @@ def illegal_name(subject: Subject, found: Found) -> None:
                 component,
                 attribute="name",
                 suggestion=better,
+                severity=ERROR,
             )
+    # In a file this old OpenSim mends the name, but not what names it.
+    for change in subject.changes:
+        if change.step == "names" and subject.source is not None:
+            place = subject.source.of_attribute(change.number, "name")
+            start = subject.source.line_start(place.line) + place.column - 1
+            name = subject.source.text[start : start + place.length]
+            if any(character.isspace() for character in name) and not name.startswith("<"):
+                better = "".join(name.split())
+                used = subject.source.text.count(name) > 1
+                found(
+                    f"the name '{name}' has white space in it: in a file of version {subject.version} OpenSim makes it "
+                    f"'{better}'" + (", and not where others use it" if used else ""),
+                    at=place,
+                    suggestion=better,
+                    severity=None if used else INFO,
+                )
 
 
 @rule("OSIM313", "missing-name", severity=WARNING)
@@ -158,8 +176,10 @@ def _wanted_names(subject: Subject, component: Component) -> list[str]:
     names: dict[str, None] = {}
     for broken in broken_references(subject):
         use = broken.use
+        # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the name to load.
         if (
             use.reference.rule == "set-member"
+            or use.spec.name == "name"
             or broken.why != "missing"
             or not any(base.__name__ == use.reference.target for base in type(component).__mro__)
         ):

@@ -1,12 +1,11 @@
-"""OSIM505 and on: gravity, materials, limits, ranges and units."""
+"""OSIM505 and on: gravity, materials and limits."""
 
 from __future__ import annotations
 
 import math
 
-from osimlite.document.lexical import shortest
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.fixes import replaced
+from osimlite.lint.config import Threshold
+from osimlite.lint.engine import INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
@@ -14,8 +13,13 @@ from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyContactPara
 from osimlite.schema.joints import Joint
 from osimlite.schema.tree import Use
 
+GRAVITY = Threshold("largest-gravity", 30.0, "m/s^2", "no planet that people walk on has more")
+BEYOND = Threshold("limit-beyond-range", 0.0, "of the range", "share of the range by which a limit may lie outside it")
+INSIDE = Threshold("limit-inside-range", 0.25, "of the range", "share of the range by which a limit may lie inside it")
+UNLIMITED = Threshold("unlimited-range", 4 * math.pi, "rad", "a wider range stands for none, or is in degrees")
 
-@rule("OSIM505", "strange-gravity", severity=WARNING)
+
+@rule("OSIM505", "strange-gravity", severity=WARNING, thresholds=(GRAVITY,))
 def strange_gravity(subject: Subject, found: Found) -> None:
     """Gravity is far from that of the Earth.
 
@@ -41,7 +45,7 @@ def strange_gravity(subject: Subject, found: Found) -> None:
     size = math.sqrt(sum(part * part for part in model.gravity))
     if not math.isfinite(size):
         return
-    if size > 30:
+    if size > subject.config.value_of(GRAVITY):
         unit = "; in millimetres?" if 9000 < size < 11000 else ""
         found(f"gravity is {quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
     elif model.gravity[1] > 1e-9 * size and model.gravity[1] > 0.9 * size:
@@ -137,7 +141,7 @@ def limits_swapped(subject: Subject, found: Found) -> None:
             )
 
 
-@rule("OSIM508", "limit-outside-range", severity=INFO)
+@rule("OSIM508", "limit-outside-range", severity=INFO, thresholds=(BEYOND,))
 def limit_outside_range(subject: Subject, found: Found) -> None:
     """A limit force begins beyond the range of its coordinate.
 
@@ -168,7 +172,7 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
             continue
         scale, unit = (180 / math.pi, "deg") if motion == "rotational" else (1.0, "m")
         low, high = sorted(bound * scale for bound in coordinate.range)
-        slack = abs(force.transition) + 1e-6
+        slack = abs(force.transition) + subject.config.value_of(BEYOND) * (high - low) + 1e-6
         for tag, limit, outside in (
             ("upper_limit", force.upper_limit, force.upper_limit > high + slack),
             ("lower_limit", force.lower_limit, force.lower_limit < low - slack),
@@ -182,7 +186,7 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
                 )
 
 
-@rule("OSIM509", "limit-inside-range", severity=INFO)
+@rule("OSIM509", "limit-inside-range", severity=INFO, thresholds=(INSIDE, UNLIMITED))
 def limit_inside_range(subject: Subject, found: Found) -> None:
     """A limit force begins well inside the range of its coordinate.
 
@@ -214,7 +218,7 @@ def limit_inside_range(subject: Subject, found: Found) -> None:
             continue
         scale, unit = (180 / math.pi, "deg") if motion == "rotational" else (1.0, "m")
         low, high = sorted(bound * scale for bound in coordinate.range)
-        slack = max(abs(force.transition), 0.25 * (high - low)) + 1e-6
+        slack = max(abs(force.transition), subject.config.value_of(INSIDE) * (high - low)) + 1e-6
         start = coordinate.default_value * scale
         for tag, limit, inside, beyond in (
             ("upper_limit", force.upper_limit, low <= force.upper_limit < high - slack, start - force.upper_limit),
@@ -222,202 +226,23 @@ def limit_inside_range(subject: Subject, found: Found) -> None:
         ):
             acts = beyond > abs(force.transition)
             # A range of many turns stands for none, or is in degrees; so does a limit that is not given.
-            given = tag in force.model_fields_set and (motion != "rotational" or high - low < 720)
+            widest = math.degrees(subject.config.value_of(UNLIMITED))
+            given = tag in force.model_fields_set and (motion != "rotational" or high - low < widest)
             if inside and given and force.lower_limit <= force.upper_limit:
+                meant = math.degrees(limit)
+                # Both limits are as small as angles in radians are, and one is a bound of the range then.
+                small = max(abs(force.lower_limit), abs(force.upper_limit)) <= 2 * math.pi
+                near = min(abs(meant - low), abs(meant - high)) <= 0.1 * (high - low)
+                radians = motion == "rotational" and small and near
                 found(
                     f"{tag} of {called(force)} is {quantity(limit, unit)}, inside the range of '{coordinate.name}' "
                     f"({quantity(low)} to {quantity(high, unit)})"
+                    + ("; in radians?" if radians else "")
                     + (f"; it acts in the default pose, {quantity(start, unit)}" if acts else ""),
                     force,
                     tag=tag,
-                    severity=WARNING if acts else None,
-                )
-
-
-@rule("OSIM511", "inverted-range", severity=WARNING)
-def inverted_range(subject: Subject, found: Found) -> None:
-    """The range of a coordinate ends before it begins.
-
-    ## What it does
-    Reports ranges whose first number is larger than the second; an error if the coordinate is clamped.
-
-    ## Why is this bad
-    OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders and solvers that
-    use the range misbehave.
-
-    ## Example
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>0 -2.1</range> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>-2.1 0</range> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-    """
-    for coordinate in subject.each(Coordinate):
-        low, high = coordinate.range
-        if low > high:
-            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
-            found(
-                f"the range of {called(coordinate)} runs from {quantity(low)} down to {quantity(high)}{refused}",
-                coordinate,
-                tag="range",
-                severity=ERROR if coordinate.clamped else None,
-                suggestion=(better := f"{shortest(high)} {shortest(low)}"),
-                fix=replaced(subject.source, subject.position(coordinate, tag="range"), better, safe=False),
-            )
-
-
-@rule("OSIM512", "default-outside-range", severity=WARNING)
-def default_outside_range(subject: Subject, found: Found) -> None:
-    """The default value of a coordinate lies outside its range.
-
-    ## What it does
-    Reports such defaults; an error if the coordinate is clamped.
-
-    ## Why is this bad
-    OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose that its own range
-    rules out; often the range or the default is in degrees.
-
-    ## Example
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-    """
-    for coordinate in subject.each(Coordinate):
-        low, high = coordinate.range
-        slack = 1e-9 * max(abs(low), abs(high), 1.0) if math.isfinite(low) and math.isfinite(high) else 0.0
-        if low <= high and not low - slack <= coordinate.default_value <= high + slack:
-            if not math.isfinite(coordinate.default_value):
-                continue
-            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
-            found(
-                f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is outside its "
-                f"range, {quantity(low)} to {quantity(high)}{refused}",
-                coordinate,
-                tag="default_value",
-                severity=ERROR if coordinate.clamped else None,
-            )
-
-
-@rule("OSIM513", "prescribed-without-function", severity=ERROR)
-def prescribed_without_function(subject: Subject, found: Found) -> None:
-    """A coordinate is prescribed and has no function.
-
-    ## What it does
-    Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
-
-    ## Why is this bad
-    OpenSim switches the prescription off in silence, and the coordinate moves freely.
-
-    ## Example
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <prescribed>true</prescribed> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-    """
-    for coordinate in subject.each(Coordinate):
-        if coordinate.prescribed and coordinate.prescribed_function is None:
-            found(
-                f"{called(coordinate)} is prescribed without a prescribed_function: OpenSim lets it move freely",
-                coordinate,
-                tag="prescribed",
-            )
-
-
-@rule("OSIM514", "degrees-for-radians", severity=WARNING)
-def degrees_for_radians(subject: Subject, found: Found) -> None:
-    """An angle looks as if it were in degrees.
-
-    ## What it does
-    Reports rotational coordinates whose default value or range goes beyond five turns, in radians.
-
-    ## Why is this bad
-    Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is more than fourteen
-    turns.
-
-    ## Example
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>-120 0</range> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>-2.0943951 0</range> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-    """
-    turns = 10 * math.pi
-    for joint in subject.each(Joint):
-        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
-            if motion != "rotational":
-                continue
-            largest = max((abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0)
-            # 99999.9 and the like stand for "no bound".
-            if turns < largest < 1000:
-                found(
-                    f"the range of {called(coordinate)}, {quantity(coordinate.range)}, is in radians; in degrees?",
-                    coordinate,
-                    tag="range",
-                    suggestion=" ".join(f"{math.radians(bound):.6g}" for bound in coordinate.range),
-                )
-            if turns < abs(coordinate.default_value) < math.inf:
-                found(
-                    f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is in radians; "
-                    "in degrees?",
-                    coordinate,
-                    tag="default_value",
-                    suggestion=f"{math.radians(coordinate.default_value):.6g}",
+                    severity=WARNING if acts or radians else None,
+                    suggestion=f"{meant:.6g}" if radians else None,
                 )
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint
 
 
-@rule("OSIM301", "unresolved-reference", severity=ERROR)
+@rule("OSIM301", "unresolved-reference", severity=ERROR, mends="both")
 def unresolved_reference(subject: Subject, found: Found) -> None:
     """A component names another component that does not exist.
 
@@ -71,7 +71,7 @@ def unresolved_reference(subject: Subject, found: Found) -> None:
         _report(subject, found, broken, message)
 
 
-@rule("OSIM302", "reference-to-wrong-type", severity=ERROR)
+@rule("OSIM302", "reference-to-wrong-type", severity=ERROR, mends="unsafe")
 def reference_to_wrong_type(subject: Subject, found: Found) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
@@ -136,7 +136,7 @@ def missing_reference(subject: Subject, found: Found) -> None:
         )
 
 
-@rule("OSIM304", "reference-form", severity=ERROR)
+@rule("OSIM304", "reference-form", severity=ERROR, mends="both")
 def reference_form(subject: Subject, found: Found) -> None:
     """A component is named by its path where a bare name belongs, or by its name where a path belongs.
 
@@ -176,7 +176,7 @@ def reference_form(subject: Subject, found: Found) -> None:
             )
 
 
-@rule("OSIM305", "reference-case", severity=ERROR)
+@rule("OSIM305", "reference-case", severity=ERROR, mends="safe")
 def reference_case(subject: Subject, found: Found) -> None:
     """A reference is right but for upper and lower case.
 

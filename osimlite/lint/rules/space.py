@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from itertools import combinations
 
+from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.placement import Pose, default_poses, fixed, on_base
 from osimlite.lint.skeleton import base_of
@@ -77,6 +78,9 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
         if here is offset:
             found(f"{called(offset)} is fixed to itself: OpenSim never comes to an end", offset, tag="socket_parent")
     for frame in subject.each(StationDefinedFrame):
+        if _rests_on_itself(subject, frame):
+            found(f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end", frame)
+            continue
         points = [subject.target_of(frame, f"socket_{word}") for word in ("point_a", "point_b", "point_c")]
         tags = ["socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"]
         stations = [point for point in [*points, subject.target_of(frame, tags[3])] if isinstance(point, Station)]
@@ -107,7 +111,12 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
                 break
 
 
-@rule("OSIM521", "starts-in-contact", severity=INFO)
+DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
+DEPTH_SHARE = Threshold("contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface")
+LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
+
+
+@rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, DEPTH_SHARE))
 def starts_in_contact(subject: Subject, found: Found) -> None:
     """Contact surfaces are inside each other in the default pose.
 
@@ -136,13 +145,14 @@ def starts_in_contact(subject: Subject, found: Found) -> None:
     </ContactSphere>
     ```
     """
+    deep, share = subject.config.value_of(DEPTH), subject.config.value_of(DEPTH_SHARE)
     for force, surfaces in _contact_groups(subject):
         for one, other in combinations(surfaces, 2):
             ball, against = (one, other) if isinstance(one, ContactSphere) else (other, one)
             if not isinstance(ball, ContactSphere):
                 continue
             depth = _depth(subject, ball, against)
-            if depth is None or not depth > max(1e-3, 0.1 * ball.radius):
+            if depth is None or not depth > max(deep, share * ball.radius):
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
             found(
@@ -154,7 +164,7 @@ def starts_in_contact(subject: Subject, found: Found) -> None:
             )
 
 
-@rule("OSIM522", "lengths-in-millimetres", severity=WARNING)
+@rule("OSIM522", "lengths-in-millimetres", severity=WARNING, thresholds=(LENGTH,))
 def lengths_in_millimetres(subject: Subject, found: Found) -> None:
     """A length on a body is longer than ten metres.
 
@@ -180,6 +190,7 @@ def lengths_in_millimetres(subject: Subject, found: Found) -> None:
     </Marker>
     ```
     """
+    longest = subject.config.value_of(LENGTH)
     for cls, items in subject.by_class.items():
         specs = [
             spec
@@ -190,7 +201,7 @@ def lengths_in_millimetres(subject: Subject, found: Found) -> None:
             for spec in specs:
                 value = item.__dict__[spec.name]
                 numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
-                if not any(10 < abs(number) < math.inf for number in numbers) or not _on_body(subject, item):
+                if not any(longest < abs(number) < math.inf for number in numbers) or not _on_body(subject, item):
                     continue
                 better = " ".join(f"{number / 1000:.6g}" for number in numbers)
                 found(
@@ -199,6 +210,24 @@ def lengths_in_millimetres(subject: Subject, found: Found) -> None:
                     tag=spec.tag,
                     suggestion=better,
                 )
+
+
+def _rests_on_itself(subject: Subject, frame: StationDefinedFrame) -> bool:
+    """Whether one follows the points of a frame, and the frames these are on, back to it."""
+    pending: list[Component] = [frame]
+    seen: set[int] = set()
+    while pending:
+        here = pending.pop()
+        tags = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
+        below = [tag for tag in (*tags, "socket_parent_frame", "socket_parent") if tag in type(here).field_specs()]
+        for tag in below:
+            target = subject.target_of(here, tag)
+            if target is frame:
+                return True
+            if target is not None and id(target) not in seen:
+                seen.add(id(target))
+                pending.append(target)
+    return False
 
 
 def _on_body(subject: Subject, item: Object) -> bool:

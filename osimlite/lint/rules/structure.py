@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
+
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.fixes import renamed, replaced, without_element
+from osimlite.lint.old_tags import Successor, successor
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, shown
 from osimlite.schema.base import FieldSpec, Object, field_specs
 from osimlite.schema.fields import Held
-from osimlite.schema.model import Model
+from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import class_for, tags
 from osimlite.text import listed, nearest
 
 
-@rule("OSIM101", "unknown-tag", severity=ERROR)
+@rule("OSIM101", "unknown-tag", severity=ERROR, mends="both")
 def unknown_tag(subject: Subject, found: Found) -> None:
     """An element is no property of the object it stands in.
 
@@ -40,6 +43,10 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         if _other_rule(note, owner):
             continue
         specs = field_specs(type(owner))
+        old = successor(type(owner), note.word)
+        if old is not None:
+            _report_old(subject, found, note, owner, old)
+            continue
         suggestion = nearest(note.word, specs, cutoff=70)
         message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
         if suggestion is not None:
@@ -56,7 +63,21 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
 
 
-@rule("OSIM102", "unknown-class", severity=ERROR)
+def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: Successor) -> None:
+    """Say that a tag is one of an older format."""
+    instead = f"write <{old.tag}>" if old.tag is not None else ""
+    words = "; " + ", ".join(part for part in (instead, old.hint) if part)
+    version = subject.version or CURRENT_VERSION
+    found(
+        f"<{note.word}> of {called(owner)} belongs to files before version {old.since}; in one of version {version} "
+        f"OpenSim ignores it{words}",
+        owner,
+        number=note.number,
+        suggestion=old.tag,
+    )
+
+
+@rule("OSIM102", "unknown-class", severity=ERROR, mends="both")
 def unknown_class(subject: Subject, found: Found) -> None:
     """An object is of a class that OpenSim does not have.
 
@@ -131,7 +152,7 @@ def wrong_class(subject: Subject, found: Found) -> None:
         )
 
 
-@rule("OSIM104", "duplicate-tag", severity=ERROR)
+@rule("OSIM104", "duplicate-tag", severity=ERROR, mends="safe")
 def duplicate_tag(subject: Subject, found: Found) -> None:
     """A property is given twice.
 
@@ -168,7 +189,8 @@ def element_in_value(subject: Subject, found: Found) -> None:
     """A value has an element inside.
 
     ## What it does
-    Reports elements inside a number, a switch, a text or a reference.
+    Reports elements inside a number, a switch, a text or a reference, and comments and CDATA sections in the middle of
+    one. A comment before or after it does no harm.
 
     ## Why is this bad
     OpenSim refuses to load the file.
@@ -185,14 +207,27 @@ def element_in_value(subject: Subject, found: Found) -> None:
     """
     for note, owner in _of_kind(subject, "child-in-value"):
         assert note.spec is not None
+        if note.word == "!--":
+            found(
+                f"there is a comment in the middle of {subject.titled(owner, note.spec)}: OpenSim refuses the file",
+                owner,
+                number=note.number,
+            )
+            continue
         found(
             f"<{note.spec.tag}> of {called(owner)} is a value and cannot hold <{note.word}>: OpenSim refuses the file",
             owner,
             number=note.number,
         )
+    source = subject.source
+    if source is not None and "<![CDATA[" in source.text:
+        for match in _CDATA.finditer(source.text):
+            if match[1].strip() or match[2].strip():
+                place = source.position(match.start() + 1 + len(match[1]), len("<![CDATA["))
+                found("a CDATA section is only a part of this value: OpenSim refuses the file", at=place)
 
 
-@rule("OSIM108", "wrong-part-name", severity=ERROR)
+@rule("OSIM108", "wrong-part-name", severity=ERROR, mends="unsafe")
 def wrong_part_name(subject: Subject, found: Found) -> None:
     """A part of an object has a name other than that of its property.
 
@@ -273,6 +308,9 @@ def missing_wrapper(subject: Subject, found: Found) -> None:
             number=note.number,
             suggestion=f"<{wrapper}>",
         )
+
+
+_CDATA = re.compile(r">([^<>]*)<!\[CDATA\[.*?\]\]>([^<]*)(?=<)", re.DOTALL)
 
 
 def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:

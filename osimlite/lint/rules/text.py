@@ -7,7 +7,6 @@ import re
 from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -17,7 +16,6 @@ _OLDEST_FOR_OPENSIM = 10901
 _SOCKETS = 30505
 """The version in which joints, points and forces got sockets."""
 _SOCKET = re.compile(r"<(socket_(?:parent|child)_frame)>")
-_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
 
 @rule("OSIM001", "syntax-error", severity=ERROR)
@@ -28,8 +26,8 @@ def syntax_error(subject: Subject, found: Found) -> None:
     Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that was cut off.
 
     ## Why is this bad
-    OpenSim cannot load the file. What stands before the place is still checked; what follows is not, since nobody can
-    tell which element it belongs to.
+    OpenSim cannot load the file. The tags and values before the place are still checked; what follows is not, since
+    nobody can tell which element it belongs to, nor are references, which may lead there.
 
     ## Example
     ```xml
@@ -45,45 +43,14 @@ def syntax_error(subject: Subject, found: Found) -> None:
         return
     for fault in subject.faults:
         if isinstance(fault, NotWellFormedError):
-            _found_at(subject.source, found, fault.message, fault.line, fault.column)
+            _found_at(subject.source, found, f"{fault.message}; {_checked(subject)}", fault.line, fault.column)
 
 
-@rule("OSIM009", "lenient-xml", severity=WARNING)
-def lenient_xml(subject: Subject, found: Found) -> None:
-    """The text is not XML in a way that OpenSim overlooks.
-
-    ## What it does
-    Reports a bare `&`, and two hyphens inside a comment.
-
-    ## Why is this bad
-    OpenSim's parser reads such a file, and most other XML readers refuse it.
-
-    ## Example
-    ```xml
-    <credits>Anna & Bert</credits>
-    ```
-
-    ## Use instead
-    ```xml
-    <credits>Anna &amp; Bert</credits>
-    ```
-    """
-    meant = {"bare-ampersand": "&amp;", "hyphens-in-comment": "-"}
-    offset = -1
-    for note in subject.notes:
-        if note.kind in meant and subject.source is not None:
-            offset = _word_behind(subject.source, max(offset + 1, subject.source.line_start(note.line or 1)), note.word)
-            found(
-                f"'{note.word}' is not XML here; OpenSim reads it, others refuse the file",
-                at=(place := subject.source.position(offset, len(note.word))),
-                suggestion=meant[note.kind],
-                fix=replaced(subject.source, place, meant[note.kind].replace("&amp;", f"&amp;{note.word[1:]}")),
-            )
-
-
-def _word_behind(source: Source, start: int, word: str) -> int:
-    place = source.text.find(word, start)
-    return place if place >= 0 else start
+def _checked(subject: Subject) -> str:
+    """How far a text with a syntax error was checked."""
+    if subject.model is None or subject.sure_until is None or subject.sure_until < 2:
+        return "until this is mended, nothing else is checked"
+    return f"until this is mended, only tags and values above line {subject.sure_until} are checked"
 
 
 @rule("OSIM010", "unused-ignore", severity=INFO)
@@ -123,11 +90,11 @@ def encoding(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then read as Windows
-    text (cp1252).
+    text (cp1252). A file in UTF-16 or UTF-32 is an error.
 
     ## Why is this bad
     OpenSim copies the bytes unseen, but every other XML reader refuses the file, and names with accents differ
-    between programs. Save the file as UTF-8.
+    between programs. Of two bytes for a letter it understands none, and cannot load the file. Save it as UTF-8.
 
     ## Example
     ```latin-1
@@ -140,6 +107,12 @@ def encoding(subject: Subject, found: Found) -> None:
     ```
     """
     source = subject.source
+    if source is not None and source.encoding in ("utf-16", "utf-32"):
+        found(
+            f"the file is in {source.encoding.upper()}: OpenSim cannot load it; save it as UTF-8",
+            at=source.position(0),
+            severity=ERROR,
+        )
     if source is None or source.encoding not in ("cp1252", "latin-1"):
         return
     declared = re.match(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)", source.data)
@@ -330,42 +303,6 @@ def second_object(subject: Subject, found: Found) -> None:
     for note in subject.notes:
         if note.kind == "second-object":
             found(f"OpenSim reads one object of a document and ignores this <{note.word}>", number=note.number)
-
-
-@rule("OSIM008", "character-reference", severity=ERROR)
-def character_reference(subject: Subject, found: Found) -> None:
-    """A numeric character reference stands for a character beyond ASCII.
-
-    ## What it does
-    Reports references such as `&#233;` with a number above 127.
-
-    ## Why is this bad
-    OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it becomes invalid
-    UTF-8, and `&#8364;` becomes another character. Write the character itself.
-
-    ## Example
-    ```xml
-    <credits>Ren&#233;</credits>
-    ```
-
-    ## Use instead
-    ```xml
-    <credits>René</credits>
-    ```
-    """
-    source = subject.source
-    # One character is found much faster than two.
-    if source is None or "&" not in source.text:
-        return
-    for match in _NUMBERED.finditer(source.text):
-        number = int(match[1], 16) if match[1] else int(match[2])
-        if 127 < number < 0x110000:
-            found(
-                f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character itself",
-                at=(place := source.position(match.start(), len(match[0]))),
-                suggestion=chr(number),
-                fix=replaced(source, place, chr(number)),
-            )
 
 
 def _conflicts(source: Source) -> list[tuple[int, int]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from osimlite.document.lexical import Unclean, flag, real, whole
+from osimlite.document.lexical import Unclean, flag, real, split, whole
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.fixes import replaced
@@ -13,9 +13,10 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import shown
 from osimlite.schema.base import FieldSpec, Object, field_specs
 from osimlite.schema.fields import Value
+from osimlite.text import listed
 
 
-@rule("OSIM201", "unreadable-value", severity=ERROR)
+@rule("OSIM201", "unreadable-value", severity=ERROR, mends="safe")
 def unreadable_value(subject: Subject, found: Found) -> None:
     """A value is no number, no switch, or not written as OpenSim reads it.
 
@@ -44,7 +45,8 @@ def unreadable_value(subject: Subject, found: Found) -> None:
             continue
         text = _text(owner, spec)
         found(
-            f"{subject.titled(owner, spec)} is '{text}', not {kind.words()}: {_kept(note, owner, spec, kind)}",
+            f"{subject.titled(owner, spec)} is '{text}', not {kind.words()}{_foreign(text)}: "
+            f"{_kept(note, owner, spec, kind)}",
             owner,
             number=note.number,
             word=note.word,
@@ -76,7 +78,7 @@ def wrong_count(subject: Subject, found: Found) -> None:
     for note, owner, spec, kind in _value_notes(subject, "too-many", "too-few"):
         if not _all_read(note.word, kind):
             continue
-        count = len(note.word.split())
+        count = len(split(note.word))
         found(
             f"{subject.titled(owner, spec)} takes {kind.words()}, not {count}: {_kept(note, owner, spec, kind)}",
             owner,
@@ -84,7 +86,7 @@ def wrong_count(subject: Subject, found: Found) -> None:
         )
 
 
-@rule("OSIM203", "cut-number", severity=ERROR)
+@rule("OSIM203", "cut-number", severity=ERROR, mends="unsafe")
 def cut_number(subject: Subject, found: Found) -> None:
     """OpenSim reads only the beginning of a number.
 
@@ -163,7 +165,7 @@ def _all_read(text: str, kind: Value) -> bool:
     readers: dict[str, Callable[[str], object]] = {"double": real, "int": whole, "bool": flag, "string": str}
     reads = readers[kind.scalar]
     try:
-        for word in text.split():
+        for word in split(text):
             reads(word)
     except Unclean:
         return False
@@ -172,7 +174,7 @@ def _all_read(text: str, kind: Value) -> bool:
 
 def _text(owner: Object, spec: FieldSpec) -> str:
     raw = owner.layout.raw.get(spec.name) if owner.layout is not None else None
-    return " ".join(raw[1].split()) if raw else ""
+    return " ".join(split(raw[1])) if raw else ""
 
 
 def _kept(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
@@ -186,19 +188,37 @@ def _kept(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
     return f"OpenSim keeps the default, {shown(field_specs(type(owner))[spec.tag].default)}"
 
 
+def _foreign(text: str) -> str:
+    """Which characters of a number cannot be told from others by looking at them."""
+    odd = [character for character in dict.fromkeys(text) if not character.isascii()]
+    if not odd:
+        return ""
+    import unicodedata
+
+    names = [f"U+{ord(c):04X} ({unicodedata.name(c, 'without a name').lower()})" for c in odd]
+    return f" (there is {listed(names, most=3)} in it)"
+
+
 def _readable(text: str, kind: Value) -> str | None:
     """The same value as OpenSim would read it, if that is plain."""
     if kind.scalar == "bool":
         return {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(text.lower())
     if kind.scalar == "double":
-        words = re.sub(r"[,;()\[\]{}~]", " ", text).split()
+        words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _plain_digits(text)).split()
         try:
             numbers = [float(word) for word in words]
         except ValueError:
             return None
-        if len(words) > 1 and (kind.size is None or len(numbers) == kind.size):
+        if (len(words) > 1 or not text.isascii()) and (kind.size is None or len(numbers) == kind.size):
             return " ".join(words)
     return None
+
+
+def _plain_digits(text: str) -> str:
+    """The text with minus signs and digits of word processors and other scripts as ASCII has them."""
+    import unicodedata
+
+    return unicodedata.normalize("NFKC", text).translate(dict.fromkeys((0x2010, 0x2011, 0x2012, 0x2013, 0x2212), "-"))
 
 
 def _whole_number(word: str) -> str | None:

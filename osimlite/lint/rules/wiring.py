@@ -59,7 +59,7 @@ def control_function_count(subject: Subject, found: Found) -> None:
             )
 
 
-@rule("OSIM332", "broken-input", severity=ERROR)
+@rule("OSIM332", "broken-input", severity=ERROR, mends="unsafe")
 def broken_input(subject: Subject, found: Found) -> None:
     """An input names an output that does not exist.
 

@@ -1,0 +1,219 @@
+"""OSIM51x: values and ranges of coordinates, and angles that are in degrees."""
+
+from __future__ import annotations
+
+import math
+
+from osimlite.document.lexical import shortest
+from osimlite.lint.config import Threshold
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.fixes import replaced
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, quantity
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.joints import Joint
+
+ANGLE = Threshold("largest-angle", 10 * math.pi, "rad", "a coordinate that turns further is taken to be in degrees")
+UNBOUNDED = Threshold("unbounded-angle", 1000.0, "rad", "a bound of a range from which on it stands for none")
+ORIENTATION = Threshold("largest-orientation", 2 * math.pi, "rad", "a larger angle of a frame is in degrees")
+
+
+@rule("OSIM511", "inverted-range", severity=WARNING, mends="unsafe")
+def inverted_range(subject: Subject, found: Found) -> None:
+    """The range of a coordinate ends before it begins.
+
+    ## What it does
+    Reports ranges whose first number is larger than the second; an error if the coordinate is clamped.
+
+    ## Why is this bad
+    OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders and solvers that
+    use the range misbehave.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>0 -2.1</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>-2.1 0</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        low, high = coordinate.range
+        if low > high:
+            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
+            found(
+                f"the range of {called(coordinate)} runs from {quantity(low)} down to {quantity(high)}{refused}",
+                coordinate,
+                tag="range",
+                severity=ERROR if coordinate.clamped else None,
+                suggestion=(better := f"{shortest(high)} {shortest(low)}"),
+                fix=replaced(subject.source, subject.position(coordinate, tag="range"), better, safe=False),
+            )
+
+
+@rule("OSIM512", "default-outside-range", severity=WARNING)
+def default_outside_range(subject: Subject, found: Found) -> None:
+    """The default value of a coordinate lies outside its range.
+
+    ## What it does
+    Reports such defaults; an error if the coordinate is clamped.
+
+    ## Why is this bad
+    OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose that its own range
+    rules out; often the range or the default is in degrees.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        low, high = coordinate.range
+        slack = 1e-9 * max(abs(low), abs(high), 1.0) if math.isfinite(low) and math.isfinite(high) else 0.0
+        if low <= high and not low - slack <= coordinate.default_value <= high + slack:
+            if not math.isfinite(coordinate.default_value):
+                continue
+            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
+            found(
+                f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is outside its "
+                f"range, {quantity(low)} to {quantity(high)}{refused}",
+                coordinate,
+                tag="default_value",
+                severity=ERROR if coordinate.clamped else None,
+            )
+
+
+@rule("OSIM513", "prescribed-without-function", severity=ERROR)
+def prescribed_without_function(subject: Subject, found: Found) -> None:
+    """A coordinate is prescribed and has no function.
+
+    ## What it does
+    Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
+
+    ## Why is this bad
+    OpenSim switches the prescription off in silence, and the coordinate moves freely.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <prescribed>true</prescribed> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        if coordinate.prescribed and coordinate.prescribed_function is None:
+            found(
+                f"{called(coordinate)} is prescribed without a prescribed_function: OpenSim lets it move freely",
+                coordinate,
+                tag="prescribed",
+            )
+
+
+@rule("OSIM514", "degrees-for-radians", severity=WARNING, thresholds=(ANGLE, UNBOUNDED, ORIENTATION))
+def degrees_for_radians(subject: Subject, found: Found) -> None:
+    """An angle looks as if it were in degrees.
+
+    ## What it does
+    Reports rotational coordinates whose default value or range goes beyond five turns, in radians, and frames,
+    surfaces and wrap objects that are turned by more than one.
+
+    ## Why is this bad
+    Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is more than fourteen
+    turns.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>-120 0</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates> <Coordinate name="knee_angle"> <range>-2.0943951 0</range> </Coordinate> </coordinates>
+    </PinJoint>
+    ```
+    """
+    turns, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
+    for joint in subject.each(Joint):
+        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
+            if motion != "rotational":
+                continue
+            largest = max((abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0)
+            # 99999.9 and the like stand for "no bound".
+            if turns < largest < unbounded:
+                found(
+                    f"the range of {called(coordinate)}, {quantity(coordinate.range)}, is in radians; in degrees?",
+                    coordinate,
+                    tag="range",
+                    suggestion=" ".join(f"{math.radians(bound):.6g}" for bound in coordinate.range),
+                )
+            if turns < abs(coordinate.default_value) < math.inf:
+                found(
+                    f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is in radians; "
+                    "in degrees?",
+                    coordinate,
+                    tag="default_value",
+                    suggestion=f"{math.radians(coordinate.default_value):.6g}",
+                )
+    largest = subject.config.value_of(ORIENTATION)
+    for cls, items in subject.by_class.items():
+        specs = cls.field_specs()
+        for spec in (specs[tag] for tag in ("orientation", "xyz_body_rotation") if tag in specs):
+            for item in items:
+                angles = getattr(item, spec.name)
+                if any(largest < abs(angle) < math.inf for angle in angles):
+                    found(
+                        f"{subject.titled(item, spec)}, {quantity(angles)}, is in radians; in degrees?",
+                        item,
+                        tag=spec.tag,
+                        suggestion=" ".join(f"{math.radians(angle):.6g}" for angle in angles),
+                    )

@@ -1,0 +1,185 @@
+"""OSIM60x: functions given by points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import cast
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import quantity, times
+from osimlite.schema.functions import GCVSpline, PiecewiseConstantFunction, PiecewiseLinearFunction, SimmSpline
+
+Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
+
+
+@rule("OSIM601", "unsorted-abscissae", severity=ERROR)
+def unsorted_abscissae(subject: Subject, found: Found) -> None:
+    """The x values of a function do not rise.
+
+    ## What it does
+    Reports the first x that is smaller than the one before it, and of splines also the first that is equal to it.
+
+    ## Why is this bad
+    A GCVSpline is refused. A SimmSpline divides by the difference without a word and gives values in the millions;
+    piecewise functions take the wrong piece. A moment arm or a moving point is then anywhere.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function>
+                    <SimmSpline> <x>0 0.5 0.5 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
+                </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function>
+                    <SimmSpline> <x>0 0.5 0.6 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
+                </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for function in _tabulated(subject):
+        strictly = isinstance(function, (SimmSpline, GCVSpline))
+        for index in range(1, len(function.x)):
+            before, here = function.x[index - 1], function.x[index]
+            if here < before or (strictly and here == before):
+                fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "its values are wrong"
+                relation = "repeats" if here == before else "is smaller than"
+                word, nth = subject.word_at(function, "x", index)
+                found(
+                    f"x of {subject.called_with(function)}: number {index + 1}, {quantity(here)}, {relation} the one "
+                    f"before; {fate}",
+                    function,
+                    tag="x",
+                    word=word,
+                    nth=nth,
+                )
+                break
+
+
+@rule("OSIM602", "unequal-points", severity=ERROR)
+def unequal_points(subject: Subject, found: Found) -> None:
+    """A function has not as many y values as x values.
+
+    ## What it does
+    Reports tabulated functions whose lists are of different length. Too many y are a warning.
+
+    ## Why is this bad
+    Where y is missing OpenSim reads beyond the end of the list, whatever is in memory there; a GCVSpline is refused.
+    Too many y are ignored.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function> <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4</y> </SimmSpline> </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function> <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4 -1</y> </SimmSpline> </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for function in _tabulated(subject):
+        xs, ys = len(function.x), len(function.y)
+        if xs == ys:
+            continue
+        fate = "OpenSim reads beyond the end of the list" if ys < xs else "the rest is ignored"
+        found(
+            f"{subject.called_with(function)} has {xs} x and {ys} y: {fate}",
+            function,
+            tag="y",
+            severity=None if ys < xs else WARNING,
+        )
+
+
+@rule("OSIM603", "too-few-points", severity=ERROR)
+def too_few_points(subject: Subject, found: Found) -> None:
+    """A function has too few points.
+
+    ## What it does
+    Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order, and piecewise
+    functions without any.
+
+    ## Why is this bad
+    A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns what is in memory.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function> <SimmSpline> <x>0</x> <y>-1</y> </SimmSpline> </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function> <Constant> <value>-1</value> </Constant> </prescribed_function>
+                <prescribed>true</prescribed>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for function in _tabulated(subject):
+        least = 1
+        if isinstance(function, SimmSpline):
+            least = 2
+        elif isinstance(function, GCVSpline):
+            least = 2 * function.half_order
+        if len(function.x) < least:
+            fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "it has no value"
+            given = times(len(function.x), "point")
+            found(f"{subject.called_with(function)} has {given} and needs {least}: {fate}", function, tag="x")
+
+
+def _tabulated(subject: Subject) -> Iterator[Tabulated]:
+    for cls in (SimmSpline, GCVSpline, PiecewiseLinearFunction, PiecewiseConstantFunction):
+        for function in subject.each(cls):
+            if function._index is not None or subject.source is None:
+                yield cast("Tabulated", function)

@@ -1,0 +1,245 @@
+"""OSIM0xx: markup that OpenSim reads otherwise than the rest of the world."""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.document.source import Source
+from osimlite.lint.diagnostic import Edit, Fix
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.fixes import replaced, without_text
+from osimlite.lint.subject import Subject
+
+REMARKS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
+"""Everything in which a tag is no tag."""
+_CONTROLS = re.compile("[\f\v]")
+_BLANK_IN_CLOSING = re.compile(r"</[^<>\s]+(\s+)>")
+_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
+
+
+@rule("OSIM008", "character-reference", severity=ERROR, mends="safe")
+def character_reference(subject: Subject, found: Found) -> None:
+    """A numeric character reference stands for a character beyond ASCII.
+
+    ## What it does
+    Reports references such as `&#233;` with a number above 127.
+
+    ## Why is this bad
+    OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it becomes invalid
+    UTF-8, and `&#8364;` becomes another character. Write the character itself.
+
+    ## Example
+    ```xml
+    <credits>Ren&#233;</credits>
+    ```
+
+    ## Use instead
+    ```xml
+    <credits>René</credits>
+    ```
+    """
+    source = subject.source
+    # One character is found much faster than two.
+    if source is None or "&" not in source.text:
+        return
+    for match in _NUMBERED.finditer(source.text):
+        number = int(match[1], 16) if match[1] else int(match[2])
+        if 127 < number < 0x110000:
+            found(
+                f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character itself",
+                at=(place := source.position(match.start(), len(match[0]))),
+                suggestion=chr(number),
+                fix=replaced(source, place, chr(number)),
+            )
+
+
+@rule("OSIM009", "lenient-xml", severity=WARNING, mends="safe")
+def lenient_xml(subject: Subject, found: Found) -> None:
+    """The text is not XML in a way that OpenSim overlooks.
+
+    ## What it does
+    Reports a bare `&`, two hyphens inside a comment, form feeds, and an XML declaration that does not stand at the very
+    beginning.
+
+    ## Why is this bad
+    OpenSim's parser reads such a file, and most other XML readers refuse it. A bare `&` it leaves out: of `Anna & Bert`
+    it keeps `Anna  Bert`.
+
+    ## Example
+    ```xml
+    <credits>Anna & Bert</credits>
+    ```
+
+    ## Use instead
+    ```xml
+    <credits>Anna &amp; Bert</credits>
+    ```
+    """
+    source = subject.source
+    if source is None:
+        return
+    offset = -1
+    for note in subject.notes:
+        if note.kind not in ("bare-ampersand", "hyphens-in-comment", "control-character", "late-declaration"):
+            continue
+        offset = _word_behind(source, max(offset + 1, source.line_start(note.line or 1)), note.word)
+        place = source.position(offset, len(note.word.splitlines()[0]))
+        match note.kind:
+            case "bare-ampersand":
+                known = note.value != note.word
+                better = str(note.value) if known else f"&amp;{note.word[1:]}"
+                does = f"leaves the & out and keeps '{note.word[1:]}'" if known else "leaves it out"
+                found(
+                    f"'{note.word}' is not XML; OpenSim {does}, others refuse the file",
+                    at=place,
+                    suggestion=better,
+                    fix=replaced(source, place, better),
+                )
+            case "hyphens-in-comment":
+                found(
+                    f"'{note.word}' may not stand in a comment; OpenSim reads it, others refuse the file",
+                    at=place,
+                    suggestion="-",
+                    fix=replaced(source, place, "-"),
+                )
+            case "control-character":
+                place = source.position(_control(source, offset))
+                found(
+                    f"the character {note.word} is not XML; OpenSim takes it for a blank, others refuse the file",
+                    at=place,
+                    fix=replaced(source, place, " "),
+                )
+            case _:
+                found(
+                    "the XML declaration belongs at the very beginning; OpenSim reads it here, others refuse the file",
+                    at=place,
+                    fix=without_text(source, offset, offset + len(note.word)),
+                )
+    start = source.text.find("<?xml")
+    if start > 0 and not source.text[:start].strip():
+        found(
+            "there are blanks before the XML declaration; OpenSim reads the file, others refuse it",
+            at=source.position(start, 5),
+            fix=Fix((Edit(0, start, ""),)),
+        )
+
+
+def _word_behind(source: Source, start: int, word: str) -> int:
+    place = source.text.find(word, start)
+    return place if place >= 0 else start
+
+
+def _control(source: Source, start: int) -> int:
+    match = _CONTROLS.search(source.text, start)
+    return match.start() if match is not None else start
+
+
+@rule("OSIM011", "text-outside-root", severity=ERROR, mends="safe")
+def text_outside_root(subject: Subject, found: Found) -> None:
+    """There is text before or after the root element.
+
+    ## What it does
+    Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an editor left behind,
+    or a byte-order mark at another place than the beginning.
+
+    ## Why is this bad
+    OpenSim finds no root element then and refuses the file, with a message about a node that is none. Make a comment of
+    a remark: `<!-- ... -->`.
+
+    ## Example
+    ```document
+    scaled by Anna, 2021
+    <OpenSimDocument Version="40600">
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```document
+    <!-- scaled by Anna, 2021 -->
+    <OpenSimDocument Version="40600">
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+    """
+    source = subject.source
+    for note in subject.notes if source is not None else ():
+        assert source is not None
+        if note.kind in ("text-outside-root", "byte-order-mark"):
+            start = _word_behind(source, source.line_start(note.line or 1), note.word)
+            if not start and note.kind == "byte-order-mark":
+                # Two of them at the beginning do no harm.
+                continue
+            what = "a byte-order mark" if note.kind == "byte-order-mark" else f"the text '{note.word}'"
+            found(
+                f"{what} stands outside the document: OpenSim refuses the file",
+                at=source.position(start, len(note.word)),
+                fix=without_text(source, start, start + 1) if note.kind == "byte-order-mark" else None,
+            )
+
+
+@rule("OSIM012", "byte-order-mark", severity=INFO)
+def byte_order_mark(subject: Subject, found: Found) -> None:
+    """The file has a byte-order mark.
+
+    ## What it does
+    Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the same mark between
+    elements.
+
+    ## Why is this bad
+    OpenSim and XML readers pass over it. Files that are joined, cut or compared with other tools carry it to places
+    where it is part of a name or a number, and nobody sees it.
+
+    ## Example
+    ```document
+    \ufeff<OpenSimDocument Version="40600">
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```document
+    <OpenSimDocument Version="40600">
+        <Model name="empty" />
+    </OpenSimDocument>
+    ```
+    """
+    source = subject.source
+    if source is not None and source.encoding == "utf-8-sig":
+        found("the file begins with a byte-order mark", at=source.position(0))
+
+
+@rule("OSIM013", "closing-tag", severity=ERROR, mends="safe")
+def closing_tag(subject: Subject, found: Found) -> None:
+    """There is white space in a closing tag.
+
+    ## What it does
+    Reports closing tags such as `</mass >`, and those that are broken over two lines.
+
+    ## Why is this bad
+    XML allows it, so that editors and other programs say nothing. OpenSim's parser does not know it and cannot load the
+    file.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    ```
+    """
+    source = subject.source
+    # Three plain searches are much faster than one with a pattern.
+    if source is None or not any(blank in source.text for blank in (" >", "\t>", "\n>")):
+        return
+    plain = REMARKS.sub(lambda match: "-" * len(match[0]), source.text)
+    for match in _BLANK_IN_CLOSING.finditer(plain):
+        start, end = match.span(1)
+        found(
+            f"OpenSim cannot read '{''.join(match[0].split())[:-1]} >': no white space may stand in a closing tag",
+            at=source.position(match.start(), start - match.start()),
+            suggestion="".join(match[0].split()),
+            fix=Fix((Edit(start, end, ""),)),
+        )
