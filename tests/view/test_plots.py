@@ -9,6 +9,7 @@ import pytest
 from osimlite.errors import MissingDependency, OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
+from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
 from osimlite.view.plots import _figures, energies
 from tests.view.motions import Recorded, stroll
@@ -113,6 +114,18 @@ def test_energy_is_that_of_the_mechanism():
     # 5 kg slide down 10 degrees.
     fall = -5.0 * 9.80665 * times[at] * np.sin(np.radians(10))
     assert parts["potential of gravity"][at] == pytest.approx(fall, rel=1e-9)
+
+
+def test_energy_of_a_simulation_has_what_contacts_store():
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    trajectory = simulate(dynamic_walker(), 0.1)
+    (panel,) = dict(_figures(trajectory, trajectory.mechanism))["energy.png"].axes
+    found = lines(panel)
+    assert set(found) == {"kinetic", "potential of gravity", "stored in contacts and springs", "sum"}
+    stored, total, gravity = (trajectory.energy[part] for part in ("stored", "total", "gravity"))
+    assert found["stored in contacts and springs"].get_ydata() == pytest.approx(stored) and stored[0] > 1.0
+    assert found["sum"].get_ydata() == pytest.approx(total - gravity[0])
+    assert [text.get_text() for text in panel.texts] == ["gravity: zero at the start"]
 
 
 def test_a_motion_without_forces_has_no_pictures_of_forces(tmp_path):
