@@ -1,0 +1,107 @@
+"""Every block of code in the manual is run, page by page, in a folder of its own, in the order of the page.
+
+Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are read. A comment
+``<!-- prepared: commands -->`` makes what a page takes for granted, ``<!-- not run: reason -->`` before a block says
+why it cannot be run here.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from lxml import etree
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md"))
+READ_ONLY = ("", "text", "lua", "elisp", "console", "diff", "matlab")
+"""Languages of blocks that show what others print, or that nothing here reads."""
+
+_BLOCK = re.compile(
+    r"(?:<!-- not run: (?P<why>[^>]+) -->\s*)?^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)",
+    re.M | re.S,
+)
+_PREPARED = re.compile(r"<!-- prepared: (.*?) -->", re.S)
+
+
+class Block(NamedTuple):
+    """One block of code; `why` says why it is not run, if it is not."""
+
+    language: str
+    code: str
+    line: int
+    why: str | None
+
+
+def blocks(text: str) -> list[Block]:
+    return [
+        Block(match["language"], match["code"], text.count("\n", 0, match.start("code")) + 1, match["why"])
+        for match in _BLOCK.finditer(text)
+    ]
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> dict[str, str]:
+    """An environment in which `osimlite` and `python` are those under test."""
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
+    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(tmp_path / "cache"))}
+    return {**os.environ, "PATH": path, "MPLBACKEND": "Agg", "COLUMNS": "100", **home}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("pybullet", "matplotlib"):
+        pytest.importorskip(package, reason=f"needs {package} (extra 'all')")
+    folder = tmp_path / "work"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    names: dict[str, object] = {"__name__": "__manual__"}
+    text = (ROOT / page).read_text()
+    for commands in _PREPARED.findall(text):
+        run(commands, page, shell)
+    for block in blocks(text):
+        place = f"{page}:{block.line}"
+        if block.why is not None:
+            continue
+        if block.language == "python":
+            exec(compile("\n" * (block.line - 1) + block.code, str(ROOT / page), "exec"), names)
+        elif block.language == "sh":
+            run(block.code, place, shell)
+        else:
+            read(block, place)
+
+
+def run(commands: str, place: str, shell: dict[str, str]) -> None:
+    """Run commands; fails if one does."""
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", commands], env=shell, capture_output=True, text=True,
+        stdin=subprocess.DEVNULL, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{place}\n{commands}\n{done.stdout}\n{done.stderr}"
+
+
+def read(block: Block, place: str) -> None:
+    """Read what is no program; fails if it cannot be read."""
+    if block.language == "toml":
+        tomllib.loads(block.code)
+    elif block.language == "json":
+        json.loads(block.code)
+    elif block.language == "yaml":
+        yaml = pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+        yaml.safe_load(block.code)
+    elif block.language == "xml":
+        etree.fromstring(f"<all>{block.code}</all>")
+    else:
+        assert block.language in READ_ONLY, f"{place}: a block of {block.language} that nobody runs"
+
+
+def test_a_block_that_is_not_run_is_found() -> None:
+    found = blocks("a\n\n<!-- not run: it takes an hour -->\n```sh\nsleep 3600\n```\n\n```python\nx = 1\n```\n")
+    assert found == [Block("sh", "sleep 3600\n", 5, "it takes an hour"), Block("python", "x = 1\n", 9, None)]
