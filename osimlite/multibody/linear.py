@@ -24,7 +24,7 @@ def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     with a left side of unit length. The directions are orthonormal.
     """
     count, size = rows.shape
-    if not count:
+    if not (count and size):
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
     # Rounding errors are no equation.

@@ -155,11 +155,11 @@ class Mechanism:
 
     def values(self, q: Values) -> Array:
         """Coordinate values as an array (n,)."""
-        return self._array(q, "value", [info.default_value for info in self.coordinates])
+        return self._array(q, "value", self._default_values)
 
     def speeds(self, u: Values) -> Array:
         """Generalized speeds as an array (n,)."""
-        return self._array(u, "speed", [info.default_speed for info in self.coordinates])
+        return self._array(u, "speed", self._default_speeds)
 
     def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> Kinematics:
         """Poses and velocities of all bodies (u None: at rest), from which everything else follows."""
@@ -211,6 +211,8 @@ class Mechanism:
         Raises:
             SimulationError: a ball, free or ellipsoid joint stands where N is singular.
         """
+        if not self._turning:
+            return self._unit
         values, matrix = self.values(q), np.eye(len(self.coordinates))
         for mobilizer in self._turning:
             own = list(mobilizer.coordinates)
@@ -219,7 +221,10 @@ class Mechanism:
 
     def rate_bias(self, q: Values, u: Values) -> Array:
         """Ndot u (n,), so that qddot = N udot + Ndot u; raises as :meth:`rate_matrix`."""
-        values, speeds, bias = self.values(q), self.speeds(u), np.zeros(len(self.coordinates))
+        bias = np.zeros(len(self.coordinates))
+        if not self._turning:
+            return bias
+        values, speeds = self.values(q), self.speeds(u)
         for mobilizer in self._turning:
             own = list(mobilizer.coordinates)
             bias[own] = mobilizer.rate_bias(values[own], speeds[own])
@@ -337,6 +342,21 @@ class Mechanism:
         return places | dict(self.frames)
 
     @cached_property
+    def _default_values(self) -> tuple[float, ...]:
+        return tuple(info.default_value for info in self.coordinates)
+
+    @cached_property
+    def _default_speeds(self) -> tuple[float, ...]:
+        return tuple(info.default_speed for info in self.coordinates)
+
+    @cached_property
+    def _unit(self) -> Array:
+        """What changes speeds that are rates into rates; nobody may write into it."""
+        unit = np.eye(len(self.coordinates))
+        unit.flags.writeable = False
+        return unit
+
+    @cached_property
     def _turning(self) -> tuple[Mobilizer, ...]:
         """The mobilizers whose speeds are not the rates of their coordinates."""
         return tuple(body.mobilizer for body in self.bodies if not body.mobilizer.speeds_are_rates)
@@ -361,6 +381,8 @@ class Mechanism:
 
     def _array(self, values: Values, what: str, defaults: Sequence[float] = ()) -> Array:
         count = len(self.coordinates)
+        if type(values) is np.ndarray and values.shape == (count,) and values.dtype == float:
+            return values
         if isinstance(values, Mapping):
             result = np.array(defaults, dtype=float) if defaults else np.zeros(count)
             for name, value in values.items():

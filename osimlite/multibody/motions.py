@@ -180,11 +180,18 @@ class DriftAngle(Function):
 
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
         """Zero, zeros, and a Hessian (k, k) that is no derivative of these."""
-        size, own = len(arguments), list(self.places)
+        hessian = self._curvature(arguments)[self.component]
+        return 0.0, np.zeros(len(arguments)), 0.5 * (hessian + hessian.T)
+
+    def all_components(self, arguments: Array, rates: Array) -> Array:
+        """Second derivatives (3,) of this angle and the other two at arguments (k,) with these rates (k,)."""
+        return np.asarray(self._curvature(arguments) @ rates @ rates, dtype=np.float64)
+
+    def _curvature(self, arguments: Array) -> Array:
+        own = list(self.places)
         q = np.zeros(max(own, default=-1) + 1)
         q[own] = arguments
-        hessian = self.drift.curvature(q)[self.component][np.ix_(own, own)]
-        return 0.0, np.zeros(size), 0.5 * (hessian + hessian.T)
+        return self.drift.curvature(q)[np.ix_((0, 1, 2), own, own)]
 
 
 @dataclass(frozen=True, eq=False)

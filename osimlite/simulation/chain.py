@@ -90,7 +90,7 @@ class Chain:
             for joint in joints:
                 if joint in others:
                     continue
-                axis, anchor = self._axis(script, joint)
+                axis, anchor = self.axis(script, joint)
                 axis = script.combine((sign, axis))
                 if self.joints[joint].kind == "prismatic":
                     found.append(Column(joint, ZERO, axis))
@@ -105,9 +105,8 @@ class Chain:
             *((f"r{column.joint}", column.turning if turning else column.moving) for column in columns)
         )
 
-    # --------------------------------------------------------------------------------------------- helpers
-    def _axis(self, script: Script, joint: int) -> tuple[Vector, Vector]:
-        """Axis of a joint and a point on it."""
+    def axis(self, script: Script, joint: int) -> tuple[Vector, Vector]:
+        """Axis of a joint, and where its motion starts from."""
 
         def make() -> tuple[Vector, Vector]:
             placed = self._origin(script, joint)
@@ -116,6 +115,7 @@ class Chain:
         found: tuple[Vector, Vector] = script.once(("axis", joint), make)
         return found
 
+    # --------------------------------------------------------------------------------------------- helpers
     def _origin(self, script: Script, joint: int) -> Placed:
         """Frame of a joint before its own motion."""
         placed: Placed = script.once(
@@ -132,7 +132,7 @@ class Chain:
         def make() -> Placed:
             start = self._origin(script, joint)
             if self.joints[joint].kind == "prismatic":
-                axis, _ = self._axis(script, joint)
+                axis, _ = self.axis(script, joint)
                 return Placed(start.rotation, script.combine((1.0, start.origin), (f"q{joint}", axis)))
             turn = _turn(script, vector(self.joints[joint].axis), f"q{joint}")
             return Placed(script.multiply(start.rotation, turn), start.origin)

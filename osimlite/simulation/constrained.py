@@ -10,8 +10,8 @@ the errors of all constraints is below the tolerance, and brought to a tenth of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import sqrt
+from collections.abc import Callable, Sequence
+from math import inf, sqrt
 
 import numpy as np
 
@@ -46,6 +46,10 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
     return [place for place, info in enumerate(mechanism.coordinates) if not info.locked or place in held]
 
 
+States = Callable[[float, Array, Array], Kinematics]
+"""The state of some bodies at a time (s), at the coordinates and the speeds of an engine's state."""
+
+
 class Constrained:
     """The constraints of a mechanism on the coordinates of an engine's state.
 
@@ -53,10 +57,15 @@ class Constrained:
         mechanism: whose constraints.
         order: place in the mechanism of each coordinate of the state; the others are locked, and stay at their
             defaults.
+        states: gives the state of the bodies in :attr:`bodies` for time, x and u; by default osimlite's recursion.
+
+    Attributes:
+        bodies: indices of the bodies that constraints look at.
     """
 
-    def __init__(self, mechanism: Mechanism, order: Sequence[int]) -> None:
+    def __init__(self, mechanism: Mechanism, order: Sequence[int], states: States | None = None) -> None:
         self.mechanism = mechanism
+        self._state = self.state if states is None else states
         self.order = tuple(order)
         self._order = np.array(order, dtype=int)
         self._q = np.array([info.default_value for info in mechanism.coordinates])
@@ -70,35 +79,48 @@ class Constrained:
                 self._constraints.append(Prescribed(item.coordinate, Constant(self._q[item.coordinate]), item.name))
             else:
                 self._locks += 1
+        self.bodies = sorted({body for item in self._constraints for body in item.bodies} - {GROUND})
         needed: set[int] = set()
-        for item in self._constraints:
-            for body in item.bodies:
-                while body != GROUND and body not in needed:
-                    needed.add(body)
-                    body = mechanism.bodies[body].parent
-        self._bodies = sorted(needed)
+        for body in self.bodies:
+            while body != GROUND and body not in needed:
+                needed.add(body)
+                body = mechanism.bodies[body].parent
+        self._carriers = sorted(needed)
 
     @property
     def names(self) -> list[str]:
         """Of what is kept up, apart from coordinates at rest."""
         return [item.name for item in self._constraints]
 
-    def accelerations(self, t: float, x: Array, u: Array, matrix: Array, right: Array) -> Array:
+    def accelerations(
+        self, t: float, x: Array, u: Array, matrix: Array, right: Array, state: Kinematics | None = None
+    ) -> Array:
         """Udot (n,) at coordinates x (n,) and speeds u (n,), for M (n, n) and f (n,) of the motion without constraints.
+
+        Args:
+            t: time, s.
+            x: coordinates.
+            u: generalized speeds.
+            matrix: M.
+            right: f.
+            state: of the bodies that constraints look at, if it is known already.
 
         Raises:
             SimulationError: a motion that nothing forbids moves no mass.
         """
         if not self._constraints:
             return constrained_accelerations(self.mechanism, matrix, right, None, self.order)
-        state = self._state(t, x, u)
+        state = self._state(t, x, u) if state is None else state
         rows, values = stacked([item.acceleration_equations(state) for item in self._constraints])
-        equations = rows[:, self._order], values
-        return constrained_accelerations(self.mechanism, matrix, right, equations, self.order)
+        rows = rows[:, self._order]
+        udot = by_multipliers(matrix, right, rows, values)
+        if udot is None:
+            return constrained_accelerations(self.mechanism, matrix, right, (rows, values), self.order)
+        return udot
 
     # -------------------------------------------------------------------------------------------- projection
     def project(
-        self, t: float, y: list[float], errors: list[float] | None, tolerance: float
+        self, t: float, y: list[float], errors: list[float] | None, tolerance: float, limit: float = inf
     ) -> tuple[list[float], list[float] | None] | None:
         """The nearest state where the constraints hold, see :class:`osimlite.simulation.integrators.Projection`."""
         if not self._constraints:
@@ -106,7 +128,6 @@ class Constrained:
         size = len(self._order)
         x, u = np.array(y[:size]), np.array(y[size:])
         off = None if errors is None else (np.array(errors[:size]), np.array(errors[size:]))
-        limit = max(2.0 * tolerance, sqrt(tolerance))
         if not (
             self._project_values(t, x, off and off[0], tolerance, limit)
             and self._project_speeds(t, x, u, off and off[1], tolerance, limit)
@@ -174,10 +195,15 @@ class Constrained:
         return True
 
     # --------------------------------------------------------------------------------------------- helpers
-    def _state(self, t: float, x: Array, u: Array) -> Kinematics:
+    def state(self, t: float, x: Array, u: Array) -> Kinematics:
+        """State of the bodies that constraints look at, by osimlite's recursion."""
+        return kinematics(self.mechanism, *self.spread(x, u), t, bodies=self._carriers)
+
+    def spread(self, x: Array, u: Array) -> tuple[Array, Array]:
+        """Values and speeds of all coordinates of the mechanism."""
         q, speeds = self._q.copy(), np.zeros(len(self._q))
         q[self._order], speeds[self._order] = x, u
-        return kinematics(self.mechanism, q, speeds, t, bodies=self._bodies)
+        return q, speeds
 
     def _rows_by_values(self, state: Kinematics) -> Array:
         """Derivatives (p, n) of the errors of the positions by the coordinates."""
@@ -193,6 +219,30 @@ class Constrained:
     def _norm(self, errors: Array) -> float:
         """Root mean square over all equations, those of locked coordinates included."""
         return sqrt(float(errors @ errors) / max(len(errors) + self._locks, 1))
+
+
+def by_multipliers(matrix: Array, right: Array, rows: Array, values: Array) -> Array | None:
+    """Udot with M udot + Gᵀ λ = f and G udot = b by elimination of udot; None where that is not safe.
+
+    It is safe where M alone is well conditioned, and no equation all but follows from others.
+    """
+    try:
+        pivots = np.linalg.cholesky(matrix).diagonal() ** 2
+        if not np.min(pivots / matrix.diagonal()) > 1e-10:
+            return None
+        solved = np.linalg.solve(matrix, np.column_stack((right, rows.T)))
+        coupling = rows @ solved[:, 1:]
+        if not np.min(coupling.diagonal()) > 0.0:
+            return None
+        scales = 1.0 / np.sqrt(coupling.diagonal())
+        scaled = coupling * np.outer(scales, scales)
+        if not np.min(np.linalg.cholesky(scaled).diagonal()) > 1e-4:
+            return None
+        multipliers = scales * np.linalg.solve(scaled, scales * (rows @ solved[:, 0] - values))
+    except np.linalg.LinAlgError:
+        return None
+    udot: Array = solved[:, 0] - solved[:, 1:] @ multipliers
+    return udot
 
 
 def kept_state(

@@ -23,7 +23,7 @@ class Projection(Protocol):
     """Moves states to where constraints hold."""
 
     def project(
-        self, t: float, y: list[float], errors: list[float] | None, tolerance: float
+        self, t: float, y: list[float], errors: list[float] | None, tolerance: float, limit: float = inf
     ) -> tuple[list[float], list[float] | None] | None:
         """The nearest state that fulfils the constraints, if it is near.
 
@@ -32,6 +32,7 @@ class Projection(Protocol):
             y: a state.
             errors: how far off each entry of it may be, or None.
             tolerance: what the constraints may be off.
+            limit: what they may be off at most in y.
 
         Returns:
             The state, and the errors without what lies across the constraints; None if no such state is near.
@@ -315,7 +316,9 @@ class RungeKuttaMerson(Stepper):
     ) -> tuple[list[float], float]:
         """The end of the step where the constraints hold, and the norm of the error there."""
         assert self._projection is not None
-        found = self._projection.project(t1, y1, [abs(e) for e in errors], self._accuracy / 10.0)
+        tolerance = self._accuracy / 10.0
+        limit = max(2.0 * tolerance, sqrt(tolerance))
+        found = self._projection.project(t1, y1, [abs(e) for e in errors], tolerance, limit)
         if found is None:
             return y1, inf
         y, rest = found

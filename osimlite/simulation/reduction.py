@@ -56,12 +56,18 @@ class Reduction:
         self._lines = np.zeros((len(joints), len(order)))
         self._single: list[tuple[int, Univariate, int]] = []
         self._several: list[tuple[int, Function, list[int], list[int], list[int]]] = []
+        # The three angles of one CustomJoint at once; the last list has their rows.
+        self._drifts: dict[object, tuple[DriftAngle, list[int], list[int], list[int], list[int]]] = {}
         for row, joint in enumerate(joints):
             places = list(joint.coordinates)
             moving = [k for k, place in enumerate(places) if place in number]
             columns = [number[places[k]] for k in moving]
             line = as_line(joint.function) if len(places) == 1 else None
-            if joint.function == IDENTITY:
+            if isinstance(joint.function, DriftAngle):
+                key = (id(joint.function.drift), joint.coordinates)
+                drift = self._drifts.setdefault(key, (joint.function, places, moving, columns, [0, 0, 0]))
+                drift[-1][joint.function.component] = row
+            elif joint.function == IDENTITY:
                 self._lines[row, columns[0]] = 1.0
             elif line is not None and line.start == 0.0:
                 self._lines[row, columns[0]] = line.slope
@@ -74,7 +80,6 @@ class Reduction:
             for body in mechanism.bodies
             if not body.mobilizer.speeds_are_rates and any(place in number for place in body.mobilizer.coordinates)
         ]
-        self.drifts = any(isinstance(joint.function, DriftAngle) for joint in joints)
 
     def at(self, x: Array, u: Array) -> Reduced:
         """The joints at coordinates x (n,) and generalized speeds u (n,).
@@ -85,14 +90,14 @@ class Reduction:
         values, jacobian = self._lines @ x, self._lines
         xdot, rate_matrix, bias = u, None, None
         q = self._still
-        if self._several or self._turning:
+        if self._several or self._turning or self._drifts:
             q = q.copy()
             q[self._order] = x
         if self._turning:
             rate_matrix, rest = self._rate_matrix(q, u)
             xdot = rate_matrix @ u
             bias = self._lines @ rest
-        if self._single or self._several:
+        if self._single or self._several or self._drifts:
             jacobian = jacobian.copy()
             bias = np.zeros(len(values)) if bias is None else bias
             for row, function, column in self._single:
@@ -109,6 +114,10 @@ class Reduction:
                 bias[row] = rates @ hessian[np.ix_(moving, moving)] @ rates
                 if rate_matrix is not None:
                     bias[row] += gradient[moving] @ rest[columns]
+            for angle, places, moving, columns, several in self._drifts.values():
+                rates = np.zeros(len(places))
+                rates[moving] = xdot[columns]
+                bias[several] = angle.all_components(q[places], rates)
         if rate_matrix is not None:
             jacobian = jacobian @ rate_matrix
         return Reduced(values, jacobian @ u, jacobian, np.zeros(len(values)) if bias is None else bias, xdot)

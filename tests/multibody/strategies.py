@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
+from osimlite.multibody import body_constraints as b
 from osimlite.multibody import functions as f
+from osimlite.multibody.constraints import Constraint, Coupler, Prescribed
 from osimlite.multibody.joints import (
     MOTIONS,
     Mobilizer,
@@ -17,9 +19,19 @@ from osimlite.multibody.joints import (
     motion_types,
     scapulothoracic,
 )
-from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
+from osimlite.multibody.mechanism import (
+    CoordinateInfo,
+    FramePlacement,
+    MassProperties,
+    Mechanism,
+    MobileBody,
+    StationPlacement,
+)
 from osimlite.multibody.motions import Motion
 from osimlite.multibody.spatial import Array, offset
+
+KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
+"""Of constraints."""
 
 JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "CustomJoint")
 
@@ -91,3 +103,27 @@ def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
     mechanism = Mechanism("random", tuple(bodies), tuple(coordinates), np.array((0.3, -9.5, 0.7)))
     n = len(coordinates)
     return Case(mechanism, rng.uniform(-1.2, 1.2, n), rng.uniform(-2.0, 2.0, n), rng.uniform(-3.0, 3.0, n))
+
+
+def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> Constraint:
+    """A random constraint of a kind."""
+    one, two = rng.choice(range(-1, len(mechanism.bodies)), 2, replace=False).tolist()
+    first, second = (StationPlacement(body, rng.uniform(-0.3, 0.3, 3)) for body in (one, two))
+    match kind:
+        case "point":
+            return b.PointConstraint(first, second)
+        case "distance":
+            return b.DistanceConstraint(first, second, 0.5)
+        case "line":
+            return b.PointOnLineConstraint(first, rng.normal(size=3), second)
+        case "weld":
+            inner, outer = (offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2))
+            return b.WeldConstraint(FramePlacement(one, inner), FramePlacement(two, outer))
+        case "rolling":
+            return b.RollingConstraint(one, two, rng.normal(size=3), 0.3)
+        case "coupler":
+            places = rng.permutation(len(mechanism.coordinates))[:2].tolist()
+            return Coupler(
+                places[0], tuple(places[1:]), f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2)
+            )
+    return Prescribed(int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1))

@@ -8,38 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from osimlite.errors import SimulationError
-from osimlite.multibody import body_constraints as b
-from osimlite.multibody import functions as f
-from osimlite.multibody.constraints import Coupler, Prescribed
 from osimlite.multibody.linear import solutions
-from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
-from osimlite.multibody.spatial import offset
-from tests.multibody.strategies import Case, cases
-
-KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
-
-
-def _constraint(kind: str, mechanism: Mechanism, rng: np.random.Generator):
-    one, two = rng.choice(range(-1, len(mechanism.bodies)), 2, replace=False).tolist()
-    first, second = (StationPlacement(body, rng.uniform(-0.3, 0.3, 3)) for body in (one, two))
-    match kind:
-        case "point":
-            return b.PointConstraint(first, second)
-        case "distance":
-            return b.DistanceConstraint(first, second, 0.5)
-        case "line":
-            return b.PointOnLineConstraint(first, rng.normal(size=3), second)
-        case "weld":
-            inner, outer = (offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2))
-            return b.WeldConstraint(FramePlacement(one, inner), FramePlacement(two, outer))
-        case "rolling":
-            return b.RollingConstraint(one, two, rng.normal(size=3), 0.3)
-        case "coupler":
-            places = rng.permutation(len(mechanism.coordinates))[:2].tolist()
-            return Coupler(
-                places[0], tuple(places[1:]), f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2)
-            )
-    return Prescribed(int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1))
+from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 
 
 @settings(max_examples=50)
@@ -48,7 +18,7 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     """Along any motion: the errors change at G u - b, and what binds speeds changes at G udot - b."""
     assume(len(case.q))
     mechanism, q, u, udot = case
-    constraint = _constraint(kind, mechanism, np.random.default_rng(seed))
+    constraint = constraint_of(kind, mechanism, np.random.default_rng(seed))
     qdot = mechanism.coordinate_rates(q, u)
     qddot = mechanism.rate_matrix(q) @ udot + mechanism.rate_bias(q, u)
 
@@ -75,7 +45,7 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
 @given(cases(), st.sampled_from(["point", "distance", "line", "coupler", "prescribed"]), st.integers(0, 2**32 - 1))
 def test_assembled_states_fulfil_the_constraints_or_are_refused(case: Case, kind, seed):
     assume(len(case.q))
-    constraint = _constraint(kind, case.mechanism, np.random.default_rng(seed))
+    constraint = constraint_of(kind, case.mechanism, np.random.default_rng(seed))
     mechanism = dataclasses.replace(case.mechanism, constraints=(constraint,))
     try:
         q = mechanism.assemble(case.q, 0.7)

@@ -117,6 +117,9 @@ class BulletEngine:
         SimulationError: a body at the end of a chain has no mass; or there is no screen to show the motion on.
     """
 
+    EXACT_INERTIAS = True
+    """Whether Bullet has to have inertias that it refuses to read; then it refuses mass matrices too."""
+
     name = "bullet"
     version = f"pybullet API {bullet.getAPIVersion()}"
 
@@ -136,7 +139,7 @@ class BulletEngine:
         robot = legal_names(merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes)))
         self._check(robot)
         files = {} if visuals is None else visuals.files
-        self._body = _Body(robot, mechanism.gravity.tolist(), show=show, files=files)
+        self._body = _Body(robot, mechanism.gravity.tolist(), show=show, files=files, exact=self.EXACT_INERTIAS)
         try:
             self._prepare(mechanism, forces, robot, route)
         except BaseException:
@@ -174,7 +177,7 @@ class BulletEngine:
             few = self._count <= FEW_JOINTS
             route = MASS_MATRIX if few and body.mass_matrix_works else ARTICULATED_BODY
         if route == MASS_MATRIX:
-            self._require_mass_matrix(ARTICULATED_BODY)
+            self._require_mass_matrix()
         self.route = route
         if route == MASS_MATRIX:
             self._solve = tree_solver([self.field.chain.parent(joint) for joint in range(self._count)])
@@ -185,11 +188,11 @@ class BulletEngine:
         elif route == ARTICULATED_BODY:
             self.derivative = self._derivative_by_step  # type: ignore[method-assign]
 
-    def _require_mass_matrix(self, other: str) -> None:
+    def _require_mass_matrix(self) -> None:
         if not self._body.mass_matrix_works:
             raise UnsupportedError(
                 f"Bullet refuses a mass matrix with the inertia of '{self._body.impossible[0]}', which no real body "
-                f"has (one principal moment exceeds the sum of the others); take the route {other}"
+                f"has (one principal moment exceeds the sum of the others); take the route {ARTICULATED_BODY}"
             )
 
     # ---------------------------------------------------------------------------------------- accelerations
@@ -335,10 +338,17 @@ class _Body:
     """Bullet clips joint speeds at 100 by default."""
 
     def __init__(
-        self, robot: Robot, gravity: Sequence[float], *, show: bool = False, files: Mapping[str, bytes] | None = None
+        self,
+        robot: Robot,
+        gravity: Sequence[float],
+        *,
+        show: bool = False,
+        files: Mapping[str, bytes] | None = None,
+        exact: bool = True,
     ) -> None:
         self.client = _connect(show)
         self._step = 0.0
+        self._exact = exact
         try:
             self._load(robot, gravity, files or {})
         except BaseException:
@@ -357,7 +367,7 @@ class _Body:
         self._indices = [int(info[0]) for info in infos if info[3] >= 0]
         self.zeros = [0.0] * len(self._indices)
         self._release(infos)
-        if self.impossible:
+        if self.impossible and self._exact:
             self._set_inertias(robot, infos)
 
     @staticmethod
@@ -404,8 +414,8 @@ class _Body:
 
     @property
     def mass_matrix_works(self) -> bool:
-        """Whether Bullet's inverse dynamics accepts the inertias."""
-        return not self.impossible
+        """Whether Bullet's inverse dynamics accepts the inertias that it has."""
+        return not (self.impossible and self._exact)
 
     def mass_matrix(self, q: list[float]) -> Sequence[Sequence[float]]:
         """M (n, n) of the joints."""

@@ -1,8 +1,8 @@
 """The PyBullet engine for what joints of one axis cannot say: axes that follow functions, and constraints.
 
 Bullet carries the expanded chain, each axis a joint of its own, and gives its mass matrix and bias; these are projected
-on the coordinates of the model, and the constraints are kept up by :mod:`osimlite.simulation.constrained`. Where Bullet
-refuses an inertia, osimlite's own recursion takes its place, on the route "recursion".
+on the coordinates of the model, and the constraints are kept up by :mod:`osimlite.simulation.constrained`. On the route
+"recursion", osimlite's own kinematics and dynamics take Bullet's place.
 """
 
 from __future__ import annotations
@@ -15,21 +15,26 @@ import numpy as np
 
 from osimlite.errors import UnsupportedError
 from osimlite.multibody.dynamics import MassCentres
-from osimlite.multibody.kinematics import kinematics
+from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.simulation.body_code import BodyStates
 from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RECURSION, BulletEngine
+from osimlite.simulation.engines.bullet_file import excess
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.field import ForceField
 from osimlite.simulation.integrators import Observer, SemiImplicitEuler, Stepper
-from osimlite.simulation.reduction import Reduced, Reduction
+from osimlite.simulation.reduction import Reduction
 from osimlite.translate.robot import Robot
 
 
 class ReducedBulletEngine(BulletEngine):
     """The accelerations of any mechanism; see :class:`BulletEngine` for arguments and errors."""
+
+    # Bullet gets inertias it can read; what that adds to the mass matrix is taken off again.
+    EXACT_INERTIAS = False
 
     @staticmethod
     def _fixed(mechanism: Mechanism) -> list[int]:
@@ -52,46 +57,60 @@ class ReducedBulletEngine(BulletEngine):
         self.contacts, self.columns = self.field.contacts, self.field.columns
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.reduction = Reduction(mechanism, body.joints, self.order)
-        self.constrained = Constrained(mechanism, self.order)
+        self.constrained = Constrained(mechanism, self.order, self._state)
+        indices = {item.path: index for index, item in enumerate(mechanism.bodies)}
+        self._added = [
+            (indices[next(iter(link.bodies))], excess(link)) for link in robot.links if link.name in body.impossible
+        ]
+        self._looked_at = bool(self._added or self.constrained.names)
+        looked_at = [*self.constrained.bodies, *(index for index, _ in self._added)]
+        self._states = BodyStates(self.field.chain, looked_at, self.order)
         self._forces = self.field.generalized
         if route == ARTICULATED_BODY:
             raise UnsupportedError(
                 f"the route {ARTICULATED_BODY} is for models without constraints whose coordinates move one axis each; "
                 f"take {MASS_MATRIX} for '{mechanism.name}'"
             )
-        if route == MASS_MATRIX:
-            self._require_mass_matrix(RECURSION)
-        self.route = (MASS_MATRIX if body.mass_matrix_works else RECURSION) if route == "auto" else route
+        self.route = MASS_MATRIX if route == "auto" else route
         self.derivative = self._derivative if self._count else self._nothing_moves  # type: ignore[method-assign]
 
     # ---------------------------------------------------------------------------------------- accelerations
-    def equations(self, t: float, y: list[float]) -> tuple[Array, Array, Reduced]:
-        """M (n, n) and f (n,) of the motion M udot = f without constraints, and the joints."""
+    def equations(self, t: float, y: list[float]) -> tuple[Array, Array, Array, Kinematics | None]:
+        """M (n, n) and f (n,) of the motion M udot = f without constraints, xdot (n,), and what bodies do, if known."""
         x, u = np.array(y[: self._count]), np.array(y[self._count :])
         joints = self.reduction.at(x, u)
         jacobian = joints.jacobian
         q, rates = joints.values.tolist(), joints.rates.tolist()
         both = np.array(self._forces(t, q, rates, y[: self._count], y[self._count :], self.loads))
         applied = both[: len(q)] @ jacobian + both[len(q) :]
-        if self.route == MASS_MATRIX:
-            body = self._body
-            matrix = jacobian.T @ np.array(body.mass_matrix(q)) @ jacobian
-            bias = np.array(body.joint_forces(q, rates, joints.bias.tolist())) @ jacobian
-            return matrix, applied - bias, joints
-        values, speeds = self._still.copy(), np.zeros(len(self._still))
-        values[self._places], speeds[self._places] = x, u
-        state = kinematics(self.mechanism, values, speeds, t)
-        bodies = MassCentres.of(state)
-        inner = bodies.gravity_forces() - bodies.inertia_forces(state.biases)
-        matrix = bodies.mass_matrix()[np.ix_(self._places, self._places)]
-        return matrix, applied + inner[self._places], joints
+        if self.route == RECURSION:
+            state = kinematics(self.mechanism, *self.constrained.spread(x, u), t)
+            bodies = MassCentres.of(state)
+            matrix = bodies.mass_matrix()[np.ix_(self._places, self._places)]
+            inner = bodies.gravity_forces() - bodies.inertia_forces(state.biases)
+            return matrix, applied + inner[self._places], joints.coordinate_rates, state
+        body = self._body
+        matrix = jacobian.T @ np.array(body.mass_matrix(q)) @ jacobian
+        right = applied - np.array(body.joint_forces(q, rates, joints.bias.tolist())) @ jacobian
+        if not self._looked_at:
+            return matrix, right, joints.coordinate_rates, None
+        state = self._states.at(t, *self.constrained.spread(x, u), joints)
+        for index, added in self._added:
+            # The same inertia about every axis: no speed alone makes it resist.
+            turning = state.jacobians[index][:3, self._places]
+            matrix -= added * turning.T @ turning
+            right += added * state.biases[index][:3] @ turning
+        return matrix, right, joints.coordinate_rates, state
 
     def _derivative(self, t: float, y: list[float]) -> list[float]:
-        matrix, right, joints = self.equations(t, y)
+        matrix, right, rates, state = self.equations(t, y)
         x, u = np.array(y[: self._count]), np.array(y[self._count :])
-        udot = self.constrained.accelerations(t, x, u, matrix, right)
-        found: list[float] = joints.coordinate_rates.tolist() + udot.tolist()
+        found: list[float] = rates.tolist() + self.constrained.accelerations(t, x, u, matrix, right, state).tolist()
         return found
+
+    def _state(self, t: float, x: Array, u: Array) -> Kinematics:
+        """What the bodies do that constraints look at."""
+        return self._states.at(t, *self.constrained.spread(x, u), self.reduction.at(x, u))
 
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: list[float]) -> int:

@@ -1,0 +1,326 @@
+"""Axes that follow functions, and constraints: accelerations by Bullet and by our recursion, energy, starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import osimlite
+from osimlite import Body, Coordinate, Model
+from osimlite.errors import SimulationError, UnsupportedError
+from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.multibody import functions as f
+from osimlite.multibody.joints import Mobilizer, TransformAxis, custom
+from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, MobileBody
+from osimlite.schema import constraint_types as kinds
+from osimlite.schema.custom_joint import CustomJoint
+from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline, Sine
+from osimlite.simulation import Simulation, simulate
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines.bullet import engine_class
+from osimlite.simulation.engines.protocol import Settings
+from tests.multibody.strategies import KINDS, Case, cases, constraint_of
+
+INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
+
+
+def accelerations(mechanism: Mechanism, q: Any, u: Any, route: str, t: float = 0.0) -> Any:
+    with engine_class(mechanism, route)(mechanism, Forces(()), route=route) as engine:
+        return np.array(engine.acceleration(t, q, u))
+
+
+# ------------------------------------------------------------------------------------ random trees and constraints
+@settings(max_examples=60)
+@given(cases(max_bodies=4), st.sampled_from([*KINDS, "none"]), st.integers(0, 2**32 - 1), st.integers(0, 3))
+def test_bullet_and_our_recursion_agree_on_any_mechanism(case: Case, kind: str, seed: int, locks: int):
+    assume(len(case.q))
+    rng = np.random.default_rng(seed)
+    held = () if kind == "none" else (constraint_of(kind, case.mechanism, rng),)
+    infos = [replace(info, default_value=float(x)) for info, x in zip(case.mechanism.coordinates, case.q, strict=True)]
+    for place in rng.integers(0, len(infos), locks):
+        infos[place] = replace(infos[place], locked=True)
+    mechanism = replace(case.mechanism, coordinates=tuple(infos), constraints=held)
+    try:
+        u = mechanism.project_speeds(case.q, case.u, 0.7)
+        expected = mechanism.acceleration(case.q, u, time=0.7)
+    except SimulationError:
+        return
+    # What no speeds fulfil, no accelerations need to.
+    rows = [item.velocity_equations(mechanism.at(case.q, u, 0.7)) for item in mechanism.constraints]
+    if any(np.abs(matrix @ u - wanted).max(initial=0.0) > 1e-9 for matrix, wanted in rows):
+        return
+    # An almost impossible demand makes any result uncertain.
+    scale = max(1.0, float(np.abs(expected).max()), float(np.abs(u).max()) ** 2)
+    assume(scale < 1e5)
+    for route in ("auto", "recursion"):
+        found = accelerations(mechanism, case.q, u, route, 0.7)
+        assert np.abs(found - expected).max() < 1e-9 * scale
+
+
+def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
+    """A shank whose one coordinate drives three rotations and two translations, upside down in the tree."""
+    axes = [
+        TransformAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
+        TransformAxis((0,), (1.0, 0.1, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
+        TransformAxis((0, 1), (0.0, 1.0, 0.0), f.WeightedSum((-0.7, 1.0))),
+        TransformAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.1, -0.2, 0.0))),
+        TransformAxis((1,), (0.0, 1.0, 0.0), f.Sine(0.1, 2.0, 0.0, 0.0)),
+        TransformAxis((), (0.0, 0.0, 1.0), f.Constant(0.05)),
+    ]
+    motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
+    properties = MassProperties(
+        2.0, np.array((0.1, -0.3, 0.05)), np.diag((0.03, 0.02, 0.04)) if inertia is None else inertia
+    )
+    bodies = tuple(
+        MobileBody(name, f"/bodyset/{name}", parent, properties, Mobilizer(f"/j/{name}", "CustomJoint", motions, own,
+                                                                           reversed=parent >= 0))
+        for name, parent, own in (("thigh", -1, (0, 1)), ("shank", 0, (2, 3)))
+    )  # fmt: skip
+    coordinates = tuple(CoordinateInfo(name, f"/j/{name}", "/j", "coupled") for name in "abcd")
+    return Mechanism("knee", bodies, coordinates)
+
+
+@pytest.mark.parametrize("opensim_derivatives", [False, True])
+def test_the_derivatives_of_opensim_are_those_of_our_recursion(opensim_derivatives: bool):
+    mechanism = knee(opensim_derivatives=opensim_derivatives)
+    q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
+    expected = mechanism.acceleration(q, u)
+    assert accelerations(mechanism, q, u, "auto") == pytest.approx(expected, rel=1e-11)
+    other = knee(opensim_derivatives=not opensim_derivatives).acceleration(q, u)
+    assert np.abs(other - expected).max() > 0.01
+
+
+def test_an_inertia_that_bullet_refuses_takes_no_other_route():
+    mechanism = knee(opensim_derivatives=False, inertia=np.diag((0.2, 0.01, 0.04)))
+    q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
+    with engine_class(mechanism, "auto")(mechanism, Forces(())) as engine:
+        assert engine._body.impossible
+        assert engine.route == "mass-matrix"
+        assert engine.acceleration(0.0, q, u) == pytest.approx(mechanism.acceleration(q, u).tolist(), rel=1e-10)
+
+
+def test_routes_that_are_none_are_refused():
+    mechanism = knee(opensim_derivatives=False)
+    with pytest.raises(UnsupportedError, match=r"articulated-body is for models .* take mass-matrix for 'knee'"):
+        accelerations(mechanism, np.zeros(4), np.zeros(4), "articulated-body")
+
+
+# --------------------------------------------------------------------------------------------------- whole models
+def add(model: Model, name: str, joint: Any, carrier: Any, at=(0, 0, 0), **more: Any) -> Body:
+    body = model.add(Body(name=name, mass=1.0, mass_center=(0.05, -0.2, 0.02), inertia=INERTIA))
+    for place, coordinate in enumerate(joint.coordinates):
+        coordinate.name = f"{name}{place}" if len(joint.coordinates) > 1 else name
+    model.add(joint.between(carrier, body, at=at, **more))
+    return body
+
+
+def pins(count: int, length: float = 0.4) -> tuple[Model, list[Body]]:
+    """A chain of pendulums."""
+    model, bodies = Model(name="pins"), []
+    for number in range(count):
+        carrier = bodies[-1] if bodies else model.ground
+        at = (0.0, -length, 0.0) if bodies else (0.0, 0.0, 0.0)
+        bodies.append(add(model, f"p{number}", osimlite.PinJoint(name=f"j{number}"), carrier, at))
+        next(item for item in model.components(Coordinate) if item.name == f"p{number}").default_value = 0.7 - number
+    return model, bodies
+
+
+def constrain(model: Model, constraint: Any) -> Model:
+    model.constraint_set.objects.append(constraint)
+    return model
+
+
+def four_bars() -> Model:
+    """Three pins, and the end of the last bar on a point of ground."""
+    model, bodies = pins(3)
+    return constrain(
+        model,
+        kinds.PointConstraint(
+            name="loop", socket_body_1=model.ground, location_body_1=(0.5, 0.0, 0.0),
+            socket_body_2=bodies[-1], location_body_2=(0.0, -0.4, 0.0),
+        ),
+    )  # fmt: skip
+
+
+def patella() -> Model:
+    """A thigh and shank on splines, and a patella that a coupler moves."""
+    model, _ = pins(1)
+    thigh = next(iter(model.components(Body)))
+    joint = CustomJoint(name="knee", coordinates=[Coordinate(name="flexion", default_value=-0.4)])
+    transform = joint.spatial_transform
+    transform.rotation1.axis, transform.rotation1.coordinates = (0, 0, 1), ("flexion",)
+    transform.rotation1.function = LinearFunction(coefficients=(1.0, 0.0))
+    for axis, y in ((transform.translation1, (0.03, -0.01, 0.02)), (transform.translation2, (-0.4, -0.41, -0.39))):
+        axis.coordinates, axis.function = ("flexion",), SimmSpline(x=(-2.0, -0.7, 0.2), y=y)
+    shank = model.add(Body(name="shank", mass=3.0, mass_center=(0.0, -0.2, 0.0), inertia=INERTIA))
+    model.add(joint.between(thigh, shank))
+    add(model, "cap", osimlite.PinJoint(name="patellofemoral"), thigh, (0.05, -0.4, 0.0))
+    law = PolynomialFunction(coefficients=(0.2, 0.8, 0.1))
+    return constrain(
+        model,
+        kinds.CoordinateCouplerConstraint(
+            name="beta", coupled_coordinates_function=law, independent_coordinate_names=("flexion",),
+            dependent_coordinate_name="cap",
+        ),
+    )  # fmt: skip
+
+
+def rod() -> Model:
+    model, bodies = pins(2)
+    ball = add(model, "ball", osimlite.FreeJoint(name="free"), model.ground)
+    return constrain(
+        model,
+        kinds.ConstantDistanceConstraint(
+            name="rod", socket_body_1=bodies[-1], location_body_1=(0.0, -0.4, 0.1), socket_body_2=ball,
+            location_body_2=(0.1, 0.0, 0.0), constant_distance=0.6,
+        ),
+    )  # fmt: skip
+
+
+def bead() -> Model:
+    model, bodies = pins(1)
+    ball = add(model, "bead", osimlite.FreeJoint(name="free"), model.ground)
+    return constrain(
+        model,
+        kinds.PointOnLineConstraint(
+            name="wire", socket_line_body=bodies[-1], line_direction_vec=(0.3, -1.0, 0.2), point_on_line=(0.1, 0, 0),
+            socket_follower_body=ball, point_on_follower=(0.0, 0.1, 0.0),
+        ),
+    )  # fmt: skip
+
+
+def welded() -> Model:
+    """A loop of four bars whose end is welded to a block that slides: most of the six equations say it twice."""
+    model, bodies = pins(3)
+    slider = add(model, "block", osimlite.PlanarJoint(name="plane"), model.ground)
+    return constrain(model, kinds.WeldConstraint(name="weld", socket_frame1=bodies[-1], socket_frame2=slider))
+
+
+def half_locked() -> Model:
+    model = Model(name="half locked")
+    add(model, "b", osimlite.BallJoint(name="ball"), model.ground)
+    next(iter(model.components(Coordinate))).locked = True
+    next(iter(model.components(Coordinate))).default_value = 0.3
+    return model
+
+
+MODELS = {make.__name__: make for make in (four_bars, patella, rod, bead, welded, half_locked)}
+
+
+@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+def test_energy_is_kept_and_so_are_the_constraints(make: Any):
+    model = make()
+    with Simulation(model) as simulation:
+        names = [info.name for info in simulation.mechanism.coordinates if not info.locked]
+        last = names[-1] if make is half_locked else names[0]
+        trajectory = simulation.run(1.0, accuracy=1e-9, initial_speeds={last: 2.0}, report_interval=0.05)
+        mechanism = simulation.mechanism
+    assert trajectory.summary["constraints"]
+    energy = trajectory.energy["total"]
+    assert np.abs(energy - energy[0]).max() < 3e-8 * trajectory.energy["kinetic"].max()
+    assert np.ptp(trajectory.values, axis=0).max() > 0.3
+    for q, u in zip(trajectory.values, trajectory.speeds, strict=True):
+        state = mechanism.at(q, u)
+        for item in mechanism.constraints:
+            assert np.abs(item.position_errors(state)).max(initial=0.0) < 1e-9
+            rows, wanted = item.velocity_equations(state)
+            assert np.abs(rows @ u - wanted).max() < 1e-9
+    for place, info in enumerate(mechanism.coordinates):
+        assert not info.locked or np.ptp(trajectory.values[:, place]) < 1e-9
+
+
+@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+def test_fixed_steps_converge_at_first_order(make: Any):
+    with Simulation(make()) as simulation:
+        exact = simulation.run(0.3, accuracy=1e-9).values[-1]
+        errors = [np.abs(simulation.run(0.3, fixed_step=h).values[-1] - exact).max() for h in (2e-3, 1e-3, 5e-4)]
+    assert errors[0] < 0.02
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+def test_both_routes_take_the_same_motion(make: Any):
+    ends = [simulate(make(), 0.3, accuracy=1e-8, route=route).values[-1] for route in ("auto", "recursion")]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-8)
+
+
+def test_a_prescribed_coordinate_does_what_it_is_told():
+    model, _ = pins(2)
+    first = next(iter(model.components(Coordinate)))
+    first.prescribed, first.prescribed_function = True, Sine(amplitude=0.5, omega=3.0, offset=0.2)
+    trajectory = simulate(model, 1.0, accuracy=1e-8, report_interval=0.1)
+    assert trajectory.values[:, 0] == pytest.approx(0.2 + 0.5 * np.sin(3.0 * trajectory.times), abs=1e-8)
+    assert trajectory.speeds[:, 0] == pytest.approx(1.5 * np.cos(3.0 * trajectory.times), abs=1e-8)
+    assert np.ptp(trajectory.values[:, 1]) > 0.3
+    with pytest.raises(SimulationError, match="'p0' is prescribed"):
+        simulate(model, 0.1, initial={"p0": 0.1})
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.2])
+def test_a_ball_rolls_down_a_slope_as_it_should(slope: float):
+    """OpenSim's rolling constraint: the surface's X and Z axes carry the ball without slip, Y is up."""
+    radius, mass, moment = 0.3, 2.0, 0.06
+    model = Model(name="ball", gravity=(9.81 * math.sin(slope), -9.81 * math.cos(slope), 0.0))
+    body = model.add(Body(name="ball", mass=mass, inertia=(moment, moment, moment, 0, 0, 0)))
+    joint = osimlite.FreeJoint(name="free")
+    for name, coordinate in zip(("rx", "ry", "rz", "tx", "ty", "tz"), joint.coordinates, strict=True):
+        coordinate.name = name
+    joint.coordinates[4].default_value = radius
+    model.add(joint.between(model.ground, body))
+    roll = kinds.RollingOnSurfaceConstraint(
+        name="roll", socket_rolling_body=body, socket_surface_body=model.ground, surface_normal=(0, 1, 0),
+        surface_height=radius,
+    )  # fmt: skip
+    constrain(model, roll)
+    trajectory = simulate(model, 1.0, rolling=True, accuracy=1e-8, initial_speeds={"tx": 0.5})
+    end = dict(zip(trajectory.coordinates, trajectory.values[-1], strict=True))
+    a = 9.81 * math.sin(slope) / (1.0 + moment / (mass * radius**2))
+    assert end["tx"] == pytest.approx(0.5 + 0.5 * a, abs=1e-7)
+    assert end["rz"] == pytest.approx(-end["tx"] / radius, abs=1e-6)
+    assert end["ty"] == pytest.approx(radius, abs=1e-8)
+    # As in OpenSim, it does nothing unless it is turned on.
+    assert simulate(model, 0.1).summary["constraints"] == []
+
+
+# ------------------------------------------------------------------------------------------------------- starts
+def test_what_is_set_stays_and_the_rest_follows():
+    trajectory = simulate(four_bars(), 0.01, initial={"p1": -0.5}, initial_speeds={"p2": 1.5})
+    assert trajectory.values[0, 1] == -0.5
+    assert trajectory.speeds[0, 2] == 1.5
+    loop = build_mechanism(four_bars()).constraints[0]
+    state = build_mechanism(four_bars()).at(trajectory.values[0], trajectory.speeds[0])
+    assert np.abs(loop.position_errors(state)).max() < 1e-10
+
+
+def test_starts_that_contradict_the_constraints_are_refused():
+    with pytest.raises(SimulationError, match="no pose of 'pins' near the given one fulfils /constraintset/loop"):
+        simulate(four_bars(), 0.01, initial={"p0": 1.5, "p1": 1.5, "p2": 1.5})
+    with pytest.raises(SimulationError, match="do not allow the speeds given for p0 and p1"):
+        simulate(four_bars(), 0.01, initial_speeds={"p0": 1.0, "p1": 5.0})
+
+
+def test_a_massless_body_may_hang_on_a_constraint():
+    model = patella()
+    cap = next(body for body in model.components(Body) if body.name == "cap")
+    cap.mass, cap.inertia = 0.0, (0.0,) * 6
+    heavy = simulate(patella(), 0.3, accuracy=1e-8)
+    light = simulate(model, 0.3, accuracy=1e-8)
+    assert np.abs(light.values[-1] - heavy.values[-1]).max() > 1e-3
+    assert np.abs(light.energy["total"] - light.energy["total"][0]).max() < 1e-6
+    model.constraint_set.objects[0].isEnforced = False
+    with pytest.raises(SimulationError, match="'cap' moves no mass"):
+        simulate(model, 0.3)
+
+
+def test_settings_reach_the_summary():
+    summary = simulate(patella(), 0.05, opensim_derivatives=True).summary
+    assert summary["settings"]["opensim_derivatives"] is True
+    assert summary["constraints"] == ["/constraintset/beta"]
+    assert Settings().route == "auto"
