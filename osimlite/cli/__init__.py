@@ -21,6 +21,7 @@ COMMANDS = (
     "diff",
     "info",
     "translate",
+    "view",
     "simulate",
     "sweep",
     "optimize",

@@ -93,16 +93,16 @@ def coordinates_json(robot: Robot, file: str) -> str:
 
 
 def _text(value: Any) -> str:
-    return json.dumps(_finite(value), ensure_ascii=False, allow_nan=False)
+    return json.dumps(finite(value), ensure_ascii=False, allow_nan=False)
 
 
-def _finite(value: Any) -> Any:
-    """The same with null for numbers that JSON has no word for."""
+def finite(value: Any) -> Any:
+    """Plain data with null for numbers that JSON has no word for."""
     match value:
         case float():
             return value if math.isfinite(value) else None
         case dict():
-            return {key: _finite(item) for key, item in value.items()}
+            return {key: finite(item) for key, item in value.items()}
         case list() | tuple():
-            return [_finite(item) for item in value]
+            return [finite(item) for item in value]
     return value

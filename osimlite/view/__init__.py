@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate
     from osimlite.view.plots import plot_simulation as plot_simulation
+    from osimlite.view.shown import Shown as Shown
 
-_PUBLIC = {"animate": "animation", "plot_simulation": "plots"}
+_PUBLIC = {"animate": "animation", "plot_simulation": "plots", "Shown": "shown"}
 
 
 def __getattr__(name: str) -> Any:

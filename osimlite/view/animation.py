@@ -78,7 +78,7 @@ def animate(
         raise OsimliteError(f"the speed of a film is a positive number, not {speed}")
     if len(trajectory.times) == 0:
         raise OsimliteError("the motion has no moments; nothing can be drawn")
-    image = require("PIL.Image", extra="plot", purpose="an animation")
+    image = require("PIL.Image", extra="view", purpose="an animation")
     film = _Film(model, trajectory, fps, speed, plane, folders)
     painter = _Painter(film, size)
     frames = []
@@ -185,8 +185,8 @@ class _Painter:
 
     def __init__(self, film: _Film, size: tuple[int, int]) -> None:
         self.film, self.size = film, size
-        self.pen = require("PIL.ImageDraw", extra="plot", purpose="an animation")
-        fonts = require("PIL.ImageFont", extra="plot", purpose="an animation")
+        self.pen = require("PIL.ImageDraw", extra="view", purpose="an animation")
+        fonts = require("PIL.ImageFont", extra="view", purpose="an animation")
         self.font, self.small = (fonts.load_default(size[1] / part) for part in (26.0, 32.0))
         # Half the width and half the height of the picture, in metres, with a margin around what moves.
         wide, high = (1.12 * film.reach).tolist()

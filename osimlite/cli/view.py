@@ -1,0 +1,107 @@
+"""``osimlite view``: a model in the browser, as a page, or as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from osimlite.view.shown import Shown
+
+SIZE = (1200, 900)
+"""Width and height of a screenshot, pixels."""
+
+
+def view(
+    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    motion: Annotated[
+        Path | None, typer.Argument(help="Coordinates over time, .sto or .mot.", show_default=False)
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="COORDINATE=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
+    ] = None,
+    forces: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Contact forces over time, labelled as by OpenSim's ForceReporter.",
+            show_default="computed, if the motion has speeds",
+        ),
+    ] = None,
+    geometry: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--geometry",
+            metavar="FOLDER",
+            help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
+            "Folders in the environment variable OSIMLITE_GEOMETRY, separated by colons, come last.",
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            "--html", metavar="FILE", help="Write one page that needs no server and no network.", show_default=False
+        ),
+    ] = None,
+    screenshot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a picture (.png); needs no display.", show_default=False),
+    ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option("--at", metavar="SECONDS", help="The moment of the screenshot.", show_default="the first"),
+    ] = None,
+    port: Annotated[int, typer.Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+) -> None:
+    """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
+
+    Opens a page in the browser and serves it until you press Ctrl-C; with --html or --screenshot it writes files
+    instead.
+
+    Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
+    """
+    from rich.console import Console
+
+    from osimlite.cli.simulate import quantities
+    from osimlite.document.reader import read
+    from osimlite.errors import MissingFileError
+    from osimlite.lint.settings import settings_for
+    from osimlite.multibody import build_mechanism
+    from osimlite.translate.mesh_files import geometry_folders
+    from osimlite.view.shown import Shown
+
+    for place in geometry or ():
+        if not place.is_dir():
+            raise MissingFileError("--geometry names a folder that is not there", file=str(place))
+    model = read(file)
+    mechanism = build_mechanism(model)
+    given: Mapping[str, float] = quantities(values or [], mechanism, "--set")
+    settings = [Path(path) for path in settings_for(file.resolve().parent).mesh_paths]
+    folders = geometry_folders(file.parent, [*(geometry or ()), *settings])
+    shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
+    console = Console(highlight=False, soft_wrap=True)
+    for remark in shown.remarks:
+        console.print(remark, markup=False)
+    if page is not None:
+        console.print(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
+    if screenshot is not None:
+        console.print(f"wrote {shown.write_picture(screenshot, SIZE, at)}")
+    if page is None and screenshot is None:
+        _serve(console, shown, port, browser=browser)
+
+
+def _serve(console: Console, shown: Shown, port: int, *, browser: bool) -> None:
+    import webbrowser
+
+    with shown.server(port) as server:
+        console.print(f"serving {server.url} until you press Ctrl-C")
+        if browser:
+            webbrowser.open(server.url)
+        server.wait()

@@ -1,0 +1,159 @@
+"""The component tree of a model for people to look through: properties as text, findings, and where they belong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from osimlite.document.lexical import formatter
+from osimlite.errors import OsimliteError
+from osimlite.lint.diagnostic import Finding
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.schema.base import Component, Object, Unknown, field_specs
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.fields import Held, Reference
+from osimlite.schema.joints import Joint
+from osimlite.schema.model import Model
+from osimlite.schema.paths import AbstractGeometryPath, PathPoint
+from osimlite.schema.tree import Tree
+from osimlite.view.scene import Scene
+
+LONGEST = 400
+"""Characters of a property that are shown; curves have thousands."""
+
+
+def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
+    """The components a file has, each after the one that holds it, and the names of the properties by class.
+
+    A component has `path`, `name`, `kind`, `parent` (a place in the list, -1 for none), `values` of its properties as
+    text, and `given`: which of them are in the file or were assigned, and are no mere defaults. Where a component has
+    other properties than the first of its class, it has `tags` of its own.
+    """
+    tree = model.tree()
+    places: dict[int, int] = {}
+    tags: dict[str, list[str]] = {}
+    nodes: list[dict[str, Any]] = []
+    for component in tree.components:
+        if tree.is_internal(component):
+            continue
+        path = tree.path_of(component) or "/"
+        above = tree.parent_of(component)
+        kind = component.class_name if isinstance(component, Unknown) else type(component).tag
+        rows = list(_properties(tree, component, ""))
+        names = [name for name, _, _ in rows]
+        node: dict[str, Any] = {
+            "path": path,
+            "name": path.rsplit("/", 1)[1] or model.name or "model",
+            "kind": kind,
+            "parent": -1 if above is None else places.get(id(above), -1),
+            "values": [text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows],
+            "given": [place for place, (_, _, given) in enumerate(rows) if given],
+        }
+        if tags.setdefault(kind, names) != names:
+            node["tags"] = names
+        places[id(component)] = len(nodes)
+        nodes.append(node)
+    return nodes, tags
+
+
+def _properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, str, bool]]:
+    """Name, text and whether it was given, of every property; those of objects without a path follow their holder."""
+    if isinstance(item, Unknown):
+        yield f"{way}content", item.content, True
+        return
+    for spec in field_specs(type(item)).values():
+        value = getattr(item, spec.name)
+        given = spec.name in item.model_fields_set
+        if isinstance(spec.kind, Held):
+            for held in value if isinstance(value, list) else [value]:
+                if isinstance(held, Object) and not isinstance(held, Component):
+                    name = f"{spec.tag}.{held.name}." if isinstance(value, list) and held.name else f"{spec.tag}."
+                    yield from _properties(tree, held, way + name)
+        elif isinstance(spec.kind, Reference):
+            yield way + spec.tag, _named(tree, item, spec.kind, value), given
+        else:
+            yield way + spec.tag, formatter(spec.kind, "shortest")(value).strip(), given
+
+
+def _named(tree: Tree, item: Object, reference: Reference, value: Any) -> str:
+    if isinstance(value, Component):
+        try:
+            return tree.text_for(tree.owner_of(item), reference, value)
+        except OsimliteError:
+            return value.name
+    if isinstance(value, tuple):
+        return " ".join(_named(tree, item, reference, word) for word in value)
+    return "" if value is None else str(value)
+
+
+def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    """Findings as the page shows them."""
+    return [
+        {
+            "code": item.code,
+            "severity": item.severity.value,
+            "message": item.message,
+            "component": item.component,
+            "place": f"line {item.line}" if item.line is not None else "",
+        }
+        for item in findings
+    ]
+
+
+def pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    """Where in space findings are pinned: for every component that is anywhere, its codes and the worst severity."""
+    tree, mechanism = model.tree(), scene.mechanism
+    found: dict[str, list[Finding]] = {}
+    for item in findings:
+        if item.component in tree.by_path and item.severity.rank < 2:
+            found.setdefault(item.component, []).append(item)
+    result = []
+    for path, items in found.items():
+        place = _place(tree, mechanism, scene, tree.by_path[path])
+        if place is not None:
+            worst = min(items, key=lambda item: item.severity.rank)
+            result.append(
+                {
+                    "path": path,
+                    "codes": ", ".join(dict.fromkeys(item.code for item in items)),
+                    "severity": worst.severity.value,
+                    "body": place[0],
+                    "at": place[1].tolist(),
+                }
+            )
+    return result
+
+
+def _place(tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None) -> tuple[int, Any] | None:
+    """Body and point (3,) in its frame of a component, or of the nearest above it that is anywhere."""
+    while component is not None:
+        path = tree.path_of(component) or ""
+        item = next((item for item in scene.items if item.path == path), None)
+        if item is not None:
+            return item.body, item.matrix[:3, 3]
+        line = next((line for line in scene.lines if line.path == path), None)
+        if line is not None:
+            return line.points[0].body, line.points[0].location
+        if path in mechanism.stations:
+            return mechanism.stations[path]
+        if path in mechanism.frames:
+            body, matrix = mechanism.frames[path]
+            return body, matrix[:3, 3]
+        if isinstance(component, Coordinate | Joint):
+            joint = component if isinstance(component, Joint) else tree.parent_of(component)
+            for index, mobile in enumerate(mechanism.bodies):
+                if joint is not None and mobile.mobilizer.joint == tree.path_of(joint):
+                    own = mobile.mobilizer
+                    return index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3]
+        if isinstance(component, PathPoint):
+            try:
+                frame = tree.target(component, "socket_parent_frame", component.socket_parent_frame)
+                body, matrix = mechanism.placement(tree.path_of(frame) or "")
+            except OsimliteError:
+                return None
+            return body, matrix[:3, :3] @ np.array(component.location) + matrix[:3, 3]
+        above = tree.parent_of(component)
+        component = above if isinstance(component, AbstractGeometryPath) or not isinstance(above, Model) else None
+    return None

@@ -1,0 +1,291 @@
+"""A scene as one page for a browser: the data it shows, and the text of the page with everything it needs inside."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from osimlite.lint.diagnostic import Finding
+from osimlite.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.multibody.functions import IDENTITY, Function
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.motions import AxisMotion
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.translate.laws import as_data
+from osimlite.translate.sidecar import finite
+from osimlite.translate.surface import Surface
+from osimlite.view.inspect import component_tree, finding_rows, pins
+from osimlite.view.motion import Motion, in_mechanism_order
+from osimlite.view.pushes import Pushes
+from osimlite.view.scene import LAYERS, Scene
+
+SCRIPTS = ("laws.js", "mechanism.js", "stage.js", "panels.js", "viewer.js")
+"""The parts of the page's own program, in their order."""
+
+TRAVELS = 0.5
+"""The camera follows a motion at first if its middle goes further than this part of the model's size."""
+
+
+def page_text(data: Mapping[str, Any]) -> str:
+    """The page (HTML) that shows data from :func:`page_data`."""
+    web = files("osimlite.view").joinpath("web")
+
+    def read(name: str) -> str:
+        return web.joinpath(name).read_text(encoding="utf-8")
+
+    # No "</script" may end the data early; in JSON the sign can be written by its number.
+    words = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {
+        "@TITLE@": html.escape(str(data["name"]) or "osimlite"),
+        "@STYLE@": read("page.css"),
+        "@LIBRARY@": read("three.js"),
+        "@SCRIPT@": "".join(map(read, SCRIPTS)),
+        "@DATA@": words,
+    }
+    text = read("page.html")
+    for name, part in parts.items():
+        before, _, after = text.partition(name)
+        text = before + part + after
+    return text
+
+
+def page_data(
+    model: Model,
+    scene: Scene,
+    motion: Motion | None,
+    findings: Sequence[Finding],
+    q: Array,
+    *,
+    server: bool = False,
+) -> dict[str, Any]:
+    """Everything the page shows, as data for JSON.
+
+    Args:
+        model: what to show.
+        scene: of that model.
+        motion: how it moves, or None.
+        findings: of the validator.
+        q: coordinate values (n,) at first.
+        server: whether a program answers the page, which then asks it for poses that fulfil the constraints.
+    """
+    mechanism = scene.mechanism
+    recorded = None if motion is None else _motion(scene, motion)
+    start = q if motion is None else in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))[0]
+    low, high = scene.box(start)
+    tree, tags = component_tree(model)
+    hints = model.model_visual_preferences.model_display_hints
+    couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
+    others = [item.name for item in mechanism.constraints if not isinstance(item, Coupler | Lock | Prescribed)]
+    data: dict[str, Any] = finite(
+        {
+            "name": model.name,
+            "facts": f"{len(mechanism.bodies)} bodies, {len(mechanism.coordinates)} coordinates, "
+            f"{len(tree)} components",
+            "server": server,
+            "layers": LAYERS,
+            "shown": sorted(scene.shown),
+            "labelled": hints.show_labels,
+            "up": scene.up.tolist(),
+            "gravity": mechanism.gravity.tolist(),
+            "floor": scene.floor(start),
+            "center": (0.5 * (low + high)).tolist(),
+            "size": float(np.linalg.norm(high - low)),
+            "directions": _directions(scene.up),
+            "coordinates": _coordinates(mechanism, {item.dependent for item in couplers}, q, recorded),
+            "q": q.tolist(),
+            "bodies": _bodies(mechanism),
+            "couplers": [
+                {"dependent": item.dependent, "independent": list(item.independent), "law": as_data(item.function)}
+                for item in couplers
+            ],
+            "constraints": others,
+            **_drawn(scene),
+            "motion": recorded,
+            "tree": tree,
+            "tags": tags,
+            "findings": finding_rows(findings),
+            "pins": pins(model, scene, findings),
+            "remarks": [list(remark) for remark in scene.remarks],
+        }
+    )
+    return data
+
+
+def _drawn(scene: Scene) -> dict[str, Any]:
+    return {
+        "surfaces": [_surface(surface) for surface in scene.surfaces],
+        "items": [
+            {
+                "path": item.path,
+                "layer": item.layer,
+                "body": item.body,
+                "surface": item.surface,
+                "matrix": _rows(item.matrix),
+                "color": list(item.color),
+                "opacity": item.opacity,
+                "visible": item.visible,
+            }
+            for item in scene.items
+        ],
+        "lines": [
+            {
+                "path": line.path,
+                "layer": line.layer,
+                "color": list(line.color),
+                "radius": line.radius,
+                "visible": line.visible,
+                "points": [
+                    {
+                        "body": point.body,
+                        "at": point.location.tolist(),
+                        **({"condition": list(point.condition)} if point.condition else {}),
+                        **(
+                            {
+                                "turn": point.turn.tolist(),
+                                "laws": [_law(law) for law in point.laws],
+                                "coordinates": list(point.coordinates),
+                            }
+                            if point.laws
+                            else {}
+                        ),
+                    }
+                    for point in line.points
+                ],
+            }
+            for line in scene.lines
+        ],
+        "axes": [
+            {"path": axes.path, "body": axes.body, "matrix": _rows(axes.matrix), "length": axes.length}
+            for axes in scene.axes
+        ],
+    }
+
+
+def _surface(surface: Surface) -> dict[str, str]:
+    from osimlite.view.surfaces import normals_of
+
+    normals = np.rint(127.0 * np.clip(normals_of(surface), -1.0, 1.0)).astype(np.int8)
+    return {
+        "points": _base64(surface.points.astype("<f4")),
+        "normals": _base64(normals),
+        "triangles": _base64(surface.triangles.astype("<u4")),
+    }
+
+
+def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
+    """Every body: who carries it, and the fixed transforms and motions on the way to it."""
+    found = []
+    for body in mechanism.bodies:
+        chain: list[Any] = []
+        for part in body.mobilizer.elementary():
+            if isinstance(part, AxisMotion):
+                places = [body.mobilizer.coordinates[place] for place in part.coordinates]
+                chain.append(
+                    {
+                        "turns": part.kind == "rotate",
+                        "axis": part.axis.tolist(),
+                        "coordinates": places,
+                        "law": _law(part.function),
+                    }
+                )
+            elif not np.array_equal(part.matrix, np.eye(4)):
+                chain.append(_rows(part.matrix))
+        center = body.mass_properties.center.tolist()
+        found.append({"path": body.path, "name": body.name, "parent": body.parent, "center": center, "chain": chain})
+    return found
+
+
+def _coordinates(
+    mechanism: Mechanism, dependent: set[int], q: Array, recorded: Mapping[str, Any] | None
+) -> list[dict[str, Any]]:
+    rows = []
+    for place, info in enumerate(mechanism.coordinates):
+        low, high = info.range
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            low, high = -10.0, 10.0
+        ends = [float(q[place])] if recorded is None else recorded["ends"][place]
+        still = (
+            "locked"
+            if info.locked
+            else "follows other coordinates by a coupler"
+            if place in dependent
+            else "prescribed over time"
+            if info.prescribed is not None
+            else ""
+        )
+        rows.append(
+            {
+                "name": info.name,
+                "path": info.path,
+                "unit": {"rotational": "rad", "translational": "m"}.get(info.motion_type, ""),
+                "range": [min(low, *ends), max(high, *ends)],
+                "still": still,
+            }
+        )
+    return rows
+
+
+def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
+    mechanism = scene.mechanism
+    times = np.asarray(motion.times, dtype=float)
+    values = in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
+    pushes = Pushes.of(scene, motion, times).pushes
+    first, last = (scene.at(row).origins[:-1].mean(axis=0) for row in (values[0], values[-1]))
+    low, high = scene.box(values[0])
+    forces = []
+    for push in pushes:
+        torques = np.zeros_like(push.forces) if push.torques is None else push.torques
+        forces.append(
+            {
+                "path": push.on.path,
+                "body": push.on.body,
+                "near": push.on.near.tolist(),
+                "values": _base64(np.hstack((push.forces, torques)).astype("<f4")),
+            }
+        )
+    return {
+        "times": _base64(times.astype("<f8")),
+        "values": _base64(values.astype("<f8")),
+        "ends": np.column_stack((values.min(axis=0), values.max(axis=0))).tolist(),
+        "travels": bool(np.linalg.norm(last - first) > TRAVELS * np.linalg.norm(high - low)),
+        "forces": forces,
+    }
+
+
+def _directions(up: Array) -> dict[str, list[float]]:
+    """From where to look: towards the viewer, in ground. OpenSim's models face +X, and have Z on their right."""
+    if abs(up[1]) > 0.9:
+        front, side = np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
+    else:
+        front = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+        front /= np.linalg.norm(front)
+        side = np.cross(front, up)
+    home = front + 0.35 * up + 1.3 * side
+    # Straight from above, up is no direction in the picture.
+    return {
+        name: vector.tolist()
+        for name, vector in (("home", home), ("front", front), ("side", side), ("top", up + 1e-3 * front))
+    }
+
+
+def _law(function: Function) -> dict[str, Any] | None:
+    """A function as the page knows it; None for the identity."""
+    return None if function == IDENTITY else as_data(function)
+
+
+def _rows(matrix: Array) -> list[float]:
+    """The upper three rows of a matrix (4, 4), one after the other."""
+    rows: list[float] = matrix[:3].ravel().tolist()
+    return rows
+
+
+def _base64(array: Any) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

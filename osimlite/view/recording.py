@@ -1,0 +1,143 @@
+"""Motions from files, with the contact forces that go with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.errors import DocumentError, OsimliteError
+from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.simulation.recorded import RecordedMotion
+from osimlite.simulation.storage import StoTable, read_sto
+from osimlite.view.motion import at_times
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A motion from a file; the attributes are those of a :class:`osimlite.view.motion.Motion`.
+
+    `remarks` are sentences on what the files do not say.
+    """
+
+    times: Array
+    coordinates: Sequence[str]
+    values: Array
+    speeds: Array
+    forces: Mapping[str, Array] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def read_recording(
+    model: Model,
+    mechanism: Mechanism,
+    path: str | Path,
+    forces: str | Path | None = None,
+    values: Mapping[str, float] | None = None,
+) -> Recording:
+    """The motion in a .sto or .mot file.
+
+    Coordinates that are not in it keep their default values, or follow others by their couplers. Contact forces are
+    those in the file `forces` (with the labels of OpenSim's ForceReporter); without it they are computed, if the motion
+    has speeds and osimlite knows the model's contacts.
+
+    Args:
+        model: what moves.
+        mechanism: of the same model.
+        path: of the motion.
+        forces: a file with forces, or None.
+        values: of coordinates by name that are to be the same all the time.
+
+    Raises:
+        OsimliteError: a file is missing or no motion; see :meth:`osimlite.simulation.recorded.RecordedMotion.read`.
+    """
+    recorded = RecordedMotion.read(mechanism, path)
+    if not len(recorded.times):
+        raise DocumentError("the motion has no rows", file=str(path))
+    rows = recorded.values
+    if not np.isfinite(rows).all():
+        raise DocumentError("a coordinate value is no number", file=str(path))
+    for name, value in (values or {}).items():
+        rows[:, mechanism.coordinate_index(name)] = value
+    _follow(mechanism, rows, set(recorded.missing))
+    speeds = _speeds(mechanism, read_sto(path))
+    remarks = []
+    columns: Mapping[str, Array] = {}
+    if forces is not None:
+        columns = _columns(read_sto(forces), recorded.times)
+    elif speeds is not None:
+        try:
+            columns = computed_forces(model, mechanism, recorded.times, rows, speeds)
+        except OsimliteError as error:
+            remarks.append(f"no forces are shown: {error.message}")
+    still = np.zeros_like(rows) if speeds is None else speeds
+    return Recording(recorded.times, mechanism.coordinate_names, rows, still, columns, tuple(remarks))
+
+
+def _follow(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
+    """Give coordinates that are not on record the values that their couplers want; those may depend on each other."""
+    couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
+    couplers = [item for item in couplers if mechanism.coordinates[item.dependent].name in missing]
+    for coupler in couplers * len(couplers):
+        own = list(coupler.independent)
+        rows[:, coupler.dependent] = [coupler.function.evaluate(row[own])[0] for row in rows]
+
+
+def computed_forces(model: Model, mechanism: Mechanism, times: Array, values: Array, speeds: Array) -> dict[str, Array]:
+    """What the forces of a model do at n states, as columns (n,) by the labels of OpenSim's ForceReporter.
+
+    Forces that osimlite does not know are left out. No engine is needed.
+
+    Args:
+        model: whose forces.
+        mechanism: of the same model.
+        times: (n,), s.
+        values: of the coordinates (n, k).
+        speeds: generalized speeds (n, k).
+
+    Raises:
+        SimulationError: at a state the rates of coordinates are not defined.
+    """
+    from osimlite.simulation.elements import force_elements
+    from osimlite.simulation.field import ForceField
+    from osimlite.translate.passes.merge_fixed import merge_fixed
+    from osimlite.translate.robot import build_robot
+
+    elements = force_elements(model, mechanism, skip_unsupported=True).elements
+    if not elements:
+        return {}
+    robot = merge_fixed(build_robot(mechanism, body_frames=False))
+    order = [place for place, info in enumerate(mechanism.coordinates) if not info.locked]
+    forces = ForceField(robot, robot.moving, elements, order)
+    rows = []
+    for t, q, u in zip(times.tolist(), values, speeds, strict=True):
+        joints = [joint.value(q) for joint in robot.moving]
+        rates = robot.joint_jacobian(q) @ mechanism.coordinate_rates(q, u)
+        rows.append(forces.records(t, joints, rates.tolist(), q[order].tolist(), u[order].tolist()))
+    table = np.array(rows, dtype=float).reshape(len(times), len(forces.columns))
+    return {label: table[:, place] for place, label in enumerate(forces.columns)}
+
+
+def _speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
+    """Generalized speeds (n, k) on record; None if those of a coordinate that is not locked are not."""
+    speeds = np.zeros((len(table.times), len(mechanism.coordinates)))
+    for place, info in enumerate(mechanism.coordinates):
+        label = f"{info.path}/speed"
+        if label in table.columns:
+            turned = table.in_degrees and info.motion_type == "rotational"
+            speeds[:, place] = np.radians(table[label]) if turned else table[label]
+        elif not info.locked:
+            return None
+    return speeds
+
+
+def _columns(table: StoTable, times: Array) -> dict[str, Array]:
+    if not len(table.times):
+        return {}
+    rows = at_times(Recording(table.times, (), table.rows, table.rows), table.rows, times)
+    return {label: rows[:, place] for place, label in enumerate(table.columns)}

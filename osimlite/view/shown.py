@@ -1,0 +1,150 @@
+"""A model made ready to be looked at: one scene for the page, the pictures and the server."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.files import write_atomically
+from osimlite.lint import Config, Finding, validate
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.text import listed
+from osimlite.view.collect import build_scene
+from osimlite.view.motion import Motion, at_times, in_mechanism_order
+from osimlite.view.page import page_data, page_text
+from osimlite.view.picture import Arrow, Camera, Style, draw
+from osimlite.view.pushes import Pushes
+from osimlite.view.recording import Recording, read_recording
+from osimlite.view.scene import Scene
+from osimlite.view.server import PageServer
+
+HOME = (1.0, 0.35, 1.3)
+"""From where a picture is taken: so much to the front, up, and to the model's right."""
+
+_LONGEST_ARROW = 0.4
+"""Length of the largest force's arrow as a part of the model's size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What is shown of a model.
+
+    Attributes:
+        model: which.
+        scene: what there is to see.
+        q: coordinate values (n,) at first.
+        motion: how it moves, or None.
+        findings: of the validator.
+        remarks: sentences on what is not shown.
+    """
+
+    model: Model
+    scene: Scene
+    q: Array
+    motion: Motion | None = None
+    findings: Sequence[Finding] = ()
+    remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        model: Model,
+        mechanism: Mechanism,
+        folders: Sequence[Path] = (),
+        *,
+        file: Path | None = None,
+        motion: Motion | Path | None = None,
+        forces: Path | None = None,
+        values: Mapping[str, float] | None = None,
+    ) -> Shown:
+        """Make a model ready.
+
+        Args:
+            model: which.
+            mechanism: of the same model.
+            folders: where its mesh files are looked for.
+            file: that the model was read from, so that findings know their lines; None: the model itself is checked.
+            motion: how it moves, or the file (.sto, .mot) that says so.
+            forces: a file with contact forces, for a motion from a file.
+            values: of coordinates by name; over a motion from a file they stay so.
+
+        Raises:
+            OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
+        """
+        scene = build_scene(model, mechanism, folders)
+        config = Config(mesh_paths=tuple(str(folder) for folder in folders))
+        findings = validate(model if file is None else file, config=config).findings
+        remarks = []
+        if scene.remarks:
+            remarks.append(f"not drawn: {listed([path for path, _ in scene.remarks], most=4)} ({scene.remarks[0][1]})")
+        if isinstance(motion, Path):
+            motion = read_recording(model, mechanism, motion, forces, values)
+        if isinstance(motion, Recording):
+            remarks += motion.remarks
+        q = mechanism.assemble(values or {})
+        return cls(model, scene, q, motion, findings, tuple(remarks))
+
+    def write_page(self, path: str | Path) -> Path:
+        """Write one self-contained page (HTML)."""
+        write_atomically(path, page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q)))
+        return Path(path)
+
+    def server(self, port: int = 0) -> PageServer:
+        """Serve the page at a port of this machine; 0 takes any that is free."""
+        data = page_data(self.model, self.scene, self.motion, self.findings, self.q, server=True)
+        return PageServer(page_text(data), self.scene.mechanism, port)
+
+    def write_picture(self, path: str | Path, size: tuple[int, int] = (1200, 900), time: float | None = None) -> Path:
+        """Write a picture (PNG, or any form that pillow knows by its ending).
+
+        Args:
+            path: the file to write.
+            size: width and height in pixels.
+            time: the moment of the motion, s; the first one if left out.
+
+        Raises:
+            OsimliteError: the time is not in the motion, or the form is not known.
+            MissingDependency: pillow is not installed.
+        """
+        scene, up = self.scene, self.scene.up
+        q, arrows, loaded = self._moment(time)
+        bodies = scene.at(q)
+        points = np.concatenate([*(p for _, p in scene.extent(bodies, q) if len(p)), *(a.point[None] for a in arrows)])
+        side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
+        direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
+        camera = Camera.around(points, up, direction, size[0] / size[1])
+        picture = draw(scene, q, camera, size, arrows, Style(scene.floor(q), loaded))
+        out = io.BytesIO()
+        try:
+            picture.save(out, Path(path).suffix[1:].upper() or "PNG")
+        except (KeyError, ValueError, OSError):
+            raise OsimliteError("pictures are written as .png", file=str(path)) from None
+        write_atomically(path, out.getvalue())
+        return Path(path)
+
+    def _moment(self, time: float | None) -> tuple[Array, list[Arrow], frozenset[str]]:
+        """Coordinate values (n,), arrows, and surfaces under load, at a time of the motion."""
+        motion = self.motion
+        if motion is None:
+            if time is not None:
+                raise OsimliteError("a moment belongs to a motion; name one after the model")
+            return self.q, [], frozenset()
+        first, last = float(motion.times[0]), float(motion.times[-1])
+        if time is not None and not first <= time <= last:
+            raise OsimliteError(f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}")
+        moment = np.array([first if time is None else time])
+        values = in_mechanism_order(motion, self.scene.mechanism, np.asarray(motion.values, dtype=float))
+        q = at_times(motion, values, moment)[0]
+        largest = Pushes.of(self.scene, motion, np.asarray(motion.times, dtype=float)).largest
+        low, high = self.scene.box(q)
+        scale = _LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
+        pushes = Pushes.of(self.scene, motion, moment).at(0, self.scene.at(q))
+        loaded = frozenset(push.surface for push, _, force in pushes if force.any())
+        return q, [Arrow(point, scale * force) for _, point, force in pushes], loaded

@@ -1,0 +1,369 @@
+"use strict";
+// The three-dimensional picture: surfaces on bodies, lines, frames, arrows, ground, light, camera.
+(() => {
+  const { point } = window.osimlite;
+  const T = window.THREE;
+  const FORCE = 0xd55e00, SELECTED = 0x1f6feb, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
+
+  const floats = (text) => new Float32Array(bytes(text).buffer);
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const toned = ([r, g, b]) => new T.Color().setRGB(r, g, b, T.SRGBColorSpace);
+  const matrix4 = (m, target = new T.Matrix4()) =>
+    target.set(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11], 0, 0, 0, 1);
+  const vector = (v) => new T.Vector3(v[0], v[1], v[2]);
+
+  class Stage {
+    constructor(canvas, data, mechanism) {
+      this.data = data;
+      this.mechanism = mechanism;
+      this.canvas = canvas;
+      this.renderer = new T.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+      this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+      this.scene = new T.Scene();
+      this.scene.background = new T.Color(0xf6f8fb);
+      this.up = vector(data.up);
+      this.camera = new T.PerspectiveCamera(32, 1, 0.001, 1000);
+      this.camera.up.copy(this.up);
+      this.controls = new T.OrbitControls(this.camera, canvas);
+      this.controls.addEventListener("change", () => this.wanted());
+      this.layers = {};
+      for (const name of [...data.layers, "forces", "ground"]) {
+        this.layers[name] = new T.Group();
+        this.layers[name].name = name;
+        this.layers[name].visible = name === "forces" || name === "ground" || data.shown.includes(name);
+      }
+      this.marks = {};
+      for (const finding of data.findings) {
+        const worst = this.marks[finding.component];
+        const order = ["error", "warning", "info"];
+        if (!worst || order.indexOf(finding.severity) < order.indexOf(worst)) {
+          this.marks[finding.component] = finding.severity;
+        }
+      }
+      this.light();
+      this.build();
+      this.ground();
+      this.scene.add(this.layers.ground, this.layers.forces, this.layers.paths, this.layers.springs);
+    }
+
+    light() {
+      const key = new T.DirectionalLight(0xffffff, 1.75), fill = new T.DirectionalLight(0xdfe8ff, 0.45);
+      key.position.set(-2, 3, 3);
+      fill.position.set(3, 0.5, 2);
+      this.lamps = new T.Group();
+      this.lamps.add(key, fill);
+      const sky = new T.HemisphereLight(0xffffff, 0x9a948c, 1.0);
+      sky.position.copy(this.up);
+      this.scene.add(this.lamps, sky);
+    }
+
+    build() {
+      const data = this.data;
+      const geometries = data.surfaces.map((surface) => {
+        const geometry = new T.BufferGeometry();
+        geometry.setAttribute("position", new T.BufferAttribute(floats(surface.points), 3));
+        geometry.setAttribute("normal", new T.BufferAttribute(new Int8Array(bytes(surface.normals).buffer), 3, true));
+        geometry.setIndex(new T.BufferAttribute(new Uint32Array(bytes(surface.triangles).buffer), 1));
+        return geometry;
+      });
+      // One group per body and layer, so that a pose is one matrix per group.
+      this.bodies = [...data.bodies.map((body) => body.path), "/ground"].map((path) => {
+        const group = new T.Group();
+        group.name = path;
+        group.matrixAutoUpdate = false;
+        this.scene.add(group);
+        return group;
+      });
+      this.shapes = [];
+      this.layered = {};
+      for (const item of data.items) {
+        const material = new T.MeshStandardMaterial({
+          color: toned(item.color), roughness: 0.72, metalness: 0, side: T.DoubleSide,
+          transparent: item.opacity < 1, opacity: item.opacity, depthWrite: item.opacity >= 1,
+        });
+        const mesh = new T.Mesh(geometries[item.surface], material);
+        mesh.name = item.path;
+        mesh.userData = item;
+        mesh.matrixAutoUpdate = false;
+        matrix4(item.matrix, mesh.matrix);
+        this.bodyGroup(item.body).add(mesh);
+        this.shapes.push(mesh);
+        (this.layered[item.layer] ||= []).push(mesh);
+        mesh.visible = item.visible && this.layers[item.layer].visible;
+      }
+      this.frames();
+      this.tubes("paths");
+      this.tubes("springs");
+      this.tubes("geometry");
+      this.pushes();
+      this.paint();
+    }
+
+    bodyGroup(body) { return this.bodies[body < 0 ? this.bodies.length - 1 : body]; }
+
+    frames() {
+      const colors = [0xcc3333, 0x2e8b57, 0x3366cc];
+      this.layered.frames = [];
+      for (const frame of this.data.axes) {
+        colors.forEach((color, axis) => {
+          const m = frame.matrix;
+          const from = [m[3], m[7], m[11]], step = [m[axis], m[4 + axis], m[8 + axis]];
+          const geometry = new T.BufferGeometry().setFromPoints(
+            [vector(from), vector(from.map((x, k) => x + frame.length * step[k]))]);
+          const line = new T.Line(geometry, new T.LineBasicMaterial({ color }));
+          line.name = frame.path;
+          line.userData = { path: frame.path, layer: "frames", visible: true };
+          line.visible = this.layers.frames.visible;
+          this.bodyGroup(frame.body).add(line);
+          this.layered.frames.push(line);
+        });
+      }
+    }
+
+    // All lines of a layer as cylinders and balls of two instanced meshes.
+    tubes(layer) {
+      const rows = [];
+      this.data.lines.forEach((line, k) => {
+        if (line.layer === layer) for (let s = 0; s < line.points.length; s++) rows.push({ line, k, s });
+      });
+      if (!rows.length) return;
+      const rod = new T.CylinderGeometry(1, 1, 1, 10, 1, true), ball = new T.SphereGeometry(1, 10, 8);
+      const material = new T.MeshStandardMaterial({ roughness: 0.6 });
+      const group = new T.Group();
+      group.userData = { rows };
+      for (const geometry of [rod, ball]) {
+        const mesh = new T.InstancedMesh(geometry, material, rows.length);
+        mesh.frustumCulled = false;
+        mesh.userData = { rows, layer };
+        rows.forEach((row, i) => mesh.setColorAt(i, toned(row.line.color)));
+        group.add(mesh);
+      }
+      this.layers[layer].add(group);
+      if (layer === "geometry") this.scene.add(this.layers.geometry);
+      (this.rods ||= []).push(group);
+    }
+
+    pushes() {
+      const motion = this.data.motion;
+      this.arrows = (motion ? motion.forces : []).map((force) => {
+        const group = new T.Group();
+        group.name = force.path;
+        group.userData = force;
+        const material = new T.MeshStandardMaterial({ color: FORCE, roughness: 0.5 });
+        const shaft = new T.Mesh(new T.CylinderGeometry(1, 1, 1, 14).translate(0, 0.5, 0), material);
+        const head = new T.Mesh(new T.ConeGeometry(1, 1, 18).translate(0, 0.5, 0), material);
+        group.add(shaft, head);
+        this.layers.forces.add(group);
+        return group;
+      });
+    }
+
+    ground() {
+      const { size, floor, gravity } = this.data;
+      const step = size > 4 ? 10 ** Math.ceil(Math.log10(size / 8)) : size > 1 ? 0.5 : size > 0.3 ? 0.1 : 0.02;
+      const count = 2 * Math.ceil(3 * Math.max(size, step) / step);
+      const grid = new T.GridHelper(count * step, count, 0xaab4c0, 0xd5dbe3);
+      grid.quaternion.setFromUnitVectors(new T.Vector3(0, 1, 0), this.up);
+      grid.position.copy(this.up).multiplyScalar(floor);
+      grid.name = "floor";
+      this.layers.ground.add(grid);
+      const axes = [0xcc3333, 0x2e8b57, 0x3366cc].map((color, axis) => {
+        const end = new T.Vector3().setComponent(axis, 0.15 * size);
+        return new T.Line(
+          new T.BufferGeometry().setFromPoints([new T.Vector3(), end]), new T.LineBasicMaterial({ color }));
+      });
+      this.layers.ground.add(...axes);
+      const strength = Math.hypot(...gravity);
+      if (strength > 0) {
+        const arrow = new T.Group(), material = new T.MeshStandardMaterial({ color: 0x9aa5b1 });
+        const length = 0.16 * size;
+        const shaft = new T.Mesh(new T.CylinderGeometry(0.0035 * size, 0.0035 * size, length, 12), material);
+        const head = new T.Mesh(new T.ConeGeometry(0.012 * size, 0.04 * size, 16), material);
+        head.position.y = 0.5 * length;
+        arrow.add(shaft, head);
+        arrow.quaternion.setFromUnitVectors(new T.Vector3(0, 1, 0), vector(gravity).normalize());
+        arrow.name = "gravity";
+        this.gravity = arrow;
+        this.layers.ground.add(arrow);
+      }
+    }
+
+    // Show a pose: coordinate values, and the moment of the motion whose forces are shown, or -1.
+    pose(q, row = -1) {
+      this.q = q;
+      const poses = this.poses = this.mechanism.poses(q);
+      this.bodies.forEach((group, k) => {
+        matrix4(poses[k], group.matrix);
+        group.matrixWorldNeedsUpdate = true;
+      });
+      const start = new T.Vector3(), end = new T.Vector3(), up = new T.Vector3(0, 1, 0);
+      const turn = new T.Quaternion(), middle = new T.Vector3(), size = new T.Vector3(), m = new T.Matrix4();
+      const cache = {};
+      for (const group of this.rods || []) {
+        const [rods, balls] = group.children;
+        group.userData.rows.forEach(({ line, k, s }, i) => {
+          const corners = cache[k] ||= this.mechanism.corners(k, q, poses);
+          const r = line.visible ? line.radius : 0;
+          if (s < corners.length) start.set(...corners[s]);
+          m.makeScale(...(s < corners.length ? [r, r, r] : [0, 0, 0])).setPosition(start);
+          balls.setMatrixAt(i, m);
+          if (s + 1 < corners.length && r > 0) {
+            end.set(...corners[s + 1]);
+            const way = end.clone().sub(start), length = way.length();
+            turn.setFromUnitVectors(up, length > 0 ? way.divideScalar(length) : up);
+            m.compose(middle.addVectors(start, end).multiplyScalar(0.5), turn, size.set(r, length, r));
+          } else m.makeScale(0, 0, 0);
+          rods.setMatrixAt(i, m);
+        });
+        for (const mesh of [rods, balls]) {
+          mesh.instanceMatrix.needsUpdate = true;
+          mesh.boundingSphere = null;
+        }
+      }
+      this.push(row);
+      this.wanted();
+    }
+
+    push(row) {
+      const motion = this.data.motion, up = new T.Vector3(0, 1, 0);
+      for (const arrow of this.arrows) {
+        const record = arrow.userData, six = row < 0 ? null : record.values.subarray(6 * row, 6 * row + 6);
+        const force = six ? vector(six) : new T.Vector3(), size = force.length();
+        arrow.visible = size > 0.005 * motion.largest;
+        if (!arrow.visible) continue;
+        const pose = this.poses[record.body < 0 ? this.poses.length - 1 : record.body];
+        // A force F with the moment M about the body's origin acts along the line through F x M / F².
+        const on = force.clone().cross(vector(six.subarray(3))).divideScalar(size * size);
+        on.add(new T.Vector3(pose[3], pose[7], pose[11]));
+        const near = vector(point(pose, record.near));
+        arrow.position.copy(on).addScaledVector(force, near.sub(on).dot(force) / (size * size));
+        arrow.quaternion.setFromUnitVectors(up, force.divideScalar(size));
+        const length = 0.5 * this.data.size * size / motion.largest, thick = 0.009 * this.data.size;
+        const head = Math.min(length, 5 * thick);
+        arrow.children[0].scale.set(thick, Math.max(length - head, 1e-6), thick);
+        arrow.children[1].position.y = length - head;
+        arrow.children[1].scale.set(2.4 * thick, head, 2.4 * thick);
+      }
+    }
+
+    // Colours: what is selected, and what the validator found something at.
+    paint() {
+      const within = (path, above) => path === above || (above !== "/" && path.startsWith(above + "/"));
+      const marked = (path) => {
+        let worst = null;
+        for (const [component, severity] of Object.entries(this.marks)) {
+          if (component && within(path, component) && (worst === null || severity === "error")) worst = severity;
+        }
+        return this.hideMarks || worst === "info" ? null : worst;
+      };
+      const glow = (path) => {
+        if (this.selected && within(path, this.selected)) return [SELECTED, 0.55];
+        const mark = marked(path);
+        return mark ? [MARKS[mark], 0.4] : [0, 0];
+      };
+      for (const mesh of this.shapes) {
+        const [color, strength] = glow(mesh.userData.path);
+        mesh.material.emissive.setHex(color);
+        mesh.material.emissiveIntensity = strength;
+      }
+      for (const group of this.rods || []) {
+        for (const mesh of group.children) {
+          group.userData.rows.forEach(({ line }, i) => {
+            const [color, strength] = glow(line.path);
+            mesh.setColorAt(i, strength ? new T.Color(color) : toned(line.color));
+          });
+          mesh.instanceColor.needsUpdate = true;
+        }
+      }
+      this.wanted();
+    }
+
+    select(path) { this.selected = path; this.paint(); }
+
+    showMarks(on) { this.hideMarks = !on; this.paint(); }
+
+    show(layer, on) {
+      this.layers[layer].visible = on;
+      for (const object of this.layered[layer] || []) object.visible = on && object.userData.visible;
+      this.wanted();
+    }
+
+    // Look at the model from a direction, all of it in sight.
+    look(direction) {
+      const { center, size } = this.data;
+      const middle = vector(center), back = vector(direction).normalize();
+      const tall = Math.min(1, this.camera.aspect) * Math.tan(0.5 * this.camera.fov * Math.PI / 180);
+      this.controls.target.copy(middle);
+      this.camera.position.copy(middle).addScaledVector(back, 0.56 * size / tall);
+      this.camera.near = 0.005 * size;
+      this.camera.far = 200 * size;
+      this.camera.updateProjectionMatrix();
+      if (this.gravity) {
+        const side = new T.Vector3().crossVectors(this.up, back);
+        if (side.lengthSq() < 1e-9) side.set(1, 0, 0);
+        this.gravity.position.copy(middle).addScaledVector(side.normalize(), -0.45 * size).addScaledVector(this.up, 0.3 * size);
+      }
+      this.controls.update();
+      this.wanted();
+    }
+
+    // Move the camera along with a point.
+    follow(target) {
+      const step = target.clone().sub(this.followed || target);
+      this.followed = target.clone();
+      this.camera.position.add(step);
+      this.controls.target.add(step);
+    }
+
+    middle() {
+      const sum = new T.Vector3();
+      const own = this.poses.slice(0, -1);
+      own.forEach((pose) => sum.add(new T.Vector3(pose[3], pose[7], pose[11])));
+      return sum.divideScalar(Math.max(own.length, 1));
+    }
+
+    // The component under a point of the page, or null.
+    pick(x, y) {
+      const box = this.canvas.getBoundingClientRect(), ray = new T.Raycaster();
+      ray.params.Line.threshold = 0.004 * this.data.size;
+      const at = new T.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height);
+      ray.setFromCamera(at, this.camera);
+      const lines = (this.rods || []).filter((group) => group.parent.visible).flatMap((group) => group.children);
+      const hits = ray.intersectObjects([...this.shapes.filter((mesh) => mesh.visible), ...lines], false);
+      // What shines through gives way to what is behind it.
+      const hit = hits.find((h) => !(h.object.material.opacity < 0.45)) || hits[0];
+      if (!hit) return null;
+      return hit.instanceId === undefined ? hit.object.userData.path : hit.object.userData.rows[hit.instanceId].line.path;
+    }
+
+    // Where a point of a body is on the page, or null behind the camera.
+    onPage(body, at) {
+      const p = vector(point(this.poses[body < 0 ? this.poses.length - 1 : body], at)).project(this.camera);
+      const box = this.canvas.getBoundingClientRect();
+      return p.z > 1 ? null : [0.5 * (p.x + 1) * box.width, 0.5 * (1 - p.y) * box.height];
+    }
+
+    resize() {
+      const { clientWidth, clientHeight } = this.canvas.parentElement;
+      this.renderer.setSize(clientWidth, clientHeight, false);
+      this.camera.aspect = clientWidth / Math.max(clientHeight, 1);
+      this.camera.updateProjectionMatrix();
+      this.wanted();
+    }
+
+    // Draw soon, once.
+    wanted() {
+      if (this.waiting) return;
+      this.waiting = true;
+      requestAnimationFrame(() => {
+        this.waiting = false;
+        this.lamps.quaternion.copy(this.camera.quaternion);
+        this.renderer.render(this.scene, this.camera);
+        this.frames_drawn = (this.frames_drawn || 0) + 1;
+        if (this.onDraw) this.onDraw();
+      });
+    }
+  }
+
+  Object.assign(window.osimlite, { Stage, bytes });
+})();

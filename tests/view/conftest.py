@@ -1,0 +1,78 @@
+"""A browser without a window, for the tests of the page."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    # Three dimensions drawn in software: there may be no graphics card.
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """Chromium, driven by Playwright; OSIMLITE_CHROMIUM names its program if it is not on the PATH."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra 'dev')")
+    program = os.environ.get("OSIMLITE_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip("needs Chromium on the PATH, or its program in OSIMLITE_CHROMIUM")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=program, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+class Page:
+    """A page of the viewer in the browser; `errors` holds what it complained of."""
+
+    def __init__(self, browser: Any, url: str, *, offline: bool) -> None:
+        self.context = browser.new_context(viewport={"width": 1000, "height": 700}, offline=offline)
+        self.page = self.context.new_page()
+        self.errors: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(url)
+        self.until("v && v.stage.frames_drawn > 0")
+
+    def run(self, code: str, argument: Any = None) -> Any:
+        """The value of an expression, in which `v` is the viewer and `x` the argument."""
+        return self.page.evaluate(f"(x) => {{ const v = window.osimlite?.viewer; return ({code}); }}", argument)
+
+    def until(self, code: str, argument: Any = None, seconds: float = 30.0) -> None:
+        """Wait until an expression holds; Playwright's own way of waiting needs eval, which the page forbids."""
+        end = time.monotonic() + seconds
+        while not self.run(code, argument):
+            assert time.monotonic() < end, f"waited in vain for {code}"
+            time.sleep(0.02)
+
+
+@pytest.fixture
+def open_page(chromium: Any) -> Iterator[Any]:
+    """Open a file or an address; a file is opened without a network."""
+    pages: list[Page] = []
+
+    def opened(where: Path | str) -> Page:
+        url = where if isinstance(where, str) else where.resolve().as_uri()
+        pages.append(Page(chromium, url, offline=not isinstance(where, str)))
+        return pages[-1]
+
+    yield opened
+    for page in pages:
+        page.context.close()
+        assert not page.errors
