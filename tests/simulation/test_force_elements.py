@@ -155,14 +155,6 @@ def test_what_has_no_meaning_is_said(make, message):
         force_elements(model, build_mechanism(model))
 
 
-def test_the_compiled_engine_refuses_by_name():
-    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
-    model = arm()
-    model.add(SpringGeneralizedForce(name="spring", coordinate="q0", stiffness=1.0))
-    with pytest.raises(UnsupportedError, match="'/forceset/spring'"):
-        osimlite.simulate(model, 0.01, engine="compiled")
-
-
 @pytest.mark.parametrize(
     "force",
     [
@@ -251,9 +243,3 @@ def test_an_ellipsoid_touches_planes_only():
     model = egg_over_floor(ContactSphere(name="stone", socket_frame="/ground", radius=0.1))
     with pytest.raises(UnsupportedError, match=r"'/forceset/contact' \(HuntCrossleyForce with an ellipsoid against"):
         osimlite.simulate(model, 0.1)
-
-
-def test_the_compiled_engine_refuses_an_ellipsoid():
-    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
-    with pytest.raises(UnsupportedError, match="'/forceset/contact'"):
-        osimlite.simulate(egg_over_floor(), 0.1, engine="compiled")

@@ -18,6 +18,11 @@ Kept = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[Any]]
 """From a record after an evaluation, and values and speeds of all coordinates: what the report wants."""
 
 
+def of_record(values: Callable[[Sequence[float]], tuple[float, ...]]) -> Kept:
+    """What the report wants, from the record alone."""
+    return lambda record, coordinates, speeds: [values(record)]
+
+
 class Placement(NamedTuple):
     """The link that a body belongs to (-1 for ground), and the body's frame (4, 4) in it."""
 
@@ -34,7 +39,7 @@ class Item:
         law: its name, None if there is nothing to compute.
         ints: of its own.
         numbers: of its own.
-        room: length of its record; the record of an item without room is that of the first contact of its element.
+        room: length of its record, if it is not that of a contact.
         is_contact: whether its record is that of a contact.
         is_part: whether another item of the element calls its law.
     """
@@ -65,6 +70,10 @@ class Places:
     def freedom(self, coordinate: int) -> int:
         """Degree of freedom of a coordinate, -1 if it is locked."""
         return self.freedoms.get(coordinate, -1)
+
+    def locked_value(self, coordinate: int) -> float:
+        """Value that a coordinate has if it is locked."""
+        return float(self.mechanism.coordinates[coordinate].default_value)
 
     def placement(self, body: int) -> Placement:
         """Link and frame of a body, or of ground."""

@@ -51,8 +51,9 @@ ABOVE, ROW, DEPTH = 0, 1, 2
 """Of a degree of freedom: the next one on the way to ground or -1, place in w of its row of the mass matrix, and how
 many there are on the way."""
 
-LAW, NUMBERS, RECORD, OWN = 0, 1, 2, 3
-"""Of an item: its law, places in x and w of what it owns there, and from OWN on integers of its own."""
+LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
+"""Of an item: its law, places in x and w of what it owns there, number of the first contact of its element, and from
+OWN on integers of its own."""
 
 # Numbers.
 GRAVITY_AT, INERTIA_AT = 0, 3
@@ -80,7 +81,7 @@ FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
 
 # Kinds.
 TURN, SLIDE, BALL, BALL_BACK = 0, 1, 2, 3
-"""Motions: about z, along z (those before BALL have one axis), a SphericalMotion, one that is passed from its end to its
+"""Motions: about z, along z (those before BALL have one axis), a SphericalMotion, one that is passed from end to
 start."""
 NOTHING, SHIFT, MOVE = 0, 1, 2
 """Fixed transforms: none, a translation, any."""

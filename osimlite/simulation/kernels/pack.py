@@ -278,20 +278,19 @@ class _Packer:
         found: list[list[tuple[Item, int]]] = []
         for group in self.items:
             found.append([])
-            first = contact
+            first = len(pairs)
             for item in group:
-                place = self.room(item.room) if item.room else first
-                if item.is_contact:
-                    place = contact
-                    contact += at.CONTACT_WORK
+                place = contact + at.CONTACT_WORK * len(pairs) if item.is_contact else self.room(item.room)
                 found[-1].append((item, place))
-                if item.law is not None:
-                    (pairs if item.is_part else records).append(len(self.ints))
-                    if item.is_contact and not item.is_part:
-                        pairs.append(len(self.ints))
-                    law = self.law(item.law) if item.law not in at.WITHIN else at.WITHIN[item.law]
-                    self.ints += [law, len(self.numbers), place, *item.ints]
-                    self.numbers += item.numbers
+                if item.law is None:
+                    continue
+                if item.is_contact:
+                    pairs.append(len(self.ints))
+                if not item.is_part:
+                    records.append(len(self.ints))
+                law = at.WITHIN[item.law] if item.law in at.WITHIN else self.law(item.law)
+                self.ints += [law, len(self.numbers), place, first, *item.ints]
+                self.numbers += item.numbers
         self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)
         self.ints += records
         self.ints[at.CONTACT_AT] = len(self.ints)

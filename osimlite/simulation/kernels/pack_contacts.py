@@ -5,27 +5,41 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from osimlite.errors import UnsupportedError
 from osimlite.forces.coordinate_limit import limit_energy, limit_force
 from osimlite.forces.hunt_crossley import contact_energy
-from osimlite.simulation.contact_elements import ContactPair, HuntCrossley, PairContact
+from osimlite.simulation.contact_elements import ContactPair, PairContact
 from osimlite.simulation.elements import CoordinateLimit
 from osimlite.simulation.kernels.items import Item, Places
 from osimlite.simulation.kernels.layout import CONTACT_WORK, DEPTH_OF, RADIUS_OF
 
 
-def pack_pairs(element: HuntCrossley, places: Places) -> list[Item]:
-    """An item for each pair of half spaces and spheres."""
-    if element.early_return:
-        raise UnsupportedError(
-            f"the compiled engine does not reproduce Simbody's early return in '{element.path}'; take --engine bullet"
-        )
-    found: list[Item] = []
+def pack_pairs(element: PairContact, places: Places) -> list[Item]:
+    """An item for each pair of half spaces, spheres and ellipsoids."""
+    found = []
     for pair in element.pairs:
+        one, two = element.surfaces[pair.first], element.surfaces[pair.second]
         links, numbers = pair_numbers(element, pair, places)
-        law = "touch_half_space" if element.surfaces[pair.first].is_half_space else "touch_spheres"
-        found.append(Item(_kept(element.pairs[len(found)]), law, links, numbers, is_contact=True))
+        law = "touch_half_space" if one.is_half_space else "touch_spheres"
+        if two.radii is not None and two.axes is not None:
+            law = "touch_ellipsoid"
+            axes = (places.direction(two.body, axis) for axis in zip(*two.axes, strict=True))
+            numbers = (*numbers, *(x for axis in axes for x in axis), *two.radii)
+        found.append(Item(_kept(pair), law, links, numbers, is_contact=True, is_part=element.early_return))
+    if element.early_return:
+        found.append(_early_return(element, places))
     return found
+
+
+def _early_return(element: PairContact, places: Places) -> Item:
+    """What computes the pairs one by one in Simbody's order."""
+    stations = [places.station(surface.body, surface.center) for surface in element.surfaces]
+    links = (link for link, _ in stations)
+    pairs = (place for pair in element.pairs for place in (pair.first, pair.second))
+    numbers = (
+        x for (_, center), surface in zip(stations, element.surfaces, strict=True) for x in (*center, surface.radius)
+    )
+    ints = len(stations), len(element.pairs), *links, *pairs
+    return Item(lambda record, values, speeds: [], "early_return", ints, tuple(numbers), room=5 * len(stations))
 
 
 def pair_numbers(element: PairContact, pair: ContactPair, places: Places) -> tuple[tuple[int, int], tuple[float, ...]]:

@@ -19,6 +19,21 @@ LAW_MODULES = {
     "amount_by_one": "functions",
     "amount_by_several": "functions",
     "touch_spheres": "contacts",
+    "touch_ellipsoid": "rare_contacts",
+    "early_return": "rare_contacts",
+    "coordinate_spring": "springs",
+    "point_spring": "springs",
+    "bushing": "springs",
+    "smooth_contact": "springs",
+    "path_spring": "paths",
+    "ligament": "paths",
+    "blankevoort": "paths",
+    "coordinate_formula": "programs",
+    "point_formula": "programs",
+    "path_formula": "programs",
+    "bushing_formula": "programs",
+    "drive": "drives",
+    "prescribed": "drives",
 }
 """The module of each law. The first two are no items: their numbers are those of the laws within the evaluation."""
 
@@ -27,7 +42,24 @@ LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 
 PACKERS = {
     "HuntCrossley": ("pack_contacts", "pack_pairs"),
+    "EllipsoidContact": ("pack_contacts", "pack_pairs"),
     "CoordinateLimit": ("pack_contacts", "pack_limit"),
+    "CoordinateSpring": ("pack_springs", "pack_coordinate_spring"),
+    "CoordinateFormula": ("pack_springs", "pack_coordinate_formula"),
+    "PointSpring": ("pack_springs", "pack_point_spring"),
+    "Bushing": ("pack_springs", "pack_bushing"),
+    "SmoothContact": ("pack_springs", "pack_smooth_contact"),
+    "PathSpringElement": ("pack_springs", "pack_path_spring"),
+    "PathFormula": ("pack_springs", "pack_path_formula"),
+    "LigamentElement": ("pack_springs", "pack_ligament"),
+    "Blankevoort": ("pack_springs", "pack_blankevoort"),
+    "CoordinateDrive": ("pack_drives", "pack_coordinate_drive"),
+    "TorqueDrive": ("pack_drives", "pack_torque_drive"),
+    "PointDrive": ("pack_drives", "pack_point_drive"),
+    "PointToPointDrive": ("pack_drives", "pack_point_to_point_drive"),
+    "IdleActuator": ("pack_drives", "pack_idle"),
+    "Prescribed": ("pack_drives", "pack_prescribed"),
+    "ExternalLoad": ("pack_drives", "pack_external_load"),
 }
 """Module and function that pack each class of elements."""
 

@@ -1,0 +1,111 @@
+"""Contact of ellipsoids, and Simbody's defect in contact of several surfaces."""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.forces.ellipsoid_contact import half_space_ellipsoid
+from osimlite.simulation.kernels.contacts import press, touch_half_space, touch_spheres
+from osimlite.simulation.kernels.layout import (
+    CONTACT_AT,
+    DEPTH_OF,
+    FINE,
+    FIRST_CONTACT,
+    HALF_SPACE,
+    LAW,
+    NUMBERS,
+    OWN,
+    RECORD,
+)
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.points import direction, station
+
+
+def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
+    i = at(s, item)
+    one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
+    ox, oy, oz = station(s, w, one, p[0], p[1], p[2])
+    nx, ny, nz = direction(s, w, one, p[3], p[4], p[5])
+    cx, cy, cz = station(s, w, two, p[7], p[8], p[9])
+    xx, yx, zx = direction(s, w, two, p[18], p[19], p[20])
+    xy, yy, zy = direction(s, w, two, p[21], p[22], p[23])
+    xz, yz, zz = direction(s, w, two, p[24], p[25], p[26])
+    d, radius, px, py, pz = half_space_ellipsoid(
+        ox, oy, oz, nx, ny, nz, cx, cy, cz, xx, xy, xz, yx, yy, yz, zx, zy, zz, p[27], p[28], p[29], p[12]
+    )
+    if d > 0.0:
+        press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
+    return FINE
+
+
+def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """All pairs of one force in Simbody's order, until one separates too fast to push.
+
+    The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces of each pair; the
+    numbers the centre and radius of each surface. The order is that of `hunt_crossley.simbody_pair_order`.
+    """
+    i = at(s, item)
+    count, pairs, links, p, room = i[OWN], i[OWN + 1], at(i, OWN + 2), at(x, i[NUMBERS]), at(w, i[RECORD])
+    centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
+    for k in range(count):
+        c = at(centers, 3 * k)
+        c[0], c[1], c[2] = station(s, w, links[k], p[4 * k], p[4 * k + 1], p[4 * k + 2])
+    axis = 0
+    widest = -1.0
+    for side in range(3):
+        mean = spread = 0.0
+        for k in range(count):
+            mean += centers[3 * k + side]
+        mean /= count
+        for k in range(count):
+            spread += abs(centers[3 * k + side] - mean)
+        # Of the first two it is the second where they are equal.
+        if spread > widest or (side == 1 and spread == widest):
+            axis, widest = side, spread
+    for k in range(count):
+        start[k] = centers[3 * k + axis] - p[4 * k + 3]
+        place = k
+        while place > 0 and start[int(order[place - 1])] > start[k]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
+    for position in range(count):
+        one = int(order[position])
+        for later in range(position + 1, count):
+            two = int(order[later])
+            if start[two] > centers[3 * one + axis] + p[4 * one + 3]:
+                break
+            if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
+                pair = pair_of(at(links, count), pairs, one, two)
+                if pair >= 0 and separates(s, x, w, y, f, s[s[CONTACT_AT] + i[FIRST_CONTACT] + pair]):
+                    return FINE
+    return FINE
+
+
+def near(a: Floats, b: Floats, one: float, two: float) -> bool:
+    """Whether the bounding spheres of two surfaces are not apart; two half spaces never are a pair."""
+    if one == inf and two == inf:
+        return False
+    reach = one + two
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return bool(dx * dx + dy * dy + dz * dz <= reach * reach)
+
+
+def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
+    """Number of the pair of two surfaces, -1 if they are none."""
+    for pair in range(pairs):
+        a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
+        if (a == one and b == two) or (a == two and b == one):
+            return pair
+    return -1
+
+
+def separates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, part: int) -> bool:
+    """Compute one contact; whether it touches and does not push."""
+    if s[part + LAW] == HALF_SPACE:
+        touch_half_space(s, x, w, y, f, part)
+    else:
+        touch_spheres(s, x, w, y, f, part)
+    found = at(w, s[part + RECORD])
+    return bool(found[DEPTH_OF] > 0.0 and found[0] == 0.0 and found[1] == 0.0 and found[2] == 0.0)

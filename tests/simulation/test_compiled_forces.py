@@ -1,0 +1,394 @@
+"""Every force of the compiled engine is that of the PyBullet engine: accelerations, records, energies, loads."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
+from osimlite.errors import UnsupportedError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.functions import Constant as NumericConstant
+from osimlite.multibody.functions import Linear as NumericLinear
+from osimlite.multibody.mechanism import FramePlacement
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.multibody.spatial import offset
+from osimlite.schema.actuators import (
+    BodyActuator,
+    CoordinateActuator,
+    PointActuator,
+    PointToPointActuator,
+    TorqueActuator,
+)
+from osimlite.schema.contact import ContactEllipsoid
+from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.functions import (
+    Constant,
+    LinearFunction,
+    MultiplierFunction,
+    PiecewiseLinearFunction,
+    PolynomialFunction,
+    SimmSpline,
+    Sine,
+    StepFunction,
+)
+from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
+from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.schema.prescribed import PrescribedForce
+from osimlite.schema.springs import (
+    BushingForce,
+    ExpressionBasedBushingForce,
+    ExpressionBasedCoordinateForce,
+    ExpressionBasedPointToPointForce,
+    FunctionBasedBushingForce,
+    PointToPointSpring,
+    SpringGeneralizedForce,
+)
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.more_elements import MAKERS
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.external_loads import ExternalLoad
+
+
+def chain() -> Model:
+    """Three bodies in space: a free one, a ball joint, a pin; and one on a locked slide."""
+    model = Model(name="chain")
+    joints = (osimlite.FreeJoint, osimlite.BallJoint, osimlite.PinJoint, osimlite.SliderJoint)
+    carrier = model.ground
+    for number, kind in enumerate(joints):
+        inertia = (0.2, 0.3, 0.25, 0.01, -0.02, 0.03)
+        body = model.add(Body(name=f"b{number}", mass=1.0 + number, mass_center=(0, -0.1, 0.05), inertia=inertia))
+        joint = kind(name=f"j{number}")
+        for place, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{place}"
+        model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
+        carrier = body
+    still = next(item for item in model.components(Coordinate) if item.name == "q3_0")
+    still.locked, still.default_value = True, 0.2
+    return model
+
+
+def straight(*more) -> GeometryPath:
+    found = GeometryPath(name="path")
+    found.path_point_set.objects += (
+        PathPoint(name="start", socket_parent_frame="/ground", location=(0.5, 0.1, 0.0)),
+        PathPoint(name="over", socket_parent_frame="/bodyset/b0", location=(0.1, 0.3, 0.2)),
+        PathPoint(name="end", socket_parent_frame="/bodyset/b2", location=(0.0, -0.3, 0.1)),
+    )
+    return found
+
+
+def between(kind, one="/bodyset/b0", two="/bodyset/b3", **more):
+    return kind(name="a", socket_frame1=one, socket_frame2=two, **more)
+
+
+def material(*surfaces):
+    names = tuple(item.name for item in surfaces)
+    return HuntCrossleyForce.ContactParameters(
+        geometry=names,
+        stiffness=1e5,
+        dissipation=1.5,
+        static_friction=0.8,
+        dynamic_friction=0.4,
+        viscous_friction=0.1,
+    )
+
+
+def floor() -> ContactHalfSpace:
+    return ContactHalfSpace(name="floor", socket_frame="/ground", orientation=(0.1, 0.2, -1.4))
+
+
+def stone(number: int, radius: float = 0.4) -> ContactSphere:
+    return ContactSphere(name=f"s{number}", socket_frame=f"/bodyset/b{number}", radius=radius, location=(0.1, -0.2, 0))
+
+
+def contact(*surfaces):
+    force = HuntCrossleyForce(name="a", transition_velocity=0.1)
+    force.contact_parameters.objects.append(material(*surfaces))
+    return *surfaces, force
+
+
+def driven(actuator, *functions):
+    """An actuator with a controller for each function."""
+    found = [actuator]
+    for number, function in enumerate(functions):
+        controller = PrescribedController(name=f"c{number}", socket_actuators=("/forceset/a",))
+        controller.ControlFunctions.objects.append(function)
+        found.append(controller)
+    return found
+
+
+def pushed(**more):
+    force = PrescribedForce(name="a", socket_frame="/bodyset/b2", **more)
+    for what, size in (("forceFunctions", 5.0), ("pointFunctions", 0.1), ("torqueFunctions", 2.0)):
+        functions = getattr(force, what)
+        functions.objects += (
+            Sine(amplitude=size, omega=3.0, phase=0.2, offset=0.1),
+            LinearFunction(coefficients=(size, 0.2)),
+            Constant(value=-size),
+        )
+    return force
+
+
+SHAPES = {
+    "m_x_theta_x_function": SimmSpline(x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)),
+    "m_y_theta_y_function": PiecewiseLinearFunction(x=(-1.0, 0.0, 1.0), y=(-4.0, 0.0, 9.0)),
+    "m_z_theta_z_function": MultiplierFunction(scale=2.0, function=Sine(amplitude=3.0, omega=2.0)),
+    "f_x_delta_x_function": PolynomialFunction(coefficients=(20.0, 0.0, 5.0, 1.0)),
+    "f_y_delta_y_function": LinearFunction(coefficients=(10.0, 1.0)),
+    "f_z_delta_z_function": StepFunction(
+        transition_start_time=-0.2, transition_end_time=0.3, start_value=-3.0, end_value=4.0
+    ),
+}
+DAMPED = {"rotational_damping": (0.1, 0.2, 0.3), "translational_damping": (0.4, 0.5, 0.6)}
+SPRING = {"resting_length": 0.4, "stiffness": 50.0, "dissipation": 0.2}
+FORMULA = "3*q^2 - w*exp(-q/2) + max(qdot, -1)*step(q); w = sin(v)*abs(qdot); v = 1 + q*q"
+ALL = "sqrt(abs(d)) + log(1+d*d) - sin(d)*cos(d)/sec(d) + csc(1+d*d) + tan(d/3) - cot(1+d*d) + asin(d/9) + acos(d/9)"
+MORE = "atan(d) + sinh(d/4) + cosh(d/4) - tanh(d) + erf(d) + erfc(d) + delta(d) + square(d) - cube(d) + recip(2+d*d)"
+
+FORCES = {
+    "limit": lambda: CoordinateLimitForce(
+        name="a", coordinate="q1_1", upper_limit=10.0, lower_limit=-10.0, transition=15.0, damping=0.1
+    ),
+    "limit of a locked coordinate": lambda: CoordinateLimitForce(name="a", coordinate="q3_0", upper_limit=0.1),
+    "spring": lambda: SpringGeneralizedForce(
+        name="a", coordinate="q2_0", stiffness=30.0, rest_length=-0.4, viscosity=0.3
+    ),
+    "spring on a ball": lambda: SpringGeneralizedForce(name="a", coordinate="q1_2", stiffness=30.0),
+    "spring on a locked coordinate": lambda: SpringGeneralizedForce(name="a", coordinate="q3_0", stiffness=30.0),
+    "formula": lambda: ExpressionBasedCoordinateForce(name="a", coordinate="q2_0", expression=FORMULA),
+    "formula of a variable": lambda: ExpressionBasedCoordinateForce(name="a", coordinate="q2_0", expression="qdot"),
+    "line": lambda: PointToPointSpring(
+        name="a",
+        socket_body1="/ground",
+        socket_body2="/bodyset/b2",
+        point1=(1, 0, 0),
+        point2=(0, 0.2, 0.1),
+        stiffness=30.0,
+        rest_length=0.3,
+    ),
+    "line by a formula": lambda: ExpressionBasedPointToPointForce(
+        name="a", body1="b0", body2="b3", point1=(0.1, 0, 0), point2=(0, 0.2, 0.1), expression=f"{ALL} + ddot"
+    ),
+    "line by another formula": lambda: ExpressionBasedPointToPointForce(
+        name="a", body1="ground", body2="b3", point1=(0.1, 0, 0), expression=f"{MORE} - min(d, ddot)^2 + 2^-d"
+    ),
+    "bushing": lambda: between(
+        BushingForce, rotational_stiffness=(1, 2, 9), translational_stiffness=(50, 30, 10), **DAMPED
+    ),
+    "bushing without damping": lambda: between(BushingForce, one="/ground", translational_stiffness=(50, 30, 10)),
+    "bushing by functions": lambda: between(FunctionBasedBushingForce, one="/ground", **SHAPES, **DAMPED),
+    "bushing by formulas": lambda: between(
+        ExpressionBasedBushingForce,
+        Mx_expression="2*theta_x + theta_y",
+        Mz_expression="theta_z^3",
+        Fx_expression="10*delta_x*delta_y",
+        Fz_expression="delta_z",
+        **DAMPED,
+    ),
+    "path": lambda: PathSpring(name="a", **SPRING, geometry_path=straight()),
+    "path by a formula": lambda: ExpressionBasedPathForce(
+        name="a", resting_length=0.4, clamp_stretch=True, expression="30*s^2 + ldot*s", geometry_path=straight()
+    ),
+    "ligament": lambda: Ligament(name="a", resting_length=0.4, pcsa_force=100.0, geometry_path=straight()),
+    "another ligament": lambda: Blankevoort1991Ligament(
+        name="a", slack_length=0.4, linear_stiffness=90.0, damping_coefficient=0.3, geometry_path=straight()
+    ),
+    "smooth contact": lambda: (
+        floor(),
+        stone(2),
+        SmoothSphereHalfSpaceForce(
+            name="a", socket_half_space="/contactgeometryset/floor", socket_sphere="/contactgeometryset/s2"
+        ),
+    ),
+    "contact": lambda: contact(floor(), *(stone(number) for number in range(4))),
+    "ellipsoid": lambda: contact(
+        floor(),
+        ContactEllipsoid(name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.3, 0.4), orientation=(0.2, 0.4, 0.1)),
+        ContactHalfSpace(name="wall", socket_frame="/bodyset/b3", location=(0, -0.4, 0), orientation=(0, 0, 0.7)),
+    ),
+    "coordinate actuator": lambda: driven(
+        CoordinateActuator(name="a", coordinate="q1_0", optimal_force=7.0),
+        Sine(amplitude=1.0, omega=4.0, phase=0.0, offset=0.0),
+        SimmSpline(x=(0.0, 0.4, 0.8, 1.2, 2.0), y=(0.0, 1.0, 0.5, 0.2, 1.0)),
+    ),
+    "actuator without controls": lambda: CoordinateActuator(name="a", coordinate="q1_0"),
+    "torque actuator": lambda: driven(
+        TorqueActuator(name="a", bodyA="b2", bodyB="b0", axis=(1, 2, 3), torque_is_global=False), Constant(value=3.0)
+    ),
+    "torque actuator along ground": lambda: driven(
+        TorqueActuator(name="a", bodyA="b2", bodyB="ground", axis=(1, 2, 3), torque_is_global=True),
+        Constant(value=3.0),
+    ),
+    "point actuator": lambda: driven(
+        PointActuator(name="a", body="b2", point=(0.1, 0.2, 0.3), direction=(1, -1, 0.5), force_is_global=True),
+        Constant(value=3.0),
+    ),
+    "point actuator in ground": lambda: driven(
+        PointActuator(name="a", body="b2", point=(0.1, 0.2, 0.3), direction=(1, -1, 0.5), point_is_global=True),
+        Constant(value=3.0),
+    ),
+    "points actuator": lambda: driven(
+        PointToPointActuator(name="a", bodyA="b3", bodyB="b0", pointA=(0.1, 0.2, 0.3), pointB=(0, 0.1, 0)),
+        Constant(value=3.0),
+    ),
+    "points actuator in ground": lambda: driven(
+        PointToPointActuator(
+            name="a", bodyA="b3", bodyB="b0", pointA=(0.1, 0.2, 0.3), pointB=(0, 0.1, 0), points_are_global=True
+        ),
+        Constant(value=3.0),
+    ),
+    "idle": lambda: BodyActuator(name="a", socket_body="/bodyset/b0"),
+    "prescribed": lambda: pushed(),
+    "prescribed in ground": lambda: pushed(forceIsGlobal=True, pointIsGlobal=True),
+    "prescribed in the body": lambda: pushed(forceIsGlobal=False, pointIsGlobal=False),
+}
+
+
+def with_force(make) -> Model:
+    model, made = chain(), make()
+    model.add(*(made if isinstance(made, tuple | list) else (made,)))
+    return model
+
+
+def engines(model, **settings):
+    mechanism = build_mechanism(model)
+    forces = force_elements(model, mechanism, **settings)
+    return mechanism, CompiledEngine(mechanism, forces), BulletEngine(mechanism, forces)
+
+
+def states(mechanism, count):
+    rng, size = np.random.default_rng(5), len(mechanism.coordinates)
+    for _ in range(count):
+        q, u = rng.uniform(-1.0, 1.0, size), rng.uniform(-2.0, 2.0, size)
+        for place, info in enumerate(mechanism.coordinates):
+            if info.locked:
+                q[place], u[place] = info.default_value, 0.0
+        yield rng.uniform(0.0, 2.0), q.tolist(), u.tolist()
+
+
+def assert_close(ours, theirs, tolerance=1e-9):
+    scale = max(1.0, np.abs(theirs).max(initial=0.0))
+    assert np.abs(np.subtract(ours, theirs)).max(initial=0.0) <= tolerance * scale
+
+
+def assert_same(mechanism, ours, theirs, count=8) -> int:
+    """Compare at some states; returns the bits of the contacts that touched."""
+    touched = 0
+    assert (ours.contacts, ours.columns) == (theirs.contacts, theirs.columns)
+    for t, q, u in states(mechanism, count):
+        assert_close(ours.acceleration(t, q, u), theirs.acceleration(t, q, u))
+        assert ours.loads[-1] == theirs.loads[-1]
+        for number in range(len(ours.contacts)):
+            if ours.loads[-1] >> number & 1:
+                assert_close(ours.loads[number], theirs.loads[number])
+        touched |= ours.loads[-1]
+        y, z = ours.state.pack(q, u), theirs.state.pack(q, u)
+        assert_close(ours.force_records(t, y), theirs.force_records(t, z))
+        assert ours.energies(t, y) == pytest.approx(theirs.energies(t, z), rel=1e-9, abs=1e-9)
+    return touched
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_force(name):
+    mechanism, ours, theirs = engines(with_force(FORCES[name]))
+    with theirs:
+        touched = assert_same(mechanism, ours, theirs)
+        assert touched or not ours.contacts
+
+
+def test_force_does_something():
+    """What is compared is not nothing against nothing."""
+    mechanism, plain, _ = engines(chain())
+    t, q, u = next(states(mechanism, 1))
+    without = plain.acceleration(t, q, u)
+    idle = {"limit of a locked coordinate", "spring on a locked coordinate", "actuator without controls", "idle"}
+    for name in FORCES.keys() - idle:
+        _, ours, _ = engines(with_force(FORCES[name]))
+        changes = [ours.acceleration(*state) != plain.acceleration(*state) for state in states(mechanism, 8)]
+        assert any(changes), name
+    assert all(math.isfinite(value) for value in without)
+
+
+def test_all_at_once():
+    """Together they are the sum of each: no one's numbers are in another's place."""
+    model = chain()
+    for place, (name, make) in enumerate(FORCES.items()):
+        made = make()
+        if "actuator" in name:
+            continue  # their controllers name them
+        for item in made if isinstance(made, tuple | list) else (made,):
+            item.name = f"{item.name}{place}"
+            if isinstance(item, HuntCrossleyForce):
+                (parameters,) = item.contact_parameters.objects
+                parameters.geometry = tuple(f"{word}{place}" for word in parameters.geometry)
+            if isinstance(item, SmoothSphereHalfSpaceForce):
+                item.socket_half_space, item.socket_sphere = (
+                    f"/contactgeometryset/floor{place}",
+                    (f"/contactgeometryset/s2{place}"),
+                )
+            model.add(item)
+    mechanism, ours, theirs = engines(model)
+    with theirs:
+        assert assert_same(mechanism, ours, theirs).bit_count() > 3
+
+
+def test_every_class_of_force_is_here():
+    """But for the one that the compiled engine refuses by name, and what needs a file."""
+    made = set()
+    for make in FORCES.values():
+        found = make()
+        made |= {type(item) for item in (found if isinstance(found, tuple | list) else (found,))}
+    assert {kind.__name__ for kind in MAKERS} - {kind.__name__ for kind in made} <= {
+        "ElasticFoundationForce",
+        "ExternalForce",
+    }
+
+
+def test_measured_load():
+    """A force and a torque along the axes of one body, at a point of another, on a third."""
+    mechanism = build_mechanism(chain())
+    cubic = smoothing_spline((0.0, 0.5, 1.0, 1.5, 2.0), (0.3, -1.0, 2.0, 0.5, 0.1), 2, 0.0)
+    functions = cubic, NumericLinear(2.0, -0.3), NumericConstant(0.4)
+    frames = [FramePlacement(body, offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5))) for body in (2, 0, 3)]
+    for given in ((1, 1, 1), (1, 0, 0), (0, 0, 1), (1, 1, 0)):
+        kinds = [functions if wanted else None for wanted in given]
+        forces = Forces((ExternalLoad("/a", "a", "b2", *frames, *kinds),))
+        with BulletEngine(mechanism, forces) as theirs:
+            assert_same(mechanism, CompiledEngine(mechanism, forces), theirs)
+
+
+def test_an_unknown_force_is_refused_by_name():
+    class Magnet:
+        path = "/forceset/magnet"
+
+    with pytest.raises(UnsupportedError, match=r"compute '/forceset/magnet' \(Magnet\); take --engine bullet"):
+        CompiledEngine(build_mechanism(chain()), Forces((Magnet(),)))
+
+
+def test_early_return():
+    """Simbody's defect, in poses where the first contact separates faster than it pushes."""
+    model = with_force(lambda: contact(floor(), *(stone(number, 0.6) for number in range(4))))
+    plain, defect = engines(model), engines(model, simbody_early_return=True)
+    changed = 0
+    with plain[2], defect[2]:
+        assert assert_same(*defect, count=40)
+        for t, q, u in states(plain[0], 40):
+            changed += plain[1].acceleration(t, q, u) != defect[1].acceleration(t, q, u)
+    assert changed > 3
+
+
+def test_motion_of_a_driven_chain():
+    """The time goes into the steps."""
+    model = with_force(FORCES["coordinate actuator"])
+    ours, theirs = (osimlite.simulate(model, 0.5, engine, accuracy=1e-9) for engine in ("compiled", "bullet"))
+    assert ours.summary["steps"] == theirs.summary["steps"]
+    assert np.abs(ours.values - theirs.values).max() < 1e-9
