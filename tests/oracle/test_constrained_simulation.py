@@ -1,0 +1,94 @@
+"""Motion on axes that follow functions and under constraints against OpenSim 4.6, live."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.document.reader import read_text
+from osimlite.schema.forces import CoordinateLimitForce, Force
+from osimlite.schema.path_forces import PathSpring
+from osimlite.simulation import Simulation
+from osimlite.simulation.more_elements import MAKERS
+from tests.oracle.test_constraints import CASES, _chain
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytestmark = pytest.mark.oracle
+
+
+def both(path: Path, to: float, accuracy: float, seed: int, **settings: Any) -> tuple[Any, Any, tuple[int, int]]:
+    """Ends (2, n) of values and speeds of either program from the same random speeds, and how many steps each took."""
+    rng = np.random.default_rng(seed)
+    with Simulation(osimlite.read(path), **settings) as simulation:
+        mechanism = simulation.mechanism
+        free = [info for info in mechanism.coordinates if not (info.locked or info.prescribed)]
+        u = mechanism.project_speeds(mechanism.assemble({}), rng.uniform(-1.0, 1.0, len(mechanism.coordinates)))
+        speeds = {info.path: float(u[mechanism.coordinate_index(info.path)]) for info in free}
+        trajectory = simulation.run(to, accuracy=accuracy, initial_speeds=speeds)
+    opensim.Logger.setLevelString("off")
+    model = opensim.Model(str(path))
+    state = model.initSystem()
+    coordinates = [model.getCoordinateSet().get(place) for place in range(len(mechanism.coordinates))]
+    for info, coordinate, value in zip(mechanism.coordinates, coordinates, trajectory.values[0], strict=True):
+        if not info.locked:
+            coordinate.setValue(state, float(value), False)
+    for coordinate, speed in zip(coordinates, trajectory.speeds[0], strict=True):
+        coordinate.setSpeedValue(state, float(speed))
+    manager = opensim.Manager(model)
+    manager.setIntegratorAccuracy(accuracy)
+    manager.initialize(state)
+    state = manager.integrate(to)
+    theirs = np.array([[item.getValue(state), item.getSpeedValue(state)] for item in coordinates]).T
+    steps = trajectory.summary["steps"], manager.getStatesTable().getNumRows() - 1
+    return np.array([trajectory.values[-1], trajectory.speeds[-1]]), theirs, steps
+
+
+# Of a point of either body, Simbody takes the velocity of that of the first body which is where the second's is now:
+# the same only as far as the constraint holds.
+POINTS = ("point", "point-on-offset-frame", "weld")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_motion_under_constraints(case: str, tmp_path: Path) -> None:
+    model, bodies = _chain(np.random.default_rng(21))
+    CASES[case](model, bodies)
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "model.osim"))
+    if case in POINTS:
+        ours, theirs, _ = both(tmp_path / "model.osim", 0.5, 1e-8, 5)
+        assert np.abs(ours - theirs).max() < 1e-7
+    else:
+        ours, theirs, (our_steps, their_steps) = both(tmp_path / "model.osim", 1.0, 1e-6, 5)
+        assert np.abs(ours - theirs).max() < 1e-8
+        assert our_steps == their_steps
+
+
+CORPUS = {
+    "m0005": 0.6,  # gait10dof18musc
+    "m0013": 0.6,  # gait2392
+    "m0079": 0.4,  # full body, running
+    "m0954": 0.4,  # Rajagopal's, with patellas on couplers
+    "m0168": 0.3,  # a neck: couplers and a point constraint
+    "m0161": 0.3,  # a shoulder on an ellipsoid
+}
+
+
+@pytest.mark.parametrize("name", CORPUS)
+def test_real_models_without_muscles(name: str, corpus: Any, tmp_path: Path) -> None:
+    entry = next(item for item in corpus if item.id == name)
+    model = read_text(gzip.decompress(entry.converted.read_bytes()).decode())
+    for force in model.components(Force):
+        if type(force) not in (CoordinateLimitForce, *MAKERS) or isinstance(force, PathSpring):
+            force.appliesForce = False
+    osimlite.write(model, tmp_path / "model.osim")
+    # Knees that turn about several axes have OpenSim's derivatives.
+    path = tmp_path / "model.osim"
+    ours, theirs, (our_steps, their_steps) = both(path, CORPUS[name], 1e-6, 7, opensim_derivatives=True)
+    assert np.abs(ours - theirs).max() < 1e-9
+    assert our_steps == their_steps
