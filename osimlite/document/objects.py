@@ -254,7 +254,7 @@ class ObjectReader:
     def _members(self, wrapper: etree._Element, spec: FieldSpec, late: list[_Late]) -> ObjectList[Any]:
         """Read the objects inside ``<objects>`` or another wrapper."""
         self.count += 1
-        members: ObjectList[Any] = ObjectList()
+        members: list[Any] = []
         pending: list[Remark] = []
         accepts = spec.accepts
         assert accepts is not None
@@ -276,7 +276,7 @@ class ObjectReader:
             members.append(member)
         if pending and members:
             layout_of(members[-1]).after.extend(pending)
-        return members
+        return ObjectList(members)
 
     def _indirect(
         self,

@@ -34,11 +34,8 @@ OLDEST_KNOWN = 10901
 
 _COUNT = etree.XPath("count(descendant-or-self::*)")
 
-_MIXED = etree.XPath("boolean(//*/following-sibling::text() | //*/preceding-sibling::text())")
-"""Whether there is text beside an element; without blank text, as the parser leaves it out."""
-
-_BEGINS_WITH_ROOT = re.compile(rb"(?:<\?xml[^<>]*+>\s*+)?<[A-Za-z]")
-"""The beginning of a text in which the root element follows the XML declaration, with no DOCTYPE between."""
+_MIXED = etree.XPath("boolean(/descendant::*[*]/text())")
+"""Whether there is text beside an element; blank text the parser leaves out."""
 
 _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
@@ -77,14 +74,18 @@ def read_text(text: str | bytes) -> Model:
     return read_document(Source(text) if isinstance(text, bytes) else Source.of_characters(text)).model
 
 
-def read_document(source: Source) -> Document:
+def read_document(source: Source, *, to_check: bool = False) -> Document:
     """Read a model and keep its text and the notes.
+
+    A text that is `to_check` is also asked whether there is anything between its elements.
 
     Raises:
         DocumentError: the text is not an OpenSim model document; with line and column.
     """
     try:
         root = parse(source)
+        if to_check:
+            source.mixed = cast("bool", _MIXED(root))
     except NotWellFormedError as fault:
         from osimlite.document.repair import read_repaired
 
@@ -191,16 +192,15 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
     if body.startswith(BOM_UTF8):
         body = data
     blank = data[: len(data) - len(body)].count(b"\n")
+    plain = all_generated(data)
     parser = etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
         no_network=True,
         load_dtd=False,
         recover=recover,
-        remove_comments=all_generated(data),
+        remove_comments=plain,
         remove_blank_text=True,
-        # The parser need not look for ids. Told so, it reads what a DOCTYPE names, so that none may follow.
-        collect_ids=_BEGINS_WITH_ROOT.match(body) is None,
     )
     try:
         root = etree.fromstring(body, parser)
@@ -215,7 +215,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
-        source.mixed = cast("bool", _MIXED(root))
+        source.remarks = not plain
     return root
 
 

@@ -36,8 +36,10 @@ class Source:
         self.text = _decoded(data, self.encoding)
         self.elements: int | None = None
         """The number of elements, once the parser has found the text well-formed."""
+        self.remarks = True
+        """Whether there may be comments other than OpenSim's own."""
         self.mixed: bool | None = None
-        """Whether there is text beside elements, once the parser has found the text well-formed."""
+        """Whether there is text beside elements, where that has been looked for in a well-formed text."""
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 
@@ -85,11 +87,18 @@ class Source:
         spans = self.spans
         return spans.starts if isinstance(spans, PlainSpans) else [span.start for span in spans]
 
+    def _tag(self, number: int) -> str:
+        spans = self.spans
+        return spans.tag(number) if isinstance(spans, PlainSpans) else spans[number].tag
+
     def children(self, number: int) -> list[int]:
         """The numbers of the elements directly inside element `number`."""
         return list(self._inside(number))
 
     def _inside(self, number: int) -> Iterator[int]:
+        if isinstance(self.spans, PlainSpans):
+            yield from self.spans.inside(number)
+            return
         inner, end = number + 1, self.spans[number].end
         while inner < len(self._starts) and self._starts[inner] < end:
             yield inner
@@ -98,7 +107,7 @@ class Source:
 
     def child(self, number: int, tag: str) -> int | None:
         """The number of the first element `tag` directly inside element `number`, or of what it was made from."""
-        found = next((child for child in self._inside(number) if self.spans[child].tag == tag), None)
+        found = next((child for child in self._inside(number) if self._tag(child) == tag), None)
         return self.moved.get((number, tag)) if found is None else found
 
     @cached_property
@@ -151,8 +160,8 @@ class Source:
         """
         if not self.spans:
             return self.position(0)
-        span = self.spans[min(number, len(self.spans) - 1)]
-        return self.position(span.start, len(span.tag) + 1)
+        number = min(number, len(self.spans) - 1)
+        return self.position(self._starts[number], len(self._tag(number)) + 1)
 
     def of_text(self, number: int, word: str | None = None, nth: int = 0) -> Position:
         """Where the text of element `number` is, or the `nth` word equal to `word` in it; the tag if it has none."""

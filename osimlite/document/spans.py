@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, overload
 
@@ -152,7 +153,6 @@ def spans_of(text: str) -> list[Span]:
 
 _BEGIN = re.compile(r"<[^/!?]")
 
-
 # The same where comments and their like may hold what looks like a tag.
 _BEGIN_OR_HIDDEN = re.compile(r"<[^/!?]|<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
 
@@ -183,13 +183,56 @@ class PlainSpans(Sequence[Span]):
             return [self[index] for index in range(*number.indices(len(self)))]
         known = self._known.get(number)
         if known is None:
-            known = self._known[number] = self._span(self.starts[number])
+            known = self._known[number] = self._span(number)
         return known
 
-    def _span(self, start: int) -> Span:
-        match = _MARKUP.match(self.text, start)
-        assert match is not None and match["open"] is not None
-        tag, tag_end = match["open"], match.end()
+    def tag(self, number: int) -> str:
+        """The tag of an element; its end, which may be far away, is not looked for."""
+        name = _NAME.match(self.text, self.starts[number] + 1)
+        assert name is not None
+        return name[0]
+
+    def inside(self, number: int) -> Iterator[int]:
+        """Yield the numbers of the elements directly inside an element; its own end is not looked for."""
+        inner = number + 1
+        opening = self._opening(number)
+        place = opening.end()
+        while not opening["empty"]:
+            place = self._next_tag(place)
+            if self.text[place + 1] == "/":
+                return
+            yield inner
+            place, inner = self._behind(inner)
+
+    def _behind(self, number: int) -> tuple[int, int]:
+        """The place behind an element, and the number of the first element that begins there or later."""
+        opening = self._opening(number)
+        end = opening.end()
+        if opening["empty"]:
+            return end, number + 1
+        tag = self._next_tag(end)
+        if self.text[tag + 1] == "/":
+            return self.text.index(">", tag) + 1, number + 1
+        end = self[number].end
+        return end, bisect_left(self.starts, end, number + 1)
+
+    def _opening(self, number: int) -> re.Match[str]:
+        match = _MARKUP.match(self.text, self.starts[number])
+        assert match is not None
+        return match
+
+    def _next_tag(self, place: int) -> int:
+        """Where the next tag begins, behind comments and their like."""
+        text = self.text
+        place = text.index("<", place)
+        while text[place + 1] in "!?":
+            ending = "-->" if text.startswith("<!--", place) else "]]>" if text[place + 1] == "!" else "?>"
+            place = text.index("<", text.index(ending, place + 2))
+        return place
+
+    def _span(self, number: int) -> Span:
+        match = self._opening(number)
+        start, tag, tag_end = match.start(), match["open"], match.end()
         if match["empty"]:
             return Span(tag, start, tag_end, tag_end, tag_end)
         close = self._close(tag, tag_end)

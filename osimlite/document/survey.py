@@ -30,7 +30,7 @@ class Survey:
 def survey(source: Source) -> Survey:
     """Read as much of `source` as can be read; raises nothing for what is wrong with the text."""
     try:
-        return Survey(source, read_document(source))
+        return Survey(source, read_document(source, to_check=True))
     except NotWellFormedError as fault:
         return _recovered(source, fault)
     except VersionError as fault:

@@ -179,7 +179,7 @@ def run(subject: Subject) -> Report:
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
-    if subject.source is not None and "osimlite:" in subject.source.text:
+    if subject.source is not None and subject.source.remarks and "osimlite:" in subject.source.text:
         findings = _not_ignored(subject, findings)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))

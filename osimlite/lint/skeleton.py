@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import cast
 
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Object, Unknown
@@ -76,7 +77,16 @@ def has_unknown_joints(subject: Subject) -> bool:
 
 
 def base_of(subject: Subject, frame: Component | None) -> Component | None:
-    """The body or ground that a frame is fixed to, through any number of offset frames."""
+    """The body or ground that a frame is fixed to, through any number of offset frames; looked for once per frame."""
+    if frame is None:
+        return None
+    known = cast("dict[int, Component | None]", subject.kept.setdefault("bases", {}))
+    if id(frame) not in known:
+        known[id(frame)] = _base_of(subject, frame)
+    return known[id(frame)]
+
+
+def _base_of(subject: Subject, frame: Component | None) -> Component | None:
     seen: set[int] = set()
     while frame is not None and not isinstance(frame, (Body, Ground)):
         if id(frame) in seen:

@@ -39,8 +39,6 @@ class Subject:
         self.upgraded = False
         self.changes: list[Change] = []
         self.kept: dict[str, object] = {}
-        # The uses are kept alive by `uses`, so that their identities stay theirs.
-        self._resolutions: dict[int, Resolution] = {}
         if isinstance(found, Model):
             self.model = found
         else:
@@ -108,12 +106,16 @@ class Subject:
         """Every reference of the model, in tree order."""
         return list(self.tree.uses())
 
+    @cached_property
+    def _resolutions(self) -> dict[int, Resolution]:
+        # The uses are kept alive by `uses`, so that their identities stay theirs.
+        resolve = self.tree.resolve
+        return {id(use): resolve(use) for use in self.uses}
+
     def resolution(self, use: Use) -> Resolution:
         """What a reference leads to."""
         known = self._resolutions.get(id(use))
-        if known is None:
-            known = self._resolutions[id(use)] = self.tree.resolve(use)
-        return known
+        return self.tree.resolve(use) if known is None else known
 
     @cached_property
     def has_unknown(self) -> bool:

@@ -152,17 +152,25 @@ class Object(BaseModel):
         """What the file said about this object beyond its properties."""
         return cast("Layout | None", self._layout)
 
-    def objects_held(self) -> list[tuple[FieldSpec, Object]]:
-        """Every object this one owns, with the property that holds it, in printing order."""
+    def objects_held(self, *, plain: bool = True) -> list[tuple[FieldSpec, Object]]:
+        """Every object this one owns, with the property that holds it, in printing order.
+
+        Without the `plain` ones, what no one has asked for is left out if nothing in it has a path or names another.
+        """
         held: list[tuple[FieldSpec, Object]] = []
         state = self.__dict__
-        for spec, name, is_list in holding(type(self)):
+        for spec, name, is_list, is_plain in holding(type(self)):
             if is_list:
                 # A list that no one has asked for is empty.
                 for item in state.get(name, ()):
                     held.append((spec, item))
                 continue
-            value = state[name] if name in state else getattr(self, name)
+            if name in state:
+                value = state[name]
+            elif is_plain and not plain:
+                continue
+            else:
+                value = getattr(self, name)
             if isinstance(value, list):
                 held += [(spec, item) for item in value]
             elif value is not None:
@@ -339,9 +347,20 @@ def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @cache
-def holding(cls: type[Object]) -> tuple[tuple[FieldSpec, str, bool], ...]:
-    """The properties of `cls` that hold objects: each with its name, and whether it is a list, empty by default."""
-    return tuple((spec, spec.name, spec.factory is ObjectList) for spec in object_specs(cls))
+def holding(cls: type[Object]) -> tuple[tuple[FieldSpec, str, bool, bool], ...]:
+    """The properties of `cls` that hold objects.
+
+    Each with its name, whether it is a list that is empty by default, and whether its default is one object in which
+    nothing has a path or names another.
+    """
+    return tuple((spec, spec.name, spec.factory is ObjectList, _is_plain(spec)) for spec in object_specs(cls))
+
+
+def _is_plain(spec: FieldSpec) -> bool:
+    made = spec.factory() if spec.factory is not None else None
+    if not isinstance(made, Object):
+        return False
+    return not any(item.is_component or reference_specs(type(item)) for item in made.walk())
 
 
 @cache

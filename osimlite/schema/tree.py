@@ -83,7 +83,11 @@ class Tree:
         self.components: list[Component] = []
         self.by_path: dict[str, Component] = {}
         self.by_class: dict[type[Object], list[Object]] = {}
-        """Every object of the model by its exact class; the parts that OpenSim makes for itself are left out."""
+        """Every object of the model by its exact class, in tree order.
+
+        Left out are the parts that OpenSim makes for itself, and default objects that no one has asked for, unless
+        something in them has a path or names another.
+        """
         self.renamed: list[Renamed] = []
         self._paths: dict[int, str] = {}
         self._parents: dict[int, Component] = {}
@@ -110,7 +114,13 @@ class Tree:
 
     def owner_of(self, item: Object) -> Component:
         """The component that an object without a path belongs to; a component owns itself."""
-        return cast("Component", item) if item.is_component else self._owners[id(item)]
+        if item.is_component:
+            return cast("Component", item)
+        if id(item) not in self._owners:
+            # It was made when someone asked for it.
+            for owner in self.components:
+                self._own(owner, owner)
+        return self._owners[id(item)]
 
     def is_internal(self, component: Component) -> bool:
         """Whether the component is a part that OpenSim makes for itself: it has a path and stands in no file."""
@@ -124,7 +134,7 @@ class Tree:
         return found
 
     def uses(self) -> Iterator[Use]:
-        """Yield every reference of the model that has a text or a component, in tree order."""
+        """Yield every reference of the model that has a text or a component or must have one, in tree order."""
         for holder, owner in self._naming:
             cls = type(holder)
             if cls.name_reference is not None and holder.name:
@@ -136,7 +146,7 @@ class Tree:
                 if isinstance(value, tuple):
                     for position, word in enumerate(value):
                         yield Use(holder, owner, spec, word, position)
-                elif value is not None:
+                elif value or (value is not None and cast("Reference", spec.kind).required):
                     yield Use(holder, owner, spec, value)
 
     def resolve(self, use: Use) -> Resolution:
@@ -253,13 +263,19 @@ class Tree:
             self._naming.append((holder, owner))
         if not holds_others:
             return
-        for spec, item in holder.objects_held():
+        for spec, item in holder.objects_held(plain=False):
             if item.is_component:
                 component = cast("Component", item)
                 children.append((_name_in_tree(spec, component), component))
             else:
                 self._owners[id(item)] = owner
                 self._enter(item, owner, children)
+
+    def _own(self, holder: Object, owner: Component) -> None:
+        for _, item in holder.objects_held(plain=False):
+            if not item.is_component:
+                self._owners[id(item)] = owner
+                self._own(item, owner)
 
     @staticmethod
     def _unique(name: str, taken: dict[str, Component]) -> str:

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from osimlite.lint.consequences import STRICTER, consequence
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
@@ -167,7 +167,17 @@ class Verdict(NamedTuple):
 _NAN_FATE = "what is computed with it becomes NaN, without a message"
 
 
-def _outside(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any, Verdict]]:
+_Outside = tuple[Object, FieldSpec, Any, Verdict]
+
+
+def _outside(subject: Subject) -> list[_Outside]:
+    """Every number outside its domain; they are looked for once."""
+    if "outside domains" not in subject.kept:
+        subject.kept["outside domains"] = list(_find_outside(subject))
+    return cast("list[_Outside]", subject.kept["outside domains"])
+
+
+def _find_outside(subject: Subject) -> Iterator[_Outside]:
     for cls, items in subject.by_class.items():
         for spec, inside in _domains(cls):
             assert isinstance(spec.kind, Value)
@@ -227,11 +237,10 @@ def _test(domain: str) -> Callable[[float], bool]:
 def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec]]:
     """Every property that holds a number that is not finite; a quick test first, since there are many numbers."""
     for cls, items in subject.by_class.items():
-        specs = [s for s in value_specs(cls) if isinstance(s.kind, Value) and s.kind.scalar == "double"]
-        names = [(spec, spec.name) for spec in specs]
+        specs = _numeric(cls)
         for item in items:
             state = item.__dict__
-            for spec, name in names:
+            for spec, name in specs:
                 value = state[name]
                 if value.__class__ is float:
                     if -math.inf < value < math.inf:
@@ -240,6 +249,13 @@ def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec]]:
                 elif not value or math.isfinite(sum(value)) or all(map(math.isfinite, value)):
                     continue
                 yield item, spec
+
+
+@cache
+def _numeric(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...]:
+    """The properties of a class that hold real numbers, each with its name."""
+    specs = (spec for spec in value_specs(cls) if isinstance(spec.kind, Value) and spec.kind.scalar == "double")
+    return tuple((spec, spec.name) for spec in specs)
 
 
 def _numbers(value: Any) -> tuple[float, ...]:

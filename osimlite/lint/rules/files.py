@@ -173,8 +173,10 @@ class _Folders:
 
     def _listing(self, place: str, name: str) -> tuple[dict[str, str], str]:
         """The names in the folder of a file by their small letters, and the file's own."""
-        before, last = os.path.split(name)
-        folder = os.path.join(place, before) if before else place or "."
+        folder, last = place or ".", name
+        if "/" in name or os.sep in name:
+            before, last = os.path.split(name)
+            folder = os.path.join(place, before)
         known = self._known.get(folder)
         if known is None:
             known = self._known[folder] = _lowered(folder)

@@ -144,9 +144,7 @@ def shared_coordinate_name(subject: Subject, found: Found) -> None:
     """
     first: dict[str, Coordinate] = {}
     tree = subject.tree
-    for component in tree.components:
-        if not isinstance(component, Coordinate):
-            continue
+    for component in subject.each(Coordinate):
         joint = tree.parent_of(component)
         known = first.setdefault(component.name, component)
         if known is component or not component.name or tree.parent_of(known) is joint:

@@ -13,6 +13,8 @@ from osimlite.lint.subject import Subject
 REMARKS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
 """Everything in which a tag is no tag."""
 _CONTROLS = re.compile("[\f\v]")
+# The bracket first: one character is searched for much faster than a class of them.
+_BLANK_BEFORE_END = re.compile(r">(?<=\s>)")
 _BLANK_IN_CLOSING = re.compile(r"</[^<>\s]+(\s+)>")
 _NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
@@ -231,8 +233,7 @@ def closing_tag(subject: Subject, found: Found) -> None:
     ```
     """
     source = subject.source
-    # Three plain searches are much faster than one with a pattern.
-    if source is None or not any(blank in source.text for blank in (" >", "\t>", "\n>")):
+    if source is None or not _BLANK_BEFORE_END.search(source.text):
         return
     plain = REMARKS.sub(lambda match: "-" * len(match[0]), source.text)
     for match in _BLANK_IN_CLOSING.finditer(plain):

@@ -82,7 +82,12 @@ def illegal_name(subject: Subject, found: Found) -> None:
     <Marker name="right_asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
-    for component in subject.tree.components:
+    # Almost every model is done with when its names are looked at all at once.
+    components = subject.tree.components
+    together = "".join([component.name for component in components])
+    if not any(character in together for character in ILLEGAL_CHARACTERS):
+        components = []
+    for component in components:
         if _ILLEGAL.isdisjoint(component.name):
             continue
         bad = [character for character in dict.fromkeys(component.name) if character in ILLEGAL_CHARACTERS]

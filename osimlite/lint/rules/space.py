@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from itertools import combinations
 
 from osimlite.lint.config import Threshold
@@ -12,7 +13,7 @@ from osimlite.lint.placement import Pose, default_poses, fixed, on_base
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
-from osimlite.schema.base import Component, Object
+from osimlite.schema.base import Component, FieldSpec, Object, value_specs
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
@@ -192,15 +193,14 @@ def lengths_in_millimetres(subject: Subject, found: Found) -> None:
     """
     longest = subject.config.value_of(LENGTH)
     for cls, items in subject.by_class.items():
-        specs = [
-            spec
-            for spec in cls.field_specs().values()
-            if isinstance(spec.kind, Value) and spec.kind.unit == "m" and spec.kind.scalar == "double"
-        ]
+        specs = _lengths(cls)
         for item in items if specs else ():
             for spec in specs:
                 value = item.__dict__[spec.name]
                 numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
+                # Almost all are small; with NaN among them no comparison need be true.
+                if not numbers or (-longest <= min(numbers) and max(numbers) <= longest):
+                    continue
                 if not any(longest < abs(number) < math.inf for number in numbers) or not _on_body(subject, item):
                     continue
                 better = " ".join(f"{number / 1000:.6g}" for number in numbers)
@@ -210,6 +210,16 @@ def lengths_in_millimetres(subject: Subject, found: Found) -> None:
                     tag=spec.tag,
                     suggestion=better,
                 )
+
+
+@cache
+def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
+    """The properties of a class that are lengths or places, in metres."""
+    return tuple(
+        spec
+        for spec in value_specs(cls)
+        if isinstance(spec.kind, Value) and spec.kind.unit == "m" and spec.kind.scalar == "double"
+    )
 
 
 def _rests_on_itself(subject: Subject, frame: StationDefinedFrame) -> bool:

@@ -307,7 +307,7 @@ def second_object(subject: Subject, found: Found) -> None:
 
 def _conflicts(source: Source) -> list[tuple[int, int]]:
     # In well-formed XML only a comment can hold the first marker, and it then holds the last one too.
-    if source.well_formed and ">>>>>>>" not in source.text:
+    if source.well_formed and not (source.remarks and ">>>>>>>" in source.text):
         return []
     if "<<<<<<<" not in source.text and ">>>>>>>" not in source.text:
         return []
