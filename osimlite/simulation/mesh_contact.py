@@ -6,7 +6,7 @@ two meshes are both taken, each with half its area.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
 
 Load = tuple[float, float, float, float, float, float, float]
 """Force (N), torque about a point (N·m), and energy (J)."""
-
-Acting = tuple[int, Triple, Triple]
-"""A spring that acts: the number of its triangle, its middle, and the nearest point of the other surface, in ground."""
 
 Moving = tuple[float, float, float, float, float, float]
 """Velocity of a point (m/s), and angular velocity (1/s)."""
@@ -137,6 +134,11 @@ class Springs:
     def __init__(self, one: ContactSurface, two: ContactSurface, vt: float) -> None:
         assert two.mesh is not None
         self.one, self.two, self.mesh, self.vt = one, two, two.mesh, vt
+        meshes = [surface for surface in (one, two) if surface.mesh is not None]
+        # Of two meshes, each has half the area.
+        self._stiffness = [
+            surface.material[0] / len(meshes) * surface.mesh.areas for surface in meshes if surface.mesh is not None
+        ]
 
     def load(self, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
         """The load on surface 2.
@@ -160,30 +162,15 @@ class Springs:
             inside = np.linalg.norm(middles - place, axis=1) <= self.one.radius
             find = partial(spring_in_sphere, *triple(place), self.one.radius)
         acting = []
-        for number in np.flatnonzero(inside).tolist():
-            middle = triple(middles[number])
-            depth, x, y, z = find(*middle)
+        for k, x, y, z in np.column_stack((self._stiffness[-1], middles))[inside].tolist():
+            depth, *end = find(x, y, z)
             if depth > 0.0:
-                acting.append((number, middle, (x, y, z)))
-        return _sum(self._loads(self.two, 1.0, acting, about, motion))
-
-    def _loads(
-        self,
-        surface: ContactSurface,
-        share: float,
-        acting: Iterable[Acting],
-        about: Triple,
-        motion: Moving,
-    ) -> Iterator[Load]:
-        """Loads on the mesh of the springs that act, by number, middle and end, each with a share of its area."""
-        assert surface.mesh is not None
-        stiffness, c, us, ud, uv = surface.material
-        for number, middle, end in acting:
-            k = stiffness * float(surface.mesh.areas[number]) * share
-            yield spring_load(k, c, us, ud, uv, self.vt, *middle, *end, *about, *motion)
+                acting.append((k, x, y, z, *end))
+        return self._sum(self.two, acting, about, motion)
 
     def _between_meshes(self, first: TriangleMesh, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
-        own, others = _inside(first, one, self.mesh, two), _inside(self.mesh, two, first, one)
+        own = _inside(self._stiffness[0], first, one, self.mesh, two)
+        others = _inside(self._stiffness[1], self.mesh, two, first, one)
         # As in Simbody, a mesh that is wholly within another does not touch it.
         if not (own or others) or not (
             any(
@@ -192,12 +179,32 @@ class Springs:
             )
             or first.crosses(self.mesh.moved(one.inverse_times(two)))
         ):
-            return _sum(())
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         vx, vy, vz, wx, wy, wz = motion
-        back = -vx, -vy, -vz, -wx, -wy, -wz
-        fx, fy, fz, tx, ty, tz, energy = _sum(self._loads(self.one, 0.5, own, about, back))
-        more = _sum(self._loads(self.two, 0.5, others, about, motion))
-        return _sum(((-fx, -fy, -fz, -tx, -ty, -tz, energy), more))
+        *first_load, first_energy = self._sum(self.one, own, about, (-vx, -vy, -vz, -wx, -wy, -wz))
+        *second_load, second_energy = self._sum(self.two, others, about, motion)
+        fx, fy, fz, tx, ty, tz = (b - a for a, b in zip(first_load, second_load, strict=True))
+        return fx, fy, fz, tx, ty, tz, first_energy + second_energy
+
+    def _sum(self, surface: ContactSurface, acting: Iterable[Sequence[float]], about: Triple, motion: Moving) -> Load:
+        """The load on a mesh of the springs that act: stiffness, middle and end of each."""
+        _, c, us, ud, uv = surface.material
+        ax, ay, az = about
+        vx, vy, vz, wx, wy, wz = motion
+        vt, law = self.vt, spring_load
+        fx = fy = fz = tx = ty = tz = energy = 0.0
+        for k, x, y, z, ex, ey, ez in acting:
+            px, py, pz, qx, qy, qz, stored = law(
+                k, c, us, ud, uv, vt, x, y, z, ex, ey, ez, ax, ay, az, vx, vy, vz, wx, wy, wz
+            )
+            fx += px
+            fy += py
+            fz += pz
+            tx += qx
+            ty += qy
+            tz += qz
+            energy += stored
+        return fx, fy, fz, tx, ty, tz, energy
 
 
 class Pose(NamedTuple):
@@ -215,8 +222,8 @@ class Pose(NamedTuple):
         return transform(self.turn.T @ other.turn, self.turn.T @ (other.origin - self.origin))
 
 
-def _inside(mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose) -> list[Acting]:
-    """The springs of a mesh that are inside another, by number, middle and end."""
+def _inside(stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose) -> list[list[float]]:
+    """The springs of a mesh that are inside another: stiffness, middle and end of each."""
     middles = own.points(mesh.centroids)
     seen = (middles - theirs.origin) @ theirs.turn
     boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)
@@ -224,13 +231,11 @@ def _inside(mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose) ->
     if not len(places):
         return []
     ends, inside = other.nearest(seen[places])
-    acting = zip(places[inside].tolist(), middles[places[inside]], theirs.points(ends[inside]), strict=True)
-    return [(number, triple(middle), triple(end)) for number, middle, end in acting]
-
-
-def _sum(loads: Iterable[Load]) -> Load:
-    fx, fy, fz, tx, ty, tz, energy = (sum(parts) for parts in zip((0.0,) * 7, *loads, strict=True))
-    return fx, fy, fz, tx, ty, tz, energy
+    acting = places[inside]
+    found: list[list[float]] = np.column_stack(
+        (stiffness[acting], middles[acting], theirs.points(ends[inside]))
+    ).tolist()
+    return found
 
 
 def _load(springs: Springs, *numbers: float) -> Load:
