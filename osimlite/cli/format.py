@@ -26,7 +26,7 @@ def format(
     from osimlite.files import model_files, write_atomically
     from osimlite.schema.model import CURRENT_VERSION
 
-    changed, failed = 0, 0
+    changed, failed, same = 0, 0, 0
     for path in model_files(paths):
         try:
             document = read_document(Source.of_file(path))
@@ -41,6 +41,7 @@ def format(
         before = document.source.text
         after = to_text(document.model)
         if before == after:
+            same += 1
             continue
         changed += 1
         if show_diff:
@@ -50,6 +51,9 @@ def format(
         else:
             write_atomically(path, after)
             typer.echo(f"reformatted {path}")
+    if same and not (changed and show_diff):
+        files = "1 file is" if same == 1 else f"{same} files are"
+        typer.echo(f"{files} formatted already", err=True)
     if failed:
         raise typer.Exit(2)
     if changed and (check or show_diff):

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
+
+if TYPE_CHECKING:
+    from osimlite.schema.custom_joint import CustomJoint
+    from osimlite.schema.joints import Joint
+    from osimlite.schema.model import Model
 
 
 def info(
@@ -52,26 +59,52 @@ def info(
         facts.add_row(name, value)
     console.print(facts)
 
-    table = Table(title="Coordinates", title_justify="left")
-    for heading in ("joint", "class", "coordinate", "default", "range", ""):
-        table.add_column(heading, justify="right" if heading in ("default", "range") else "left", overflow="fold")
-    for joint in model.components(Joint):
-        for number, coordinate in enumerate(joint.coordinates):
-            low, high = coordinate.range
-            flags = [word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)]
-            table.add_row(
-                joint.name if number == 0 else "",
-                type(joint).__name__ if number == 0 else "",
-                coordinate.name,
-                f"{coordinate.default_value:.4g}",
-                f"{low:.4g} .. {high:.4g}",
-                " ".join(flags),
-            )
-    if table.row_count:
-        console.print(table)
+    if any(joint.coordinates for joint in model.components(Joint)):
+        console.print("\n[bold]Coordinates[/bold]: default, range")
+        for line in _coordinates(model):
+            # A name is never broken, however narrow the terminal is.
+            console.print(line, soft_wrap=True, highlight=False, markup=False)
 
     counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in components)
     shown = counts.most_common(None if every_class else 15)
-    console.print("classes: " + ", ".join(f"{count} {name}" for name, count in shown), highlight=False)
+    # A count stays with its class.
+    listed = ", ".join(f"{count}\0{name}" for name, count in shown)
+    text = textwrap.fill(f"Classes: {listed}", console.width, subsequent_indent="  ", break_long_words=False)
+    console.print("\n" + text.replace("\0", " "), soft_wrap=True, highlight=False, markup=False)
     if len(counts) > len(shown):
         console.print(f"and {len(counts) - len(shown)} classes more (--all lists them)")
+
+
+def _coordinates(model: Model) -> Iterator[str]:
+    """A line for each joint and one for each coordinate below it, with units."""
+    from osimlite.schema.joints import Joint
+
+    joints = [joint for joint in model.components(Joint) if joint.coordinates]
+    width = max(len(coordinate.name) for joint in joints for coordinate in joint.coordinates)
+    for joint in joints:
+        yield f"  {joint.name} ({type(joint).__name__})"
+        for place, coordinate in enumerate(joint.coordinates):
+            unit = _unit(joint, place)
+            low, high = coordinate.range
+            flags = [word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)]
+            numbers = f"{coordinate.default_value:>9.4g} {unit:3}  {low:.4g} to {high:.4g} {unit}".rstrip()
+            yield f"    {coordinate.name:{width}} {numbers}" + (f"  ({', '.join(flags)})" if flags else "")
+
+
+def _unit(joint: Joint, place: int) -> str:
+    """The unit of a coordinate, "" if the functions of the joint decide what it means."""
+    from osimlite.lint.axes import axes_of
+    from osimlite.schema.tree import is_a
+
+    if joint.motion_types is not None:
+        kind = joint.motion_types[place] if place < len(joint.motion_types) else ""
+        return {"rotational": "rad", "translational": "m"}.get(kind, "")
+    if not is_a(joint, "CustomJoint"):
+        return ""
+    name = joint.coordinates[place].name
+    uses = [
+        number
+        for number, axis in enumerate(axes_of(cast("CustomJoint", joint)))
+        if name in [word if isinstance(word, str) else word.name for word in axis.coordinates]
+    ]
+    return "rad" if uses and uses[0] < 3 else "m" if uses else ""
