@@ -111,23 +111,22 @@ def quantities(words: Sequence[str], mechanism: Mechanism, option: str) -> dict[
     """Numbers (rad, m, per second) by coordinate from ``NAME=VALUE`` words; a value may carry a unit.
 
     Raises:
-        OsimliteError: a word is not of that form, or its unit does not fit the coordinate.
-        ModelError: there is no such coordinate.
+        OsimliteError: a word is not of that form, there is no such coordinate, or the unit does not fit it.
     """
-    from osimlite.errors import OsimliteError
+    from osimlite.errors import ModelError, OsimliteError
     from osimlite.quantity import quantity
+    from osimlite.simulation.start import in_units_of
 
     found = {}
     for word in words:
         name, equals, text = (part.strip() for part in word.partition("="))
-        given = quantity(text)
-        if not equals or given is None:
+        if not equals or quantity(text) is None:
             raise OsimliteError(f"{option} takes COORDINATE=VALUE with a number such as 0.5 or 30deg, got '{word}'")
-        kind = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
-        if given.unit is not None and kind != "coupled" and given.is_angle != (kind == "rotational"):
-            wanted = "deg or rad" if kind == "rotational" else "m, cm or mm"
-            raise OsimliteError(f"coordinate '{name}' is {kind}: give '{text}' in {wanted}")
-        found[name] = given.value
+        try:
+            found[name] = in_units_of(mechanism, name, text)
+        except ModelError as error:
+            # The model is as it should be; it is the command that asks for what is not there.
+            raise OsimliteError(f"{option}: {error.message}") from None
     return found
 
 

@@ -20,6 +20,7 @@ from osimlite.simulation.engines import KEEP_CONSTRAINTS, engine_factory
 from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson, Stepper
 from osimlite.simulation.recorder import Recorder
+from osimlite.simulation.start import in_units_of
 from osimlite.simulation.trajectory import Report, Trajectory
 from osimlite.text import listed
 
@@ -35,8 +36,8 @@ def simulate(
     accuracy: float = DEFAULT_ACCURACY,
     fixed_step: float | None = None,
     report_interval: float = 0.01,
-    initial: Mapping[str, float] | None = None,
-    initial_speeds: Mapping[str, float] | None = None,
+    initial: Mapping[str, float | str] | None = None,
+    initial_speeds: Mapping[str, float | str] | None = None,
     route: str = "auto",
     skip_unsupported: bool = False,
     simbody_early_return: bool = False,
@@ -59,7 +60,8 @@ def simulate(
         accuracy: of the integrator, with the meaning it has in OpenSim.
         fixed_step: take PyBullet's own steps of this length (s) instead of controlling the error.
         report_interval: time between the recorded moments, s; the last one is `to` in any case.
-        initial: values (rad, m) of coordinates by name or path that do not start at their default.
+        initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
+            default.
         initial_speeds: generalized speeds that do not start at their default, likewise.
         route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
             osimlite's own "recursion", or "auto" for the quickest that is possible.
@@ -170,8 +172,8 @@ class Simulation:
         accuracy: float = DEFAULT_ACCURACY,
         fixed_step: float | None = None,
         report_interval: float = 0.01,
-        initial: Mapping[str, float] | None = None,
-        initial_speeds: Mapping[str, float] | None = None,
+        initial: Mapping[str, float | str] | None = None,
+        initial_speeds: Mapping[str, float | str] | None = None,
         progress: Progress | None = None,
     ) -> Trajectory:
         """Simulate once; arguments and errors as those of :func:`simulate`."""
@@ -179,7 +181,11 @@ class Simulation:
         times = report_times(to, report_interval)
         if self._show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
-        y = self._initial_state(initial or {}, initial_speeds or {})
+        initial, initial_speeds = (
+            {name: in_units_of(self.mechanism, name, value) for name, value in (given or {}).items()}
+            for given in (initial, initial_speeds)
+        )
+        y = self._initial_state(initial, initial_speeds)
         settings = Settings(accuracy=accuracy, fixed_step=fixed_step, route=self.engine.route, show=self._show)
         recorder = Recorder(self.engine)
         stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
@@ -196,8 +202,8 @@ class Simulation:
             "to": to,
             **({"accuracy": accuracy} if fixed_step is None else {"fixed_step": fixed_step}),
             "report_interval": report_interval,
-            "initial": dict(initial or {}),
-            "initial_speeds": dict(initial_speeds or {}),
+            "initial": initial,
+            "initial_speeds": initial_speeds,
             **self._settings,
         }
         return self._trajectory(times, states, stepper, recorder, wanted, wall)

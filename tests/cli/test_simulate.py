@@ -56,7 +56,7 @@ def test_fixed_step(walker, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["--set", "RHip=1"], 1, "did you mean 'RHip_rz'"),
+        (["--set", "RHip=1"], 2, "did you mean 'RHip_rz'"),
         (["--set", "RHip_rz"], 2, "COORDINATE=VALUE"),
         (["--set", "RHip_rz=fast"], 2, "a number such as 0.5 or 30deg"),
         (["--set", "Pelvis_tx=3deg"], 2, "m, cm or mm"),

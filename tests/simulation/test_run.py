@@ -11,7 +11,7 @@ import pytest
 
 import osimlite
 from osimlite import Body, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model, PinJoint
-from osimlite.errors import ModelError, OsimliteError, SimulationError, UnsupportedError
+from osimlite.errors import ModelError, OsimliteError, SettingError, SimulationError, UnsupportedError
 from osimlite.simulation import Simulation, read_sto
 from osimlite.simulation.run import report_times
 
@@ -32,6 +32,19 @@ def test_defaults_and_what_is_set(walker):
     assert start["RHip_rz"] == 0.1 and start["Pelvis_ty"] == 0.835
     speeds = dict(zip(trajectory.coordinates, trajectory.speeds[0], strict=True))
     assert speeds.pop("LKnee_rz") == -2.0 and not any(speeds.values())
+
+
+def test_what_is_set_may_carry_a_unit(walker):
+    trajectory = osimlite.simulate(walker, to=0.01, initial={"RHip_rz": "40deg", "Pelvis_ty": "90 cm"})
+    start = dict(zip(trajectory.coordinates, trajectory.values[0], strict=True))
+    assert start["RHip_rz"] == np.radians(40) and start["Pelvis_ty"] == 0.9
+    assert trajectory.summary["settings"]["initial"] == {"RHip_rz": np.radians(40), "Pelvis_ty": 0.9}
+    for given, words in (
+        ({"RHip_rz": "4 cm"}, "give '4 cm' in deg or rad"),
+        ({"RHip_rz": "far"}, "such as 0.5 or 30deg"),
+    ):
+        with pytest.raises(SettingError, match=words):
+            osimlite.simulate(walker, to=0.01, initial=given)
 
 
 def test_locked_coordinate_keeps_its_value(walker):
