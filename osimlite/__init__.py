@@ -57,7 +57,13 @@ def __getattr__(name: str) -> Any:
 
         module = MODULES.get(name)
     if module is None:
-        raise AttributeError(f"module 'osimlite' has no attribute '{name}'")
+        near = ""
+        if not name.startswith("_"):
+            from osimlite.schema.registry import MODULES
+            from osimlite.text import did_you_mean
+
+            near = did_you_mean(name, [*_FUNCTIONS, *MODULES])
+        raise AttributeError(f"module 'osimlite' has no attribute '{name}'{near}")
     return getattr(import_module(module), name)
 
 

@@ -12,7 +12,7 @@ from osimlite.document.lexical import formatter
 from osimlite.files import write_atomically
 from osimlite.schema.base import Component, FieldSpec, Include, Layout, Object, Remark, Unknown, field_specs
 from osimlite.schema.fields import Held, Reference, Value
-from osimlite.schema.model import CURRENT_VERSION, Model
+from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
 
 Numbers = Literal["shortest", "opensim"]
 
@@ -28,6 +28,7 @@ def to_text(model: Model, *, numbers: Numbers = "shortest", comments: bool = Tru
     Raises:
         ModelError: a reference leads to a component outside the model.
     """
+    expect_model(model)
     return _document(_Printer(model, numbers, comments))
 
 
@@ -37,6 +38,7 @@ def write(model: Model, path: str | Path, *, numbers: Numbers = "shortest") -> N
     What was read from a file of its own and is unchanged stays a reference to that file. Arguments and errors as
     `to_text`.
     """
+    expect_model(model)
     write_atomically(path, _document(_Printer(model, numbers, True, Path(path).resolve().parent)))
 
 

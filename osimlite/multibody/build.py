@@ -33,7 +33,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
-from osimlite.schema.model import Model
+from osimlite.schema.model import Model, expect_model
 
 
 def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling: bool = False) -> Mechanism:
@@ -63,6 +63,7 @@ def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling:
         UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop closed by a FreeJoint or
             by a joint whose child is ground.
     """
+    expect_model(model)
     return _Builder(model, opensim_derivatives, rolling).mechanism()
 
 

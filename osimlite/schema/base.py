@@ -29,7 +29,11 @@ from osimlite.schema.layout import Layout as Layout
 from osimlite.schema.layout import Remark as Remark
 
 if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+
     from osimlite.schema.model import Model
+else:
+    ModelMetaclass = type(BaseModel)
 
 
 class FieldSpec(NamedTuple):
@@ -73,7 +77,20 @@ def made(cls: type[Object], **values: Any) -> Any:
     )
 
 
-class Object(BaseModel):
+# A docstring of its own would stand in the place of the property.
+class ObjectType(ModelMetaclass):  # noqa: D101
+    @property
+    def __doc__(cls) -> str | None:  # type: ignore[override]
+        """The docstring of a class, and what its properties are."""
+        own: str | None = cls.__dict__.get("__doc__")
+        if not issubclass(cls, Object) or not own:
+            return own
+        from osimlite.schema.descriptions import with_properties
+
+        return with_properties(cls, own)
+
+
+class Object(BaseModel, metaclass=ObjectType):
     """Anything with a name and properties that an OpenSim document can hold.
 
     A subclass is declared with its properties in the order OpenSim prints them. ``tag`` gives the XML element when it
@@ -452,7 +469,10 @@ def _misspelt(cls: type[Object], name: str) -> str:
     from osimlite.text import did_you_mean
 
     known = [field_name for field_name in cls.model_fields]
-    return f"{cls.__name__} has no property '{name}'{did_you_mean(name, known)}"
+    # Sockets are known by the middle of their names: ``frame`` is ``socket_frame``.
+    within = [field_name for field_name in known if f"_{name}_" in f"{field_name}_"]
+    better = f"; did you mean '{min(within, key=len)}'?" if within and len(name) > 3 else did_you_mean(name, known)
+    return f"{cls.__name__} has no property '{name}'{better}"
 
 
 def _explain(cls: type[Object], error: ValidationError) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import inspect
+import textwrap
 from functools import cache
 from importlib import import_module
 
-from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.base import FieldSpec, Object, field_specs
 from osimlite.schema.fields import Held, Reference, Value
 
 
@@ -35,7 +36,27 @@ def value_of(spec: FieldSpec) -> str:
 
 def described(cls: type[Object]) -> str:
     """What a class is: its docstring."""
-    return inspect.cleandoc(cls.__doc__ or "")
+    return inspect.cleandoc(cls.__dict__.get("__doc__") or "")
+
+
+@cache
+def with_properties(cls: type[Object], own: str) -> str:
+    """A docstring with a section on the properties of the class, as ``help()`` shows it."""
+    rows = [inspect.cleandoc(own), "", "Properties, in the order of a file:", "    name: a text"]
+    for spec in field_specs(cls).values():
+        given = "" if isinstance(spec.kind, Held) else f"; {_shown(spec.default)} by default"
+        meaning = " ".join(meaning_of(spec).split())
+        text = f"{spec.name}: {value_of(spec)}{given}" + (f". {meaning}" if meaning else "")
+        rows.append(textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="        "))
+    return "\n".join(rows)
+
+
+def _shown(value: object) -> str:
+    if value is None or value == "" or value == ():
+        return "nothing"
+    if isinstance(value, tuple):
+        return " ".join(map(_shown, value))
+    return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
 
 
 @cache

@@ -228,6 +228,9 @@ def class_in(annotation: Any) -> type[Object] | None:
 def _instance(value: Any, accepts: type) -> Any:
     if isinstance(value, accepts) or type(value).__name__ == "Unknown":
         return value
+    if isinstance(value, list | tuple) and "objects" in getattr(accepts, "model_fields", ()):
+        name = str(getattr(accepts, "tag", accepts.__name__)).replace("::", ".")
+        raise ValueError(f"expected a {name}, got a list; write {name}(objects=[...])")
     raise ValueError(f"expected a {accepts.__name__}, got {type(value).__name__}")
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, overload
 
-from osimlite.errors import ModelError
+from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, ModelComponent, made, put_model
 from osimlite.schema.constraints import ConstraintSet
 from osimlite.schema.contact import ContactGeometrySet
@@ -121,18 +122,18 @@ class Model(ModelComponent):
         """Add components to the sets they belong in, in order, and return the first of them.
 
         Raises:
-            ModelError: the component is of a kind that no set of a model takes.
+            ModelError: the component is of a kind that no set of a model takes, or another beside it has its name.
         """
         for component in components:
             for spec, holder in self.objects_held():
                 members = type(holder).field_specs().get("objects")
                 if members is not None and spec.name != "component_set" and isinstance(component, members.accepts):  # type: ignore[arg-type]
-                    cast("Any", holder).objects.append(component)
+                    _append(cast("Any", holder).objects, component)
                     break
             else:
                 if not isinstance(component, ModelComponent):
                     raise ModelError(f"a model has no place for a {type(component).__name__}")
-                self.component_set.objects.append(component)
+                _append(self.component_set.objects, component)
             if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
                 # As in OpenSim's API: a file that leaves them out would call them all alike.
                 for number, coordinate in enumerate(component.coordinates):
@@ -140,3 +141,28 @@ class Model(ModelComponent):
                         coordinate.name = f"{component.name}_coord_{number}"
             object.__setattr__(component, "_model", self)
         return components[0]
+
+
+def expect_model(given: object) -> None:
+    """Refuse what is no model, in words that say how to get one.
+
+    Raises:
+        OsimliteError: `given` is something else, most often the path of a file.
+    """
+    if isinstance(given, Model):
+        return
+    if isinstance(given, str | PurePath):
+        raise OsimliteError(f"a Model is wanted here, not a path; read the file first: osimlite.read('{given}')")
+    raise OsimliteError(f"a Model is wanted here, not a {type(given).__name__}; osimlite.read(path) returns one")
+
+
+def _append(members: list[Any], component: Component) -> None:
+    for member in members:
+        if member is component:
+            raise ModelError(f"{type(component).__name__} '{component.name}' is in the model already")
+        if component.name and member.name == component.name:
+            raise ModelError(
+                f"there is a {type(member).__name__} '{component.name}' in the model already; "
+                f"give this {type(component).__name__} another name"
+            )
+    members.append(component)

@@ -130,7 +130,9 @@ class Tree:
         """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
         found = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
         if found is None:
-            raise ModelError(f"no component at '{path}'{did_you_mean(path, self.by_path)}")
+            named = [known for known in self.by_path if _last(known) == _last(f"/{path}")]
+            better = f"; did you mean '{named[0]}'?" if named else did_you_mean(path, self.by_path)
+            raise ModelError(f"no component at '{path}'{better}")
         return found
 
     def uses(self) -> Iterator[Use]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import pydoc
 from importlib import import_module
 
 import pytest
@@ -140,3 +141,37 @@ def test_coordinates_that_were_named_keep_their_names_in_a_model():
     joint.coordinates[1].name = "swing"
     model.add(joint.between(model.ground, model.add(Body(name="thigh", mass=1.0))))
     assert [coordinate.name for coordinate in joint.coordinates] == ["hip_coord_0", "swing"]
+
+
+@pytest.mark.parametrize(
+    ("cls", "given", "meant"),
+    [
+        ("ContactSphere", "frame", "socket_frame"),
+        ("PinJoint", "parent", "socket_parent_frame"),
+        ("Body", "mas", "mass"),
+    ],
+)
+def test_a_socket_is_known_by_the_middle_of_its_name(cls, given, meant):
+    with pytest.raises(MissingNameError, match=f"did you mean '{meant}'"):
+        CLASSES[cls](**{given: "/ground"})
+
+
+def test_a_list_where_a_set_belongs_is_told_how_to_make_the_set():
+    with pytest.raises(ModelError, match=r"write HuntCrossleyForce\.ContactParametersSet\(objects=\[\.\.\.\]\)"):
+        CLASSES["HuntCrossleyForce"](contact_parameters=[CLASSES["HuntCrossleyContactParameters"]()])
+
+
+@every_class
+def test_the_docstring_has_every_property(cls):
+    own = cls.__dict__["__doc__"]
+    if own is None:
+        return
+    assert own.splitlines()[0] in cls.__doc__
+    section = pydoc.render_doc(cls, renderer=pydoc.plaintext).split("Properties, in the order of a file:")[1]
+    for spec in field_specs(cls).values():
+        assert f" {spec.name}: " in section
+
+
+def test_the_docstring_says_units_and_defaults():
+    assert "    mass_center: 3 numbers in m; 0 0 0 by default" in CLASSES["Body"].__doc__
+    assert "socket_frame: the name of a PhysicalFrame; nothing by default" in CLASSES["ContactSphere"].__doc__

@@ -125,3 +125,37 @@ def test_inputs_follow_a_name() -> None:
     assert table.input_inputs == ("/jointset/knee/RKnee_rz|speed(flexion)", "/none|value")
     with pytest.raises(ModelError, match="RKneeLimitTorque and /table name it"):
         osimlite.schema.editing.remove(model, model["/jointset/knee"])
+
+
+def test_a_model_takes_no_second_component_of_a_name(walker: Model) -> None:
+    with pytest.raises(ModelError, match="there is a Body 'Pelvis' in the model already"):
+        walker.add(Body(name="Pelvis", mass=1))
+    body = Body(name="Head", mass=1)
+    walker.add(body)
+    with pytest.raises(ModelError, match="Body 'Head' is in the model already"):
+        walker.add(body)
+    # A joint of that name is another matter: it has another path.
+    walker.add(PinJoint(name="Pelvis"))
+    assert walker["/jointset/Pelvis"].path == "/jointset/Pelvis"
+
+
+def test_a_name_alone_is_answered_with_its_path(walker: Model) -> None:
+    with pytest.raises(
+        ModelError, match="no component at 'RHip_rz'; did you mean '/jointset/RightThighToPelvis/RHip_rz'"
+    ):
+        walker["RHip_rz"]
+
+
+@pytest.mark.parametrize("function", ["mechanism", "to_urdf", "to_text", "simulate"])
+def test_a_path_in_place_of_a_model_is_told_to_be_read(function: str) -> None:
+    with pytest.raises(
+        osimlite.OsimliteError, match=r"a Model is wanted here, not a path; .* osimlite.read\('x.osim'\)"
+    ):
+        getattr(osimlite, function)("x.osim")
+    with pytest.raises(osimlite.OsimliteError, match="a Model is wanted here, not a NoneType"):
+        getattr(osimlite, function)(None)
+
+
+def test_a_class_that_is_not_there_is_answered_with_the_nearest() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'PinJont'; did you mean 'PinJoint'"):
+        osimlite.PinJont  # noqa: B018

@@ -108,7 +108,8 @@ def test_spellings_are_what_would_be_right(walker: Model) -> None:
 def test_duplicates_are_renamed_and_found_by_their_new_name() -> None:
     model = Model(name="m")
     first, second, third = (Body(name="b", mass=float(n)) for n in (1, 2, 3))
-    model.add(first, second, third)
+    model.body_set.objects.extend((first, second, third))
+    model.tree()
     assert [b.path for b in (first, second, third)] == ["/bodyset/b", "/bodyset/b_0", "/bodyset/b_1"]
     assert [(r.component, r.name, r.first) for r in model.tree().renamed] == [
         (second, "b_0", first),
