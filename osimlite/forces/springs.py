@@ -8,6 +8,8 @@ three-dimensional model of the knee", Journal of Biomechanical Engineering 113 (
 
 from __future__ import annotations
 
+from math import pi
+
 
 def coordinate_spring_force(q: float, u: float, k: float, q0: float, c: float) -> float:
     """Generalized force -k (q - q0) - c u, in N.m (N for a translation).
@@ -110,3 +112,20 @@ def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:
     if e < e1:
         return k * l0 * e * e * e / (6.0 * e1)
     return k * l0 * (0.5 * e * (e - e1) + e1 * e1 / 6.0)
+
+
+def mckibben_tension(L: float, p: float, n: float, B: float, l0: float) -> float:
+    """Tension p (3 (L - l0)^2 - B^2) / (4 pi n^2) of a pneumatic muscle, N.
+
+    Source: C.-P. Chou and B. Hannaford, "Measurement and modeling of McKibben pneumatic artificial muscles", IEEE
+    Transactions on Robotics and Automation 12 (1996) 90-102.
+
+    Args:
+        L: length of the path, m.
+        p: pressure, Pa.
+        n: number of turns of the thread, 1.
+        B: length of the thread, m.
+        l0: length of the cord in the path, m.
+    """
+    length = L - l0
+    return p * (3.0 * length * length - B * B) / (4.0 * pi * n * n)

@@ -1,7 +1,4 @@
-"""Actuators, whose controls are functions of time, and prescribed forces, as force elements.
-
-A control that nothing sets is 0. OpenSim keeps it within no limits.
-"""
+"""Actuators, whose controls are functions of time, and prescribed forces, as force elements."""
 
 from __future__ import annotations
 
@@ -21,61 +18,14 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.base import Unknown
-from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.controllers import Controller
 from osimlite.schema.prescribed import PrescribedForce
-from osimlite.simulation.elements import ElementBuilder, Triple, kind_of, triple
+from osimlite.simulation.controls import Control, controllers
+from osimlite.simulation.elements import ElementBuilder, Triple, triple
 from osimlite.simulation.field import TIME, Writer
 from osimlite.simulation.script import ZERO, Matrix, Scalar, Vector, matrix
 from osimlite.simulation.spring_elements import Element
 
 STILL: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-@dataclass(frozen=True)
-class Control:
-    """What sets an actuator: the sum of some functions of time, times the optimal force (N, N.m)."""
-
-    optimal_force: float
-    functions: tuple[Function, ...]
-
-    @classmethod
-    def of(cls, builder: ElementBuilder, actuator: Any) -> Control:
-        """Gather what the controllers of the model do to an actuator.
-
-        Raises:
-            UnsupportedError: it is driven by a controller that is no plain PrescribedController.
-        """
-        functions: list[Function] = []
-        for controller in builder.tree.components:
-            if isinstance(controller, Unknown) or not isinstance(controller, Controller) or not controller.enabled:
-                continue
-            for place, value in enumerate(controller.socket_actuators):
-                if builder.target(controller, "socket_actuators", value) is actuator:
-                    functions.append(cls._function(builder, controller, place, actuator))
-        builder.check(actuator, (actuator.optimal_force,))
-        return cls(actuator.optimal_force, tuple(functions))
-
-    @staticmethod
-    def _function(builder: ElementBuilder, controller: Controller, place: int, actuator: Any) -> Function:
-        what = f" driven by the {kind_of(controller)} '{builder.path(controller)}'"
-        if not isinstance(controller, PrescribedController):
-            raise builder.unsupported(actuator, what)
-        if controller.controls_file:
-            raise builder.unsupported(actuator, f"{what} with a file of controls")
-        given = controller.ControlFunctions.objects
-        if len(given) != len(controller.socket_actuators):
-            raise ModelError(
-                f"'{builder.path(controller)}' has {len(given)} functions for {len(controller.socket_actuators)} "
-                "actuators; give it one for each"
-            )
-        return builder.function(actuator, given[place], f"control by {builder.path(controller)}")
-
-    def write(self, writer: Writer) -> Scalar:
-        """The force or torque."""
-        script = writer.script
-        return script.sum(*((self.optimal_force, writer.evaluate(item, TIME)) for item in self.functions))
 
 
 @dataclass(frozen=True)
@@ -226,11 +176,10 @@ class IdleActuator(Element):
             UnsupportedError: something drives it. A PrescribedController has one function for the six controls, and
                 OpenSim 4.6 takes the other five from whatever is in memory.
         """
-        for controller in builder.tree.components:
-            if not isinstance(controller, Unknown) and isinstance(controller, Controller) and controller.enabled:
-                named = (builder.target(controller, "socket_actuators", item) for item in controller.socket_actuators)
-                if any(item is force for item in named):
-                    raise builder.unsupported(force, f" driven by '{builder.path(controller)}'")
+        for controller in controllers(builder):
+            named = (builder.target(controller, "socket_actuators", item) for item in controller.socket_actuators)
+            if any(item is force for item in named):
+                raise builder.unsupported(force, f" driven by '{builder.path(controller)}'")
         return cls(builder.path(force), force.name)
 
     def write(self, writer: Writer) -> None:

@@ -25,7 +25,7 @@ from osimlite.simulation.elements import triple
 from osimlite.simulation.field import TIME, Writer, value_of
 from osimlite.simulation.script import ZERO, Matrix, Scalar, Vector, matrix
 from osimlite.simulation.spring_elements import Element
-from osimlite.simulation.storage import StoTable, read_sto
+from osimlite.simulation.storage import StoTable, read_beside
 from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:
@@ -152,8 +152,7 @@ def _data(loads: ExternalLoads, folder: Path, file: str) -> _Columns:
     name = loads.datafile.strip()
     if not name:
         raise ModelError("it names no data file; give it a <datafile>", file=file)
-    beside = folder / name
-    return _Columns(read_sto(beside if beside.is_file() or not Path(name).is_file() else name))
+    return _Columns(read_beside(folder, name))
 
 
 def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, path: str, file: str) -> ExternalLoad:

@@ -24,6 +24,7 @@ from osimlite.forces import (
     hunt_crossley,
     smooth_contact,
     springs,
+    station_contact,
 )
 from osimlite.multibody.functions import Constant, Function
 from osimlite.multibody.mechanism import GROUND, Mechanism
@@ -35,7 +36,16 @@ from osimlite.translate.robot import Robot, RobotJoint
 
 LAWS: dict[str, Callable[..., Any]] = {
     name: law
-    for module in (bushing, coordinate_limit, ellipsoid_contact, formulas, hunt_crossley, smooth_contact, springs)
+    for module in (
+        bushing,
+        coordinate_limit,
+        ellipsoid_contact,
+        formulas,
+        hunt_crossley,
+        smooth_contact,
+        springs,
+        station_contact,
+    )
     for name, law in vars(module).items()
     if isinstance(law, FunctionType) and law.__module__ == module.__name__
 }

@@ -12,7 +12,7 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_forces import ElasticFoundationForce, MeyerFregly2016Force, SmoothSphereHalfSpaceForce
 from osimlite.schema.prescribed import ExternalForce, PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -38,6 +38,7 @@ from osimlite.simulation.mesh_contact import elastic_foundation
 from osimlite.simulation.path_elements import PATH_MAKERS
 from osimlite.simulation.smooth_contact_element import SmoothContact
 from osimlite.simulation.spring_elements import CoordinateFormula, CoordinateSpring, PointSpring
+from osimlite.simulation.station_contact_element import StationContact
 
 MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
     **PATH_MAKERS,
@@ -54,6 +55,7 @@ MAKERS: dict[type, Callable[[ElementBuilder, Any], ForceElement]] = {
     ExpressionBasedPointToPointForce: PointSpring.of_formula,
     ExternalForce: load_in_model,
     FunctionBasedBushingForce: Bushing.by_functions,
+    MeyerFregly2016Force: StationContact.of,
     PointToPointSpring: PointSpring.of,
     SmoothSphereHalfSpaceForce: SmoothContact.of,
     SpringGeneralizedForce: CoordinateSpring.of,

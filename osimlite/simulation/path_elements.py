@@ -1,15 +1,17 @@
-"""Springs and ligaments along a path through points that are fixed in bodies, as force elements."""
+"""Springs, ligaments and actuators along a path through points that are fixed in bodies, as force elements."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function
+from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.simulation.controls import Control
 from osimlite.simulation.elements import ElementBuilder, Triple, kind_of, triple
 from osimlite.simulation.field import Writer, integral
 from osimlite.simulation.formula import Formula
@@ -180,6 +182,51 @@ class Blankevoort(PathElement):
         return tension, energy, (elastic, damping, tension, length, rate, strain, strain_rate)
 
 
+@dataclass(frozen=True)
+class PathDrive(PathElement):
+    """One PathActuator, which pulls with its control."""
+
+    recorded = ("",)
+
+    control: Control
+
+    @classmethod
+    def of(cls, builder: ElementBuilder, force: PathActuator) -> PathDrive:
+        """The element of an actuator."""
+        control = Control.of(builder, force)
+        return cls(builder.path(force), force.name, path_points(builder, force), control)
+
+    def tension(self, writer: Writer, length: Scalar, rate: Scalar) -> tuple[Scalar, Scalar, tuple[Scalar, ...]]:
+        """The control times the optimal force."""
+        tension = self.control.write(writer)
+        return tension, 0.0, (tension,)
+
+
+@dataclass(frozen=True)
+class McKibben(PathElement):
+    """One McKibbenActuator, whose control is a pressure; `constants` are n, B, l0 of the law."""
+
+    recorded = ("",)
+
+    control: Control
+    constants: Triple
+
+    @classmethod
+    def of(cls, builder: ElementBuilder, force: McKibbenActuator) -> McKibben:
+        """The element of an actuator."""
+        constants = force.number_of_turns, force.thread_length, force.cord_length
+        builder.check(force, constants)
+        if force.number_of_turns == 0.0:
+            raise ModelError(f"the number_of_turns of '{builder.path(force)}' is 0; give it some")
+        pressure = replace(Control.of(builder, force), optimal_force=1.0)
+        return cls(builder.path(force), force.name, path_points(builder, force), pressure, constants)
+
+    def tension(self, writer: Writer, length: Scalar, rate: Scalar) -> tuple[Scalar, Scalar, tuple[Scalar, ...]]:
+        """As the law has it."""
+        tension: Scalar = writer.call("mckibben_tension", length, self.control.write(writer), *self.constants)
+        return tension, 0.0, (tension,)
+
+
 def path_points(builder: ElementBuilder, force: Any) -> tuple[Point, ...]:
     """The points of a force's path.
 
@@ -213,5 +260,7 @@ PATH_MAKERS: dict[type, Callable[[ElementBuilder, Any], PathElement]] = {
     Blankevoort1991Ligament: Blankevoort.of,
     ExpressionBasedPathForce: PathFormula.of,
     Ligament: LigamentElement.of,
+    McKibbenActuator: McKibben.of,
+    PathActuator: PathDrive.of,
     PathSpring: PathSpringElement.of,
 }

@@ -120,6 +120,12 @@ def read_sto(path: str | Path) -> StoTable:
         )
 
 
+def read_beside(folder: Path, name: str) -> StoTable:
+    """Read a table that a document names: looked for in the document's folder, then from where the program runs."""
+    beside = folder / name
+    return read_sto(beside if beside.is_file() or not Path(name).is_file() else name)
+
+
 def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str) -> Iterator[str]:
     yield f"{name}\n"
     yield f"inDegrees={'yes' if in_degrees else 'no'}\n"

@@ -108,10 +108,6 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
             lambda: controlled(ControlSetController(name="c")),
             r"'/forceset/a' \(CoordinateActuator driven by the ControlSetController '/controllerset/c'\)",
         ),
-        (
-            lambda: controlled(prescribed(Constant(), controls_file="controls.sto")),
-            r"PrescribedController '/controllerset/c' with a file of controls",
-        ),
         (by_body, r"'/forceset/a' \(BodyActuator driven by '/controllerset/c'\)"),
     ],
 )

@@ -1,0 +1,107 @@
+"""Actuators on paths, contact of stations, and controls from files against a live OpenSim 4.6."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from osimlite.errors import ModelError
+from osimlite.multibody import build_mechanism
+from osimlite.schema.actuators import CoordinateActuator
+from osimlite.schema.contact_forces import MeyerFregly2016Force
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.functions import Constant
+from osimlite.schema.markers import Station
+from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
+from osimlite.simulation import write_sto
+from osimlite.simulation.elements import force_elements
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytestmark = pytest.mark.oracle
+
+from tests.oracle.test_forces import JOINTS, along, carrier, compare, drive  # noqa: E402
+
+
+@pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
+def model(request, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return carrier(request.param)
+
+
+def test_actuators_along_paths(model, tmp_path):
+    model.add(*along(PathActuator, optimal_force=30.0))
+    drive(model, "along0", "along1")
+    assert compare(model, tmp_path) > 0
+
+
+def test_pneumatic_muscles(model, tmp_path):
+    model.add(*along(McKibbenActuator, optimal_force=30.0, number_of_turns=2.5, thread_length=0.7, cord_length=0.2))
+    drive(model, "along0", "along1")
+    assert compare(model, tmp_path) > 0
+
+
+def test_stations_on_the_floor(model, tmp_path):
+    for number, frame in enumerate(("/bodyset/b0", "/bodyset/b1/f1", "/bodyset/b2", "/ground")):
+        station = Station(name=f"s{number}", socket_parent_frame=frame, location=(0.1, -0.2 * number, 0.3))
+        model.subcomponents.append(station)
+        model.add(
+            MeyerFregly2016Force(
+                name=f"contact{number}",
+                socket_station=f"/s{number}",
+                stiffness=2000.0,
+                dissipation=0.3,
+                dynamic_friction=0.6,
+                viscous_friction=0.4,
+                spring_resting_length=0.02,
+            )
+        )
+    assert compare(model, tmp_path) > 0
+
+
+@pytest.mark.parametrize("method", [None, 0, 1, 3, 5])
+def test_controls_from_a_file(model, method, tmp_path):
+    for name in ("q0_0", "q1_0", "q2_0"):
+        model.add(CoordinateActuator(name=f"on_{name}", coordinate=name, optimal_force=7.0))
+    times = np.linspace(-0.1, 1.0, 23)
+    rows = np.column_stack([np.sin((3.0 + k) * times + k) for k in range(2)])
+    write_sto(tmp_path / "controls.sto", "controls", times, ["on_q0_0", "/forceset/on_q2_0"], rows.tolist())
+    model.add(PrescribedController(name="brain", controls_file="controls.sto", interpolation_method=method))
+    assert compare(model, tmp_path) > 0
+
+
+def test_a_column_beside_a_function_of_the_same_name(model, tmp_path):
+    """The function counts, and the column does not."""
+    model.add(CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0))
+    write_sto(tmp_path / "controls.sto", "controls", [0.0, 1.0], ["/forceset/motor"], [[1.0], [2.0]])
+    brain = PrescribedController(name="brain", controls_file="controls.sto", socket_actuators=("/forceset/motor",))
+    brain.ControlFunctions.objects.append(Constant(value=5.0))
+    model.add(brain)
+    assert compare(model, tmp_path) > 0
+
+
+@pytest.mark.parametrize(
+    ("label", "method", "words"),
+    [
+        ("moter", None, "the column 'moter' .* did you mean 'motor'"),
+        ("motor", None, "by a function and by the column 'motor'; leave one out"),
+        ("other", 2, "is 2, which 2 rows do not allow"),
+        ("other", 3, "is 3, which 2 rows do not allow"),
+    ],
+)
+def test_files_that_do_not_fit(label, method, words, tmp_path):
+    """OpenSim refuses these too."""
+    model = carrier(JOINTS["pin, slider, universal"])
+    for name, coordinate in (("motor", "q1_0"), ("other", "q0_0")):
+        model.add(CoordinateActuator(name=name, coordinate=coordinate))
+    write_sto(tmp_path / "controls.sto", "controls", [0.0, 1.0], [label], [[1.0], [2.0]])
+    brain = PrescribedController(
+        name="brain",
+        controls_file="controls.sto",
+        socket_actuators=("/forceset/motor",),
+        interpolation_method=method,
+    )
+    brain.ControlFunctions.objects.append(Constant(value=5.0))
+    model.add(brain)
+    with pytest.raises(ModelError, match=words):
+        force_elements(model, build_mechanism(model), folder=tmp_path)
