@@ -46,6 +46,8 @@ class Config:
 
     def wants(self, rule: Rule) -> bool:
         """Whether a rule runs."""
+        if not self.select and not self.ignore:
+            return True
         selected = not self.select or any(rule.matches(word) for word in self.select)
         return selected and not any(rule.matches(word) for word in self.ignore)
 

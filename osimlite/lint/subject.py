@@ -63,7 +63,7 @@ class Subject:
         """The file the text came from."""
         return self.source.file if self.source is not None else None
 
-    @property
+    @cached_property
     def folder(self) -> Path | None:
         """The folder of the file, None for a model that is in no file."""
         return Path(self.file).parent if self.file is not None and Path(self.file).is_file() else None

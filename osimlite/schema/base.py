@@ -169,26 +169,14 @@ class Object(BaseModel, metaclass=ObjectType):
         """What the file said about this object beyond its properties."""
         return cast("Layout | None", self._layout)
 
-    def objects_held(self, *, plain: bool = True) -> list[tuple[FieldSpec, Object]]:
-        """Every object this one owns, with the property that holds it, in printing order.
-
-        Without the `plain` ones, what no one has asked for is left out if nothing in it has a path or names another.
-        """
+    def objects_held(self) -> list[tuple[FieldSpec, Object]]:
+        """Every object this one owns, with the property that holds it, in printing order."""
         held: list[tuple[FieldSpec, Object]] = []
         state = self.__dict__
-        for spec, name, is_list, is_plain in holding(type(self)):
-            if is_list:
-                # A list that no one has asked for is empty.
-                for item in state.get(name, ()):
-                    held.append((spec, item))
-                continue
-            if name in state:
-                value = state[name]
-            elif is_plain and not plain:
-                continue
-            else:
-                value = getattr(self, name)
-            if isinstance(value, list):
+        for spec, name, is_list, _ in holding(type(self)):
+            # A list that no one has asked for is empty.
+            value: Any = state[name] if name in state else () if is_list else getattr(self, name)
+            if is_list or isinstance(value, list):
                 held += [(spec, item) for item in value]
             elif value is not None:
                 held.append((spec, value))
@@ -363,14 +351,22 @@ def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Held))
 
 
-@cache
-def holding(cls: type[Object]) -> tuple[tuple[FieldSpec, str, bool, bool], ...]:
-    """The properties of `cls` that hold objects.
+class Holding(NamedTuple):
+    """A property that holds objects, and what it holds as long as no one asks for it.
 
-    Each with its name, whether it is a list that is empty by default, and whether its default is one object in which
-    nothing has a path or names another.
+    Either a list, which is empty, or an object, which is plain if nothing in it has a path or names another.
     """
-    return tuple((spec, spec.name, spec.factory is ObjectList, _is_plain(spec)) for spec in object_specs(cls))
+
+    spec: FieldSpec
+    name: str
+    is_list: bool
+    is_plain: bool
+
+
+@cache
+def holding(cls: type[Object]) -> tuple[Holding, ...]:
+    """The properties of `cls` that hold objects."""
+    return tuple(Holding(spec, spec.name, spec.factory is ObjectList, _is_plain(spec)) for spec in object_specs(cls))
 
 
 def _is_plain(spec: FieldSpec) -> bool:

@@ -15,6 +15,7 @@ from osimlite.errors import ModelError
 from osimlite.schema.base import (
     Component,
     FieldSpec,
+    Holding,
     Object,
     field_specs,
     holding,
@@ -93,8 +94,8 @@ class Tree:
         self._parents: dict[int, Component] = {}
         self._owners: dict[int, Component] = {}
         self._naming: list[tuple[Object, Component]] = []
-        # What an object of a class is put into, whether it can name others, and whether it can hold others.
-        self._shelves: dict[type[Object], tuple[list[Object], bool, bool]] = {}
+        # By class: what its objects are put into, whether they can name others, and what they can hold.
+        self._shelves: dict[type[Object], tuple[list[Object], bool, tuple[Holding, ...]]] = {}
         self._names: dict[str, dict[str, Component]] = {}
         self._resolved: dict[tuple[str, str, str], Resolution] = {}
         self._parts: dict[int, tuple[Component, list[Component]]] = {}
@@ -258,23 +259,28 @@ class Tree:
         shelf = self._shelves.get(cls)
         if shelf is None:
             items = self.by_class[cls] = []
-            shelf = self._shelves[cls] = items, _names_others(cls), bool(holding(cls))
-        items, names_others, holds_others = shelf
+            shelf = self._shelves[cls] = items, _names_others(cls), holding(cls)
+        items, names_others, holds = shelf
         items.append(holder)
         if names_others:
             self._naming.append((holder, owner))
-        if not holds_others:
-            return
-        for spec, item in holder.objects_held(plain=False):
-            if item.is_component:
-                component = cast("Component", item)
-                children.append((_name_in_tree(spec, component), component))
-            else:
-                self._owners[id(item)] = owner
-                self._enter(item, owner, children)
+        state = holder.__dict__
+        for spec, name, is_list, is_plain in holds:
+            value = state.get(name)
+            if value is None:
+                # Of what no one has asked for, lists are empty and plain objects have no part in the tree.
+                if is_list or is_plain or name in state:
+                    continue
+                value = getattr(holder, name)
+            for item in value if isinstance(value, list) else (value,):
+                if item.is_component:
+                    children.append((_name_in_tree(spec, item), item))
+                else:
+                    self._owners[id(item)] = owner
+                    self._enter(item, owner, children)
 
     def _own(self, holder: Object, owner: Component) -> None:
-        for _, item in holder.objects_held(plain=False):
+        for _, item in holder.objects_held():
             if not item.is_component:
                 self._owners[id(item)] = owner
                 self._own(item, owner)

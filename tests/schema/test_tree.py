@@ -14,6 +14,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Reference
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.frames import Body
+from osimlite.schema.geometry import Geometry
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Use, normalised
@@ -182,3 +183,21 @@ def test_a_frame_takes_over_only_the_geometry_it_draws():
     tree = model.tree()
     failures = {use.owner.name: tree.resolve(use).failure for use in tree.uses() if use.value == "/nowhere"}
     assert failures == {"drawn": None, "held": "missing"}
+
+
+def test_an_object_that_is_made_when_someone_asks_for_it_has_an_owner(walker: Model) -> None:
+    tree = walker.tree()
+    mesh = next(item for item in walker.components(Geometry) if "appearance" not in item.__dict__)
+    appearance = mesh.appearance
+    assert not any(item is appearance for item in tree.by_class.get(type(appearance), ()))
+    assert tree.owner_of(appearance) is mesh
+    assert tree.owner_of(appearance.surface_properties) is mesh
+
+
+def test_every_object_of_the_file_is_found_by_its_class(walker: Model) -> None:
+    by_class = walker.tree().by_class
+    found = [id(item) for items in by_class.values() for item in items]
+    assert len(found) == len(set(found))
+    assert all(type(item) is cls for cls, items in by_class.items() for item in items)
+    assert {id(item) for item in walker.walk() if item._index is not None} <= set(found)
+    assert [id(item) for item in walker.components(Body)] == [id(item) for item in by_class[Body]]

@@ -38,11 +38,11 @@ def missing_mesh(subject: Subject, found: Found) -> None:
         </Cylinder> </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    folder = subject.folder
-    if folder is None:
-        return
     items: list[tuple[Object, str, str]] = [(mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)]
     items += [(mesh, "filename", mesh.filename) for mesh in subject.each(ContactMesh)]
+    folder = subject.folder if items else None
+    if folder is None:
+        return
     beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
     places = [str(path) for path in beside]
     tried = listed(dict.fromkeys(places))
@@ -128,25 +128,26 @@ def missing_data_file(subject: Subject, found: Found) -> None:
     </PrescribedController>
     ```
     """
-    if subject.folder is None:
+    tags = {
+        "PrescribedController": "controls_file",
+        "ControlSetController": "controls_file",
+        "ExternalLoads": "datafile",
+        "TableSource": "filename",
+    }
+    items = [(item, cls, tag) for cls, tag in tags.items() for item in subject.named(cls)]
+    if not items or subject.folder is None:
         return
     places = [str(subject.folder), ""]
     folders = _Folders()
-    for cls, tag in (
-        ("PrescribedController", "controls_file"),
-        ("ControlSetController", "controls_file"),
-        ("ExternalLoads", "datafile"),
-        ("TableSource", "filename"),
-    ):
-        for item in subject.named(cls):
-            name = getattr(item, tag)
-            if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
-                continue
-            if name and any(folders.has(place, name) for place in places):
-                continue
-            twin = folders.in_other_case(places, name)
-            fate = "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
-            found(f"the file '{name}' of {called(item)} is not there: {fate}", item, tag=tag, suggestion=twin)
+    for item, cls, tag in items:
+        name = getattr(item, tag)
+        if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
+            continue
+        if name and any(folders.has(place, name) for place in places):
+            continue
+        twin = folders.in_other_case(places, name)
+        fate = "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
+        found(f"the file '{name}' of {called(item)} is not there: {fate}", item, tag=tag, suggestion=twin)
 
 
 class _Folders:
