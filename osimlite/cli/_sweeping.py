@@ -80,6 +80,9 @@ def make_plan(
             raise SettingError(f"'{source}' is a file and takes no parameters; vary its properties by their paths")
         return plan(read(source), ranges, **choices)
     given = _words(parameter or [], "-p")
+    both = [name for name in ranges if name in given]
+    if both:
+        raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
     known = {name: default for name, default in parameters_of(source).items() if name not in given}
     return plan(partial(_make, make_model, source, given), ranges, parameters=known, **choices)
 

@@ -19,7 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from osimlite._load import module_named, module_of_file
-from osimlite.errors import SettingError
+from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.many import Runs, Watch
 from osimlite.sweep.variables import Floats
 from osimlite.text import did_you_mean, listed
@@ -158,7 +158,10 @@ def measure(spec: Any, engine: Any) -> Measure:
     if ":" in name:
         return Measure(name, partial(_each, _function(name)), room=_room)
     if "/" in name:
-        place, locked = _state_place(engine, name)
+        try:
+            place, locked = _state_place(engine, name)
+        except ModelError as error:
+            raise SettingError(f"there is no measure '{name}': {error.message}") from None
         return Measure(name, partial(_ends, place, locked))
     near = did_you_mean(name, BUILT_IN)
     raise SettingError(f"there is no measure '{name}'{near}; there is {listed(BUILT_IN)}, and module:function")

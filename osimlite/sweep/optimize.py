@@ -18,7 +18,7 @@ from osimlite.files import make_folder, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, differences, schema, settings_of
+from osimlite.sweep.results import Partial, differences, partial_of, schema, settings_of
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
@@ -187,8 +187,7 @@ def _start(
 
 def _open(path: Path, table: Any, resume: bool, evaluations: _Evaluations) -> Partial:
     """The history, and what is in it already."""
-    partial_is_there = path.with_name(f"{path.name}.partial").exists()
-    if resume and path.exists() and not partial_is_there:
+    if resume and path.exists() and not partial_of(path).exists():
         before = settings_of(path)
         unlike = differences(before, json.loads(table.metadata[b"osimlite"]))
         if unlike:
@@ -300,9 +299,8 @@ def _finish(
     where: Path, plan: Plan, variants: Variants, evaluations: _Evaluations, wanted: dict[str, Any], ended: str
 ) -> Optimum:
     if evaluations.best is None:
-        raise SimulationError(
-            f"none of {evaluations.count} runs came to its end; {listed(evaluations.reasons, most=1)}"
-        )
+        first = evaluations.reasons[0] if evaluations.reasons else "the budget is smaller than one population"
+        raise SimulationError(f"no run came to its end: {first}")
     cost, number, row = evaluations.best
     variants.put(row)
     variants.set_start(row)

@@ -18,6 +18,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.variables import Parameter, Range, Variable, variables
+from osimlite.text import did_you_mean
 
 Maker = Callable[[Mapping[str, float]], Model]
 """Makes a model from the values of some of its parameters."""
@@ -134,7 +135,8 @@ def plan(
         ModelError: the model is no mechanism.
     """
     model = source if isinstance(source, Model) else source({})
-    found = variables(vary, model, build_mechanism(model), parameters)
+    mechanism = build_mechanism(model)
+    found = variables(vary, model, mechanism, parameters)
     needs_maker = any(isinstance(item.target, Parameter) for item in found)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), found, make=make)
@@ -142,4 +144,8 @@ def plan(
     for name, value in (("to", made.to), ("accuracy", made.accuracy), ("report_interval", made.report_interval)):
         if value is not None and not (isfinite(value) and value > 0.0):
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
+    names = [name for info in mechanism.coordinates for name in (info.name, info.path)]
+    for stop in made.stops:
+        if stop.coordinate not in names:
+            raise SettingError(f"there is no coordinate '{stop.coordinate}'{did_you_mean(stop.coordinate, names)}")
     return made

@@ -54,6 +54,11 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return found
 
 
+def partial_of(path: Path) -> Path:
+    """Where the rows of a file are until all of them are there."""
+    return path.with_name(f"{path.name}.partial")
+
+
 class Partial:
     """A table that grows; close it after use.
 
@@ -72,10 +77,9 @@ class Partial:
 
     def __init__(self, path: Path, table: Any, *, resume: bool = False) -> None:
         self.path, self.schema, self.rows = path, table, 0
-        self.partial = path.with_name(f"{path.name}.partial")
-        self._waiting: list[Any] = []
         if path.is_dir():
             raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(path))
+        self.partial = partial_of(path)
         is_there = self.partial.exists()
         if is_there and not resume:
             raise SettingError(f"an interrupted sweep is in '{self.partial}'; go on with --resume, or remove that file")
@@ -105,7 +109,9 @@ class Partial:
             _batches(stream, take)
 
     def finish(self) -> Path:
-        """Make the Parquet file of it, which appears whole."""
+        """Make the Parquet file of it, which appears whole; without rows there is none."""
+        if self.rows == 0:
+            return self.path
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
         pa = _arrow()
         self._stream.close()
@@ -114,15 +120,21 @@ class Partial:
         try:
             with pq.ParquetWriter(beside, self.schema) as writer:
 
+                def put(least: int) -> None:
+                    table = pa.Table.from_batches(waiting, self.schema)
+                    while table.num_rows >= least:
+                        # Whatever pieces the rows came in, the file is the same.
+                        writer.write_table(table.slice(0, ROWS_PER_GROUP).combine_chunks())
+                        table = table.slice(ROWS_PER_GROUP)
+                    waiting[:] = table.to_batches()
+
                 def take(batch: Any) -> None:
                     waiting.append(batch)
                     if sum(item.num_rows for item in waiting) >= ROWS_PER_GROUP:
-                        writer.write_table(pa.Table.from_batches(waiting, self.schema))
-                        waiting.clear()
+                        put(ROWS_PER_GROUP)
 
                 self.read(take)
-                if waiting:
-                    writer.write_table(pa.Table.from_batches(waiting, self.schema))
+                put(1)
             beside.replace(self.path)
         except OSError as error:
             raise OsimliteError(f"cannot write the file: {error.strerror or error}", file=str(self.path)) from None
@@ -132,8 +144,10 @@ class Partial:
         return self.path
 
     def close(self) -> None:
-        """Let go of the file, and leave it as it is."""
+        """Let go of the file, and leave it as it is; one without rows is removed."""
         self._stream.close()
+        if self.rows == 0:
+            self.partial.unlink(missing_ok=True)
 
     def _reopen(self) -> None:
         """Count what is there, and cut off what is not whole."""

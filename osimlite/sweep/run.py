@@ -15,7 +15,7 @@ from osimlite.errors import OsimliteError
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, differences, schema, settings_of
+from osimlite.sweep.results import Partial, differences, partial_of, schema, settings_of
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
 
@@ -93,7 +93,7 @@ def sweep(
     path, started = Path(output), time.perf_counter()
     wanted = settings(plan, samples)
     table = schema(columns(plan), wanted)
-    if resume and path.exists() and not path.with_name(f"{path.name}.partial").exists():
+    if resume and path.is_file() and not partial_of(path).exists():
         if unlike := differences(settings_of(path), wanted):
             raise OsimliteError(f"'{path}' has other settings: {', '.join(unlike)}; give the results another name")
         return Outcome(path, samples.count, samples.count)

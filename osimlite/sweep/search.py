@@ -49,6 +49,8 @@ class Search(NamedTuple):
 def cma(ask: Ask, search: Search) -> str:
     """Covariance matrix adaptation (Hansen's pycma); why it ended."""
     strategy = require("cma", extra="optimize", purpose="the search by cma")
+    if len(search.start) < 2:
+        raise SettingError("cma searches two variables or more; take --method nelder-mead for one")
     source = np.random.RandomState(search.seed)
     options: dict[str, Any] = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "randn": source.randn, "seed": np.nan}
     if search.popsize is not None:
@@ -77,6 +79,7 @@ def differential_evolution(ask: Ask, search: Search) -> str:
         init=first,
         maxiter=search.budget,
         tol=search.tolerance if search.tolerance is not None else 0.01,
+        atol=search.tolerance or 0.0,
         vectorized=True,
         updating="deferred",
         polish=False,

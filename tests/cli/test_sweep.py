@@ -1,0 +1,95 @@
+"""The commands that sweep and search."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.cli import main
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
+pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, fixtures: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    osimlite.write(osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim"), tmp_path / "walker.osim")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*words: str) -> int:
+    try:
+        main(list(words))
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
+def test_a_grid(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["sweep", "walker.osim", "--vary", "RHip_rz=20deg:40deg:3", "--vary", "platform_rz=-10deg:-5deg:2"]
+    assert run(*words, "--to", "0.4", "--measure", "distance", "--measure", "RHip_rz/speed", "-o", "grid.parquet") == 0
+    shown = capsys.readouterr().out
+    assert "6 runs" in shown and "6 done" in shown and "grid.parquet" in shown
+    table = pq.read_table("grid.parquet")
+    assert table.column_names == [
+        "run", "RHip_rz", "platform_rz", "status", "reason", "time", "distance", "RHip_rz/speed",
+    ]  # fmt: skip
+    assert table.num_rows == 6
+
+
+def test_parameters_and_stops(folder: Path) -> None:
+    words = ["sweep", "dynamic-walker", "-p", "slope=8", "--vary", "thigh_length=0.35:0.45", "--samples", "4"]
+    assert run(*words, "--stop-below", "Pelvis_ty=70cm", "--sampler", "lhs", "--seed", "3") == 0
+    table = pq.read_table("results.parquet").to_pydict()
+    assert set(table["reason"]) <= {None, "Pelvis_ty below 0.7"} and len(table["run"]) == 4
+
+
+def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+    words = [
+        "optimize",
+        "walker.osim",
+        "--objective",
+        "distance",
+        "--vary",
+        "RHip_rz=0:60deg",
+        "--vary",
+        "LHip_rz=-1:0",
+    ]
+    assert run(*words, "--to", "0.4", "--budget", "12", "--popsize", "6") == 0
+    shown = capsys.readouterr().out
+    summary = json.loads((folder / "optimum" / "summary.json").read_text())
+    assert f"distance {summary['value']:.6g}" in shown and summary["evaluations"] == 12
+    assert osimlite.validate(str(folder / "optimum" / "best.osim")).ok
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["sweep", "walker.osim"], "say what to vary"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz"], "--vary takes"),
+        (["sweep", "walker.osim", "--vary", "RHip_rx=0:1"], "did you mean 'RHip_rz'"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1"], "--samples"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-p", "a=1"], "takes no parameters"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-below", "RHip_rz=low"], "--stop-below takes"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-below", "RHip=0"], "RHip"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "nowhere/r.parquet"], "nowhere"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "."], "folder"),
+        (["sweep", "dynamic-walker", "--vary", "slope=1:5:2", "-p", "slope=2"], "slope"),
+        (["optimize", "walker.osim", "--objective", "speed", "--vary", "RHip_rz=0:1"], "no measure 'speed'"),
+        (["optimize", "none.osim", "--objective", "distance", "--vary", "RHip_rz=0:1"], "none.osim"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(
+    words: list[str], said: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = run(*words)
+    error = capsys.readouterr().err
+    assert code == 2, error
+    assert error.startswith("osimlite: ") and said in error and error.count("\n") == 1
+    assert sorted(path.name for path in folder.iterdir() if path.name != "optimum") == ["walker.osim"]

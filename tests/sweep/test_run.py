@@ -1,0 +1,226 @@
+"""Sweeps here: the same file from any number of workers, whatever interrupts it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import OsimliteError, SettingError
+from osimlite.sweep import results
+from osimlite.sweep.plan import plan
+from osimlite.sweep.results import Partial, differences, ranges, schema, settings_of
+from osimlite.sweep.run import Interrupted, sweep
+from osimlite.sweep.sampling import samples
+
+pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
+VARY = {"RHip_rz": (0.3, 0.7), "/forceset/*Foot*/contact_parameters/stiffness": (1e5, 1e6, "log")}
+
+
+@pytest.fixture
+def made(walker):
+    return plan(walker, VARY, measures=("distance", "largest_force"), to=0.3)
+
+
+def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
+    chosen = samples(made.variables, "sobol", 60, 5)
+    outcomes = [sweep(made, chosen, tmp_path / f"{count}.parquet", workers=count) for count in (1, 2, 3)]
+    whole = outcomes[0].path.read_bytes()
+    assert [outcome.path.read_bytes() == whole for outcome in outcomes] == [True] * 3
+    table = pq.read_table(outcomes[0].path).to_pydict()
+    assert table["run"] == list(range(60)) and table["status"] == ["done"] * 60
+    rows = chosen.block(0, 60)
+    assert table["RHip_rz"] == rows[:, 0].tolist()
+    assert outcomes[0].status == {"done": 60}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["1.parquet", "2.parquet", "3.parquet"]
+
+
+def test_processes_of_bullet_too(walker, tmp_path):
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.2, engine="bullet")
+    chosen = samples(made.variables, "random", 12, 1)
+    whole = [sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 2)]
+    assert whole[0] == whole[1]
+
+
+def test_settings_are_in_the_file(made, tmp_path):
+    chosen = samples(made.variables, "lhs", 5, 3)
+    found = settings_of(sweep(made, chosen, tmp_path / "r.parquet").path)
+    assert found["sampler"] == "lhs" and found["samples"] == 5 and found["seed"] == 3
+    assert found["vary"][0] == {"name": "RHip_rz", "low": 0.3, "high": 0.7}
+    assert found["vary"][1]["log"] is True
+    assert found["engine"] == "compiled" and found["to"] == 0.3 and found["measures"] == ["distance", "largest_force"]
+
+
+class Stopper:
+    """Interrupts, as the keyboard would, once enough is done."""
+
+    def __init__(self, after):
+        self.after = after
+
+    def __call__(self, done, of):
+        if done >= self.after:
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_sweep_goes_on(made, tmp_path):
+    chosen = samples(made.variables, "sobol", 80, 5)
+    whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
+    path = tmp_path / "r.parquet"
+    for after in (10, 40):
+        with pytest.raises(Interrupted, match="--resume"):
+            sweep(made, chosen, path, resume=after > 10, progress=Stopper(after))
+        assert not path.exists() and path.with_name("r.parquet.partial").exists()
+    with pytest.raises(SettingError, match="go on with --resume"):
+        sweep(made, chosen, path)
+    counts = []
+    outcome = sweep(made, chosen, path, resume=True, progress=lambda done, of: counts.append(done))
+    assert path.read_bytes() == whole
+    assert outcome.before >= 4 and outcome.before + sum(outcome.status.values()) == 80
+    assert counts[0] == outcome.before and counts[-1] == 80 and counts == sorted(counts)
+    again = sweep(made, chosen, path, resume=True)
+    assert again.before == 80 and not again.status
+
+
+def test_other_settings_are_told_apart(made, walker, tmp_path):
+    path = tmp_path / "r.parquet"
+    chosen = samples(made.variables, "sobol", 40, 5)
+    with pytest.raises(Interrupted):
+        sweep(made, chosen, path, progress=Stopper(8))
+    with pytest.raises(SettingError, match=r"seed \(5 before, 6 now\)"):
+        sweep(made, samples(made.variables, "sobol", 40, 6), path, resume=True)
+    walker.tree().by_path["/bodyset/Pelvis"].mass = 2.0
+    other = plan(walker, VARY, measures=("distance", "largest_force"), to=0.4)
+    with pytest.raises(SettingError, match=r"other settings: model and to \(0.3 before, 0.4 now\)"):
+        sweep(other, chosen, path, resume=True)
+    (tmp_path / "x.parquet.partial").write_text("something else")
+    with pytest.raises(SettingError, match="no interrupted sweep"):
+        sweep(made, chosen, tmp_path / "x.parquet", resume=True)
+    sweep(made, chosen, path, resume=True)
+    with pytest.raises(OsimliteError, match="another name"):
+        sweep(made, samples(made.variables, "sobol", 41, 5), path, resume=True)
+
+
+def test_a_torn_message_at_the_end_is_cut_off(made, tmp_path):
+    chosen = samples(made.variables, "sobol", 40, 5)
+    whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
+    path, partial = tmp_path / "r.parquet", tmp_path / "r.parquet.partial"
+    with pytest.raises(Interrupted):
+        sweep(made, chosen, path, progress=Stopper(8))
+    with pytest.raises(Interrupted):
+        sweep(made, chosen, path, resume=True, progress=Stopper(30))
+    good = partial.read_bytes()
+    for cut in (1, 7, 100, 300):
+        partial.write_bytes(good[:-cut])
+        path.unlink(missing_ok=True)
+        outcome = sweep(made, chosen, path, resume=True)
+        assert 0 < outcome.before < 40 and path.read_bytes() == whole
+
+
+def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
+    monkeypatch.setattr(results, "ROWS_PER_GROUP", 10)
+    table = schema({"run": "int64", "x": "float64", "status": "string"}, {"a": 1})
+    for name, pieces in {"one": [37], "many": [1, 9, 3, 20, 4], "few": [25, 12]}.items():
+        partial = Partial(tmp_path / name, table)
+        first = 0
+        for size in pieces:
+            rows = np.arange(first, first + size)
+            partial.add([rows, rows * 0.5, [f"s{row % 3}" for row in rows]])
+            first += size
+        partial.close()
+        partial.finish()
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "many").read_bytes() == (tmp_path / "few").read_bytes()
+    file = pq.ParquetFile(tmp_path / "one")
+    assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [10, 10, 10, 7]
+    assert ranges(tmp_path / "one", ["x"])["x"] == (0.0, 0, 18.0, 36, 9.0)
+
+
+def test_differences_in_words():
+    assert differences({"a": 1, "b": [1]}, {"a": 2, "b": [2], "c": 3}) == [
+        "a (1 before, 2 now)",
+        "b",
+        "c (None before, 3 now)",
+    ]
+
+
+def run_command(*words, **kwargs):
+    return subprocess.Popen(
+        [sys.executable, "-m", "osimlite", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **kwargs
+    )
+
+
+@pytest.mark.skipif(os.name == "nt", reason="sends signals")
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGKILL])
+def test_a_command_that_is_ended_goes_on(signum, made, tmp_path: Path, walker):
+    osimlite.write(walker, tmp_path / "walker.osim")
+    words = [
+        "sweep", "walker.osim", "--vary", "RHip_rz=0.3:0.7", "--samples", "4000", "--to", "3", "--workers", "1",
+        "--accuracy", "1e-5",
+    ]  # fmt: skip
+    process = run_command(*words, cwd=tmp_path)
+    partial = tmp_path / "results.parquet.partial"
+    deadline = time.monotonic() + 120
+    start = None
+    while process.poll() is None and time.monotonic() < deadline:
+        size = partial.stat().st_size if partial.exists() else 0
+        start = start or size or None
+        if start and size > start:
+            break
+        time.sleep(0.05)
+    process.send_signal(signum)
+    _, said = process.communicate(timeout=60)
+    if signum == signal.SIGINT:
+        assert process.returncode == 130 and "--resume" in said, said
+    assert partial.exists() and not (tmp_path / "results.parquet").exists()
+    # What is left is many runs, which need not be made for the sake of this test.
+    made = plan(osimlite.read(tmp_path / "walker.osim"), {"RHip_rz": "0.3:0.7"}, to=3.0, accuracy=1e-5)
+    chosen = samples(made.variables, None, 4000)
+    before: list[float] = []
+    with pytest.raises(Interrupted):
+        sweep(made, chosen, tmp_path / "results.parquet", resume=True, progress=lambda n, of: _first(before, n))
+    there = Partial(tmp_path / "results.parquet", schema_of(made, chosen), resume=True)
+    rows = []
+    there.read(lambda batch: rows.extend(batch.to_pylist()))
+    there.close()
+    assert [row["run"] for row in rows] == list(range(len(rows))) and len(rows) >= before[0] > 0
+    assert [row["RHip_rz"] for row in rows] == chosen.block(0, len(rows))[:, 0].tolist()
+
+
+def _first(before, number):
+    before.append(number)
+    if number > before[0]:
+        raise KeyboardInterrupt
+
+
+def schema_of(made, chosen):
+    from osimlite.sweep.run import columns, settings
+
+    return schema(columns(made), settings(made, chosen))
+
+
+def test_memory_does_not_grow_with_the_number_of_runs(made, tmp_path):
+    """Of Python's own objects, after the first hundred runs."""
+    import tracemalloc
+
+    chosen = samples(made.variables, "lhs", 400, 5)
+    peaks = []
+
+    def note(done, of):
+        if not tracemalloc.is_tracing():
+            tracemalloc.start()
+        peaks.append((done, tracemalloc.get_traced_memory()[0]))
+
+    try:
+        sweep(made, chosen, tmp_path / "r.parquet", workers=2, progress=note)
+    finally:
+        tracemalloc.stop()
+    early = max(memory for done, memory in peaks if done <= 200)
+    late = max(memory for done, memory in peaks if done > 200)
+    assert late < early + 1e6

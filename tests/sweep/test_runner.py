@@ -1,0 +1,187 @@
+"""Each run is the simulation of the model that has these numbers, bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from osimlite.errors import OsimliteError, SettingError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.simulation import Simulation
+from osimlite.sweep.plan import Plan, Stop, plan
+from osimlite.sweep.runner import Runner
+
+NUMBERS = {
+    "RHip_rz": (0.2, 0.9),
+    "LKnee_rz/speed": (-1.0, 1.0),
+    "platform_rz": (-0.3, 0.0),
+    "slope": (-0.1, 0.1),
+    "/bodyset/Pelvis/mass": (0.5, 5.0),
+    "/bodyset/*Thigh/mass_center/1": (-0.1, 0.1),
+    "/bodyset/LeftShank/inertia/2": (0.01, 2.0),
+    "/forceset/*Foot*/contact_parameters/stiffness": (1e5, 1e7),
+    "/forceset/LKneeForce/contact_parameters/dissipation": (0.0, 3.0),
+    "/forceset/RFootForce/transition_velocity": (0.05, 0.3),
+    "/forceset/RKneeLimitTorque/upper_limit": (-20.0, 5.0),
+    "/contactgeometryset/RFootContact/radius": (0.03, 0.07),
+    "/contactgeometryset/PlatformContact/location/1": (0.0, 0.05),
+    "/jointset/RightShankToThigh/RKnee_rz/default_value": (-0.7, 0.0),
+}
+STATES = [
+    f"{name}/{what}"
+    for name in ("Pelvis_rz", "Pelvis_tx", "Pelvis_ty", "RHip_rz", "LHip_rz", "RKnee_rz", "LKnee_rz")
+    for what in ("value", "speed")
+]
+
+
+def simulated(model, initial, speeds, to=0.6):
+    """Final state by the ordinary way, in the order of STATES."""
+    with Simulation(model, "compiled") as simulation:
+        trajectory = simulation.run(to, initial=initial, initial_speeds=speeds)
+    columns = list(trajectory.coordinates)
+    found = []
+    for name in STATES:
+        coordinate, _, what = name.partition("/")
+        table = trajectory.values if what == "value" else trajectory.speeds
+        found.append(table[-1, columns.index(coordinate)])
+    return found
+
+
+def changed(chosen, values):
+    """The walker with the numbers written into it by hand."""
+    model = dynamic_walker()
+    initial, speeds = {}, {}
+    at = model.tree().by_path
+    for name, value in zip(chosen, values, strict=True):
+        if name == "RHip_rz":
+            initial[name] = value
+        elif name == "LKnee_rz/speed":
+            speeds["LKnee_rz"] = value
+        elif name == "platform_rz":
+            at["/jointset/PlatformToGround/platform_rz"].default_value = value
+        elif name == "slope":
+            g = 9.80665
+            model.gravity = (g * np.sin(value), -g * np.cos(value), 0.0)
+        elif name == "/bodyset/Pelvis/mass":
+            at["/bodyset/Pelvis"].mass = value
+        elif name == "/bodyset/*Thigh/mass_center/1":
+            for side in ("Left", "Right"):
+                at[f"/bodyset/{side}Thigh"].mass_center = (0.0, value, 0.0)
+        elif name == "/bodyset/LeftShank/inertia/2":
+            at["/bodyset/LeftShank"].inertia = (1.0, 1.0, value, 0.0, 0.0, 0.0)
+        elif name == "/forceset/*Foot*/contact_parameters/stiffness":
+            for side in "LR":
+                at[f"/forceset/{side}FootForce"].contact_parameters.objects[0].stiffness = value
+        elif name == "/forceset/LKneeForce/contact_parameters/dissipation":
+            at["/forceset/LKneeForce"].contact_parameters.objects[0].dissipation = value
+        elif name == "/forceset/RFootForce/transition_velocity":
+            at["/forceset/RFootForce"].transition_velocity = value
+        elif name == "/forceset/RKneeLimitTorque/upper_limit":
+            at["/forceset/RKneeLimitTorque"].upper_limit = value
+        elif name == "/contactgeometryset/RFootContact/radius":
+            at["/contactgeometryset/RFootContact"].radius = value
+        elif name == "/contactgeometryset/PlatformContact/location/1":
+            at["/contactgeometryset/PlatformContact"].location = (0.0, value, 0.0)
+        elif name == "/jointset/RightShankToThigh/RKnee_rz/default_value":
+            at["/jointset/RightShankToThigh/RKnee_rz"].default_value = value
+        else:
+            raise AssertionError(name)
+    return model, initial, speeds
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_a_run_is_the_simulation_of_the_changed_model(data):
+    chosen = data.draw(st.lists(st.sampled_from(sorted(NUMBERS)), min_size=1, max_size=4, unique=True))
+    if "platform_rz" in chosen and "slope" in chosen:
+        chosen.remove("slope")
+    fractions = st.lists(st.sampled_from([0.0, 0.25, 0.5, 0.77, 1.0]), min_size=len(chosen), max_size=len(chosen))
+    rows = [
+        [NUMBERS[name][0] + f * (NUMBERS[name][1] - NUMBERS[name][0]) for name, f in zip(chosen, row, strict=True)]
+        for row in data.draw(st.lists(fractions, min_size=1, max_size=3))
+    ]
+    made = plan(dynamic_walker(), {name: NUMBERS[name] for name in chosen}, measures=tuple(STATES), to=0.6)
+    block = Runner(made).run(np.array(rows))
+    assert block.status == ["done"] * len(rows)
+    for number, row in enumerate(rows):
+        assert [block.measures[name][number] for name in STATES] == simulated(*changed(chosen, row))
+
+
+def test_parameters_of_a_function():
+    def make(parameters):
+        return dynamic_walker(**parameters)
+
+    vary = {"thigh_length": (0.3, 0.5), "RHip_rz": (0.2, 0.6), "/bodyset/Pelvis/mass": (1.0, 2.0)}
+    made = plan(make, vary, parameters={"thigh_length": 0.4, "slope": 10.0}, measures=tuple(STATES), to=0.6)
+    rows = np.array([[0.35, 0.5, 1.5], [0.45, 0.3, 1.0], [0.35, 0.5, 1.25]])
+    block = Runner(made).run(rows)
+    for number, (length, hip, mass) in enumerate(rows.tolist()):
+        model = dynamic_walker(thigh_length=length)
+        model.tree().by_path["/bodyset/Pelvis"].mass = mass
+        assert [block.measures[name][number] for name in STATES] == simulated(model, {"RHip_rz": hip}, {})
+
+
+def test_a_number_that_becomes_zero_changes_the_structure():
+    """A sphere whose centre moves to the origin of its body needs no shift any more."""
+    name = "/jointset/RightThighToPelvis/Pelvis_offset/translation/2"
+    made = plan(dynamic_walker(), {name: (0.0, 0.2)}, measures=tuple(STATES), to=0.3)
+    block = Runner(made).run(np.array([[0.2], [0.0], [0.1]]))
+    assert block.status == ["done"] * 3
+    for number, value in enumerate((0.2, 0.0, 0.1)):
+        model = dynamic_walker()
+        model.tree().by_path["/jointset/RightThighToPelvis/Pelvis_offset"].translation = (0.0, 0.0, value)
+        assert [block.measures[name][number] for name in STATES] == simulated(model, {}, {}, 0.3)
+
+
+def test_runs_that_fail_are_told_of_and_harm_no_others(walker):
+    path = "/forceset/RFootForce/contact_parameters/stiffness"
+    made = plan(walker, {path: (-1e6, 1e6), "RHip_rz": (0.0, 1e300)}, to=0.5)
+    block = Runner(made).run(np.array([[1e6, 0.5], [-1e6, 0.5], [1e6, 1e300], [1e6, 0.5]]))
+    assert block.status == ["done", "failed", "failed", "done"]
+    assert "RFootForce" in (block.reasons[1] or "") and "cannot be computed beyond" in (block.reasons[2] or "")
+    distance = block.measures["distance"]
+    assert distance[0] == distance[3] and np.isnan(distance[1:3]).all()
+
+
+def test_a_model_without_mass_is_a_row_with_a_reason(walker):
+    made = plan(walker, {"/bodyset/*Shank/mass": (-5.0, 1.0)}, to=0.2)
+    block = Runner(made).run(np.array([[-5.0], [1.0]]))
+    assert block.status == ["failed", "done"]
+    assert block.reasons[0]
+
+
+def test_stops(walker):
+    made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=3.0, stops=(Stop("Pelvis_ty", 0.7), Stop("Pelvis_tx", 0.1, False)))
+    made = Plan(**{**vars(made), "measures": ("Pelvis_ty/value", "Pelvis_tx/value")})
+    block = Runner(made).run(np.array([[0.3], [0.5], [0.7]]))
+    assert set(block.status) == {"stopped"}
+    for number, reason in enumerate(block.reasons):
+        name, level = {"Pelvis_ty below 0.7": ("Pelvis_ty", 0.7), "Pelvis_tx above 0.1": ("Pelvis_tx", 0.1)}[reason]
+        assert block.measures[f"{name}/value"][number] == pytest.approx(level, abs=1e-6)
+
+
+def test_what_is_wrong_is_said_before_anything_runs(walker):
+    with pytest.raises(SettingError, match="'to' is a positive number"):
+        plan(walker, {"RHip_rz": (0.0, 1.0)}, to=-1.0)
+    with pytest.raises(SettingError, match="did you mean 'distance'"):
+        Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, measures=("distanz",)))
+    with pytest.raises(OsimliteError, match="no engine"):
+        Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, engine="compild"))
+
+
+def test_bullet_gives_the_same_rows(walker):
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    vary = {"RHip_rz": (0.3, 0.7), "/bodyset/Pelvis/mass": (1.0, 2.0)}
+    measures = ("distance", "largest_force", "energy", "RKnee_rz/speed")
+    rows = np.array([[0.35, 1.0], [0.6, 1.5]])
+    both = [
+        Runner(plan(walker, vary, measures=measures, to=1.0, accuracy=1e-9, engine=engine)).run(rows)
+        for engine in ("compiled", "bullet")
+    ]
+    for name in measures:
+        # The largest force is that at the end of a step, and steps may differ.
+        close = 1e-3 if name == "largest_force" else 1e-5
+        assert both[0].measures[name] == pytest.approx(both[1].measures[name], rel=close), name
+    assert both[0].status == both[1].status == ["done", "done"]
