@@ -27,7 +27,7 @@ LAYERS: tuple[Layer, ...] = ("geometry", "contact", "wrap", "markers", "paths", 
 SCENERY = 12.0
 """How many times larger than the usual shape one may be and still be wanted whole in a picture; a long floor is not."""
 
-_FEW = 600
+_FEW = 1500
 """So many points of a surface are no effort to follow."""
 
 

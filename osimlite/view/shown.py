@@ -12,6 +12,7 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.lint import Config, Finding, validate
+from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -56,7 +57,7 @@ class Shown:
     def of(
         cls,
         model: Model,
-        mechanism: Mechanism,
+        mechanism: Mechanism | None = None,
         folders: Sequence[Path] = (),
         *,
         file: Path | None = None,
@@ -68,7 +69,7 @@ class Shown:
 
         Args:
             model: which.
-            mechanism: of the same model.
+            mechanism: of the same model, if it is at hand.
             folders: where its mesh files are looked for.
             file: that the model was read from, so that findings know their lines; None: the model itself is checked.
             motion: how it moves, or the file (.sto, .mot) that says so.
@@ -78,8 +79,9 @@ class Shown:
         Raises:
             OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
         """
+        mechanism = build_mechanism(model) if mechanism is None else mechanism
         scene = build_scene(model, mechanism, folders)
-        config = Config(mesh_paths=tuple(str(folder) for folder in folders))
+        config = Config(mesh_paths=tuple(str(folder.resolve()) for folder in folders))
         findings = validate(model if file is None else file, config=config).findings
         remarks = []
         if scene.remarks:

@@ -15,7 +15,7 @@ from osimlite.translate.stl import stl_corners
 from osimlite.translate.surface import Indices, Surface, triangulated
 from osimlite.translate.vtp import read_vtp
 
-SLICES, STACKS = 32, 16
+SLICES, STACKS = 48, 24
 
 
 @cache

@@ -1,0 +1,79 @@
+"""``view`` from the command line."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.cli import main
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.simulation.storage import write_sto
+from tests.view.motions import stroll
+
+
+@pytest.fixture
+def walker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    osimlite.write(dynamic_walker(), tmp_path / "walker.osim")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as left:
+        main(["view", *arguments])
+    return int(left.value.code or 0)
+
+
+def test_a_page_and_a_picture_are_written(walker: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
+    motion = stroll()
+    write_sto(walker / "walk.sto", "walk", motion.times, motion.coordinates, motion.values.tolist())
+    code = run("walker.osim", "walk.sto", "--html", "out/page.html", "--screenshot", "a.png", "--at", "0.2")
+    assert code == 2 and "out" in capsys.readouterr().err
+    assert run("walker.osim", "walk.sto", "--html", "page.html", "--screenshot", "a.png", "--at", "0.2") == 0
+    assert re.search(r"wrote page\.html \(0\.\d MB\)\nwrote a\.png", capsys.readouterr().out)
+    assert (walker / "page.html").stat().st_size > 500_000 and (walker / "a.png").read_bytes()[1:4] == b"PNG"
+
+
+def test_coordinates_can_be_set(walker: Path) -> None:
+    assert run("walker.osim", "--set", "RKnee_rz=-30deg", "--html", "page.html") == 0
+    found = re.search(r'"q":\[([^]]*)\]', (walker / "page.html").read_text())
+    assert found and "-0.523598775598298" in found[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nowhere.osim",), "nowhere.osim"),
+        (("walker.osim", "nowhere.sto", "--html", "a.html"), "nowhere.sto"),
+        (("walker.osim", "--geometry", "nowhere"), "--geometry names a folder"),
+        (("walker.osim", "--set", "RKnee=1", "--html", "a.html"), "RKnee_rz"),
+        (("walker.osim", "--at", "1", "--screenshot", "a.png"), "belongs to a motion"),
+    ],
+)
+def test_what_cannot_be_shown_is_said(
+    arguments: tuple[str, ...], said: str, walker: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*arguments) == 2
+    assert said in capsys.readouterr().err
+    assert not list(walker.glob("a.*"))
+
+
+def test_the_page_is_served_until_interrupted(walker: Path) -> None:
+    command = [sys.executable, "-u", "-m", "osimlite", "view", "walker.osim", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
+        assert served.stdout is not None and served.stderr is not None
+        line = served.stdout.readline()
+        (url,) = re.findall(r"http://127\.0\.0\.1:\d+/", line)
+        with urllib.request.urlopen(url) as page:
+            assert "DynamicWalkerModel" in page.read().decode()
+        served.send_signal(signal.SIGINT)
+        assert served.wait(20) == 130
+        assert "Traceback" not in served.stderr.read()
