@@ -9,7 +9,7 @@ from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, Object, reference_specs
+from osimlite.schema.base import Component, Object, defaults, reference_specs
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.fields import Reference
 from osimlite.schema.forces import Force
@@ -169,7 +169,7 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
     """Each force that works through lists of contact geometry: the force, its parameter objects, what they name."""
     forces: dict[int, tuple[Component, list[Object], list[Use]]] = {}
     for force in subject.each(Force):
-        if "contact_parameters" in type(force).model_fields:
+        if "contact_parameters" in defaults(type(force))[1]:
             parameters: Any = force
             forces[id(force)] = (force, list(parameters.contact_parameters.objects), [])
     if not forces:

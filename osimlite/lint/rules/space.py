@@ -18,7 +18,6 @@ from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSp
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.markers import Station
-from osimlite.schema.tree import is_a
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
@@ -254,9 +253,12 @@ def _on_body(subject: Subject, item: Object) -> bool:
 
 def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
     """The surfaces that each contact force sets against each other."""
+    forces = {
+        id(force) for kind in ("HuntCrossleyForce", "SmoothSphereHalfSpaceForce") for force in subject.named(kind)
+    }
     groups: dict[int, tuple[Component, list[ContactGeometry]]] = {}
-    for use in subject.uses:
-        if is_a(use.owner, "HuntCrossleyForce") or is_a(use.owner, "SmoothSphereHalfSpaceForce"):
+    for use in subject.uses if forces else ():
+        if id(use.owner) in forces:
             target = subject.resolution(use).target
             if isinstance(target, ContactGeometry):
                 group = groups.setdefault(id(use.owner), (use.owner, []))[1]
