@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from math import inf, isfinite, sqrt
-from typing import Protocol
+from typing import Any, Protocol
 
 from osimlite.errors import SettingError, SimulationError
 
@@ -139,6 +139,15 @@ class Stepper(ABC):
             while self.time < t:
                 self.step(times[-1])
             yield t, self.at(t)
+
+    def table(self, times: Sequence[float], progress: Callable[[float], object] | None = None) -> Sequence[Any]:
+        """The states at times that do not decrease (s), one row for each; `progress` is called with every time."""
+        rows = []
+        for t, state in self.reports(times):
+            rows.append(state)
+            if progress is not None:
+                progress(t)
+        return rows
 
     def at(self, t: float) -> list[float]:
         """State at a time not before the start of the last step nor after its end, s."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import floor, isfinite
 from pathlib import Path
 from typing import Any
@@ -190,11 +190,7 @@ class Simulation:
         recorder = Recorder(self.engine)
         stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
         recorder.begin(stepper)
-        states: list[list[float]] = []
-        for t, state in stepper.reports(times):
-            states.append(state)
-            if progress is not None:
-                progress(t)
+        states = stepper.table(times, progress)
         if not isfinite(sum(states[-1])):
             raise SimulationError("the motion is not finite any more; ask for more accuracy")
         wall = time.perf_counter() - started
@@ -249,7 +245,7 @@ class Simulation:
     def _trajectory(
         self,
         times: list[float],
-        states: list[list[float]],
+        states: Sequence[Any],
         stepper: Stepper,
         recorder: Recorder,
         settings: dict[str, Any],

@@ -24,7 +24,7 @@ from osimlite.schema.actuators import (
     TorqueActuator,
 )
 from osimlite.schema.contact import ContactEllipsoid
-from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_forces import MeyerFregly2016Force, SmoothSphereHalfSpaceForce
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.functions import (
     Constant,
@@ -36,6 +36,8 @@ from osimlite.schema.functions import (
     Sine,
     StepFunction,
 )
+from osimlite.schema.markers import Station
+from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.schema.prescribed import PrescribedForce
@@ -209,6 +211,10 @@ FORCES = {
             name="a", socket_half_space="/contactgeometryset/floor", socket_sphere="/contactgeometryset/s2"
         ),
     ),
+    "station": lambda: (
+        Station(name="toe", socket_parent_frame="/bodyset/b2", location=(0.1, -0.2, 0.0)),
+        MeyerFregly2016Force(name="a", socket_station="/componentset/toe"),
+    ),
     "contact": lambda: contact(floor(), *(stone(number) for number in range(4))),
     "ellipsoid": lambda: contact(
         floor(),
@@ -245,6 +251,13 @@ FORCES = {
             name="a", bodyA="b3", bodyB="b0", pointA=(0.1, 0.2, 0.3), pointB=(0, 0.1, 0), points_are_global=True
         ),
         Constant(value=3.0),
+    ),
+    "path actuator": lambda: driven(
+        PathActuator(name="a", optimal_force=20.0, geometry_path=straight()), Constant(value=0.7)
+    ),
+    "pneumatic actuator": lambda: driven(
+        McKibbenActuator(name="a", thread_length=0.9, number_of_turns=3.0, cord_length=0.1, geometry_path=straight()),
+        Constant(value=5000.0),
     ),
     "idle": lambda: BodyActuator(name="a", socket_body="/bodyset/b0"),
     "prescribed": lambda: pushed(),
@@ -323,8 +336,8 @@ def test_all_at_once():
     model = chain()
     for place, (name, make) in enumerate(FORCES.items()):
         made = make()
-        if "actuator" in name:
-            continue  # their controllers name them
+        if "actuator" in name or name == "station":
+            continue  # others name them by a path
         for item in made if isinstance(made, tuple | list) else (made,):
             item.name = f"{item.name}{place}"
             if isinstance(item, HuntCrossleyForce):

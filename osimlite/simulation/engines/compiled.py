@@ -6,7 +6,7 @@ they call. The code serves every model: models and parameters are arrays.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -257,6 +257,22 @@ class CompiledMerson(RungeKuttaMerson):
 
     def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
         """Yield (time, state) at times that do not decrease, s; the steps are those of the base."""
+        for moments, rows in self._blocks(times):
+            yield from zip(moments, rows.tolist(), strict=True)
+
+    def table(self, times: Sequence[float], progress: Callable[[float], object] | None = None) -> Sequence[Any]:
+        """The states at times that do not decrease (s) as an array (k, 2n)."""
+        found = []
+        for moments, rows in self._blocks(times):
+            found.append(rows)
+            if progress is not None:
+                for moment in moments:
+                    progress(moment)
+        table: Any = found[0] if len(found) == 1 else np.concatenate(found)
+        return table  # type: ignore[no-any-return]
+
+    def _blocks(self, times: Sequence[float]) -> Iterator[tuple[Sequence[float], Floats]]:
+        """Times and states, as many as one call of machine code gives."""
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
         batch = Batch(
@@ -283,7 +299,7 @@ class CompiledMerson(RungeKuttaMerson):
             if ending == merson.FAILED:
                 self._explain()
             reached = int(count[merson.REPORTED])
-            yield from zip(times[done:reached], batch.reports[0, done:reached], strict=True)
+            yield times[done:reached], batch.reports[0, done:reached]
             done = reached
 
     def catch_up(self) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from math import sqrt
 
+from osimlite.forces.springs import mckibben_tension
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.layout import FINE, FREEDOMS, NUMBERS, OWN, RECORD, TIME
+from osimlite.simulation.kernels.paths import measure, own_numbers, pull
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import direction, push, station, turn
 
@@ -21,10 +23,7 @@ def drive(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int
     """
     i = at(s, item)
     p, found, own = at(x, i[NUMBERS]), at(w, i[RECORD]), at(i, OWN)
-    value = 0.0
-    for k in range(own[5]):
-        part, _, _ = value_at(at(p, own[6 + k]), w[TIME])
-        value += p[6] * part
+    value = p[6] * control(at(own, 5), p, w[TIME])
     found[0] = value
     if value == 0.0:
         return FINE
@@ -48,6 +47,25 @@ def drive(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int
         size = value / length if length > 0.0 else 0.0
         push(s, w, one, ax, ay, az, size * gx, size * gy, size * gz)
         push(s, w, two, ax, ay, az, -size * gx, -size * gy, -size * gz)
+    return FINE
+
+
+def control(places: Ints, p: Floats, t: float) -> float:
+    """The sum of some functions of time, whose number stands before the places of their tables."""
+    total = 0.0
+    for k in range(places[0]):
+        value, _, _ = value_at(at(p, places[1 + k]), t)
+        total += value
+    return total
+
+
+def path_drive(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A tension along a path by a control, or by a pressure if there are numbers of turns, thread and cord."""
+    length, _ = measure(s, x, w, item)
+    i, p, found = at(s, item), own_numbers(s, x, item), at(w, s[item + RECORD])
+    value = p[0] * control(at(i, OWN + 1 + i[OWN]), p, w[TIME])
+    found[2] = mckibben_tension(length, value, p[1], p[2], p[3]) if p[1] != 0.0 else value
+    pull(s, x, w, item, found[2])
     return FINE
 
 

@@ -2,8 +2,8 @@
 
 A mechanism is a tree of links. A link is one body, or several that never move in one another, and has its frame where
 the last motion of its joint ends. The way from the carrying link to it is a list of operations: each is a fixed
-transform and then one motion, along or about the z axis if it has an axis. The degrees of freedom are numbered in the
-order of the links, so that what carries stands before what is carried. Whatever pushes is an item.
+transform and then one motion, about the z axis or along any axis if it has one. The degrees of freedom are numbered in
+the order of the links, so that what carries stands before what is carried. Whatever pushes is an item.
 
 The integers s say what is connected to what, and where everything is in the other two; the numbers x hold masses,
 places, parameters of forces, in SI units; the work w is what an evaluation leaves behind. Models of one structure
@@ -22,7 +22,9 @@ LINK_AT, OPERATION_AT, FREEDOM_AT, ITEM_AT = 4, 5, 6, 7
 SUMMED, SUMMED_AT = 8, 9
 """Count and place of a list of the degrees of freedom whose columns are sums of several."""
 FIXED_AT = 10
-"""Place in x of the fixed transforms of the operations, by rows and then the translation (K, 12)."""
+"""Place in x of the fixed transforms of the operations, by rows and then the translation, and of axes of slides
+(K, FIXED_NUMBERS)."""
+FIXED_NUMBERS = 15
 WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = 11, 12, 13, 14, 15, 16
 """Places in w."""
 WORK_SIZE = 17
@@ -81,7 +83,7 @@ FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
 
 # Kinds.
 TURN, SLIDE, BALL, BALL_BACK = 0, 1, 2, 3
-"""Motions: about z, along z (those before BALL have one axis), a SphericalMotion, one that is passed from end to
+"""Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one that is passed from end to
 start."""
 NOTHING, SHIFT, MOVE = 0, 1, 2
 """Fixed transforms: none, a translation, any."""

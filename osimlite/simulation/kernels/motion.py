@@ -16,6 +16,7 @@ from osimlite.simulation.kernels.layout import (
     FINE,
     FIRST_OPERATION,
     FIXED_AT,
+    FIXED_NUMBERS,
     FREEDOM,
     FREEDOMS,
     FUNCTION,
@@ -69,8 +70,8 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
         for operation in range(i[FIRST_OPERATION], i[END_OPERATION]):
             record = s[OPERATION_AT] + OPERATION_INTS * operation
             j, a = at(s, record), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
+            b = at(x, s[FIXED_AT] + FIXED_NUMBERS * operation)
             if j[BEFORE] != NOTHING:
-                b = at(x, s[FIXED_AT] + 12 * operation)
                 px += xx * b[9] + xy * b[10] + xz * b[11]
                 py += yx * b[9] + yy * b[10] + yz * b[11]
                 pz += zx * b[9] + zy * b[10] + zz * b[11]
@@ -81,22 +82,26 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
                     zx, zy, zz = zx * b0 + zy * b3 + zz * b6, zx * b1 + zy * b4 + zz * b7, zx * b2 + zy * b5 + zz * b8
             motion = j[MOTION]
             if motion < BALL:
-                a[AXIS], a[AXIS + 1], a[AXIS + 2] = xz, yz, zz
-                a[POINT], a[POINT + 1], a[POINT + 2] = px, py, pz
                 if j[FREEDOM] >= 0:
                     amount = y[j[FREEDOM]]
                 else:
                     call(s[LAWS + j[FUNCTION]], s, x, w, y, f, operation)
                     amount = a[AMOUNT]
                 if motion == TURN:
+                    a[AXIS], a[AXIS + 1], a[AXIS + 2] = xz, yz, zz
+                    a[POINT], a[POINT + 1], a[POINT + 2] = px, py, pz
                     sine, cosine = sine_cosine(amount)
                     xx, xy = cosine * xx + sine * xy, cosine * xy - sine * xx
                     yx, yy = cosine * yx + sine * yy, cosine * yy - sine * yx
                     zx, zy = cosine * zx + sine * zy, cosine * zy - sine * zx
                 else:
-                    px += amount * xz
-                    py += amount * yz
-                    pz += amount * zz
+                    ex = xx * b[12] + xy * b[13] + xz * b[14]
+                    ey = yx * b[12] + yy * b[13] + yz * b[14]
+                    ez = zx * b[12] + zy * b[13] + zz * b[14]
+                    a[AXIS], a[AXIS + 1], a[AXIS + 2] = ex, ey, ez
+                    px += amount * ex
+                    py += amount * ey
+                    pz += amount * ez
             else:
                 frame = at(w, SCRATCH)
                 set_frame(frame, xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz)

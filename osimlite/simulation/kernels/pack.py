@@ -51,6 +51,7 @@ class _Operation:
     arguments: list[int]  # places in the mechanism
     function: Any = None
     radii: Array = field(default_factory=lambda: np.zeros(3))
+    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
 
 
 @dataclass
@@ -109,11 +110,14 @@ def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tup
             frame = frame @ (inverse(matrix) if mobilizer.reversed else matrix)
         elif isinstance(motion, AxisMotion):
             axis = -motion.axis if mobilizer.reversed else motion.axis
-            turned = transform(_to_axis(axis))
-            kind = at.TURN if motion.kind == "rotate" else at.SLIDE
             function = None if motion.function == IDENTITY else motion.function
-            found.append(_Operation(kind, frame @ turned, places, function))
-            frame = inverse(turned)
+            if motion.kind == "rotate":
+                turned = transform(_to_axis(axis))
+                found.append(_Operation(at.TURN, frame @ turned, places, function))
+                frame = inverse(turned)
+            else:
+                found.append(_Operation(at.SLIDE, frame, places, function, axis=axis))
+                frame = np.eye(4)
         elif isinstance(motion, SphericalMotion):
             if any(still):
                 raise UnsupportedError(
@@ -185,7 +189,8 @@ class _Packer:
             self.numbers += _inertia(link)
         ints[at.FIXED_AT] = len(self.numbers)
         for operation in self.operations:
-            self.numbers += [*operation.before[:3, :3].ravel().tolist(), *operation.before[:3, 3].tolist()]
+            before = operation.before
+            self.numbers += [*before[:3, :3].ravel().tolist(), *before[:3, 3].tolist(), *operation.axis.tolist()]
         ints[at.LINKS], ints[at.FREEDOMS] = len(self.links), size
         ints[at.WORK_LINK] = self.room(at.LINK_WORK * len(self.links))
         ints[at.WORK_OPERATION] = self.room(at.OPERATION_WORK * len(self.operations))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from osimlite.multibody.mechanism import GROUND, FramePlacement
 from osimlite.multibody.spatial import transform
 from osimlite.simulation.actuator_elements import (
-    Control,
     CoordinateDrive,
     IdleActuator,
     PointDrive,
@@ -17,10 +17,13 @@ from osimlite.simulation.actuator_elements import (
     Prescribed,
     TorqueDrive,
 )
+from osimlite.simulation.controls import Control
 from osimlite.simulation.external_loads import ExternalLoad
 from osimlite.simulation.kernels.drives import COORDINATE, POINT, TORQUE, TWO_POINTS
 from osimlite.simulation.kernels.functions import table_of_one
 from osimlite.simulation.kernels.items import Item, Places, of_record
+from osimlite.simulation.kernels.pack_springs import path_numbers
+from osimlite.simulation.path_elements import McKibben, PathDrive
 
 NOWHERE = (0.0, 0.0, 0.0)
 
@@ -29,13 +32,18 @@ def _drive(
     path: str, control: Control, ints: tuple[int, int, int, int, int], one: Any = NOWHERE, two: Any = NOWHERE
 ) -> list[Item]:
     """An item with the force or torque in its record."""
-    numbers = [*one, *two, control.optimal_force]
-    places: list[int] = []
+    numbers, tables = _controlled(path, control, (*one, *two, control.optimal_force))
+    kept = of_record(lambda record: (record[0], 0.0))
+    return [Item(kept, "drive", (*ints, *tables), tuple(numbers), room=1)]
+
+
+def _controlled(path: str, control: Control, first: Sequence[float]) -> tuple[list[float], list[int]]:
+    """Some numbers with the tables of a control after them; the count of the tables and where they are."""
+    numbers, places = [*first], [len(control.functions)]
     for function in control.functions:
         places.append(len(numbers))
         numbers += table_of_one(function, f"a control of '{path}'")
-    kept = of_record(lambda record: (record[0], 0.0))
-    return [Item(kept, "drive", (*ints, len(places), *places), tuple(numbers), room=1)]
+    return numbers, places
 
 
 def pack_coordinate_drive(element: CoordinateDrive, places: Places) -> list[Item]:
@@ -71,6 +79,15 @@ def pack_point_to_point_drive(element: PointToPointDrive, places: Places) -> lis
     if element.in_ground:
         return _drive(element.path, element.control, (TWO_POINTS, one, two, GROUND, GROUND), *element.points)
     return _drive(element.path, element.control, (TWO_POINTS, one, two, one, two), start, end)
+
+
+def pack_path_drive(element: PathDrive | McKibben, places: Places) -> list[Item]:
+    """A tension."""
+    links, points = path_numbers(element, places)
+    constants = element.constants if isinstance(element, McKibben) else NOWHERE
+    numbers, tables = _controlled(element.path, element.control, (element.control.optimal_force, *constants))
+    kept = of_record(lambda record: (record[2], 0.0))
+    return [Item(kept, "path_drive", (*links, *tables), (*points, *numbers), room=3)]
 
 
 def pack_idle(element: IdleActuator, places: Places) -> list[Item]:

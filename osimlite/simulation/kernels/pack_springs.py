@@ -25,6 +25,7 @@ from osimlite.simulation.path_elements import (
 )
 from osimlite.simulation.smooth_contact_element import SmoothContact
 from osimlite.simulation.spring_elements import CoordinateFormula, CoordinateSpring, PointSpring
+from osimlite.simulation.station_contact_element import StationContact
 
 
 def pack_coordinate_spring(element: CoordinateSpring, places: Places) -> list[Item]:
@@ -146,7 +147,7 @@ def _frame(frame: BushingFrame, places: Places) -> tuple[int, list[float]]:
     return link, [*rotation.T.ravel().tolist(), *origin]
 
 
-def _path(element: PathElement, places: Places) -> tuple[tuple[int, ...], tuple[float, ...]]:
+def path_numbers(element: PathElement, places: Places) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """The integers and numbers of the points."""
     stations = [places.station(body, point) for body, point in element.points]
     return (len(stations), *(link for link, _ in stations)), tuple(x for _, point in stations for x in point)
@@ -154,14 +155,14 @@ def _path(element: PathElement, places: Places) -> tuple[tuple[int, ...], tuple[
 
 def pack_path_spring(element: PathSpringElement, places: Places) -> list[Item]:
     """Tension and energy."""
-    links, points = _path(element, places)
+    links, points = path_numbers(element, places)
     kept = of_record(lambda record: tuple(record[2:4]))
     return [Item(kept, "path_spring", links, (*points, *element.constants), room=4)]
 
 
 def pack_path_formula(element: PathFormula, places: Places) -> list[Item]:
     """Tension; the energy is not known."""
-    links, points = _path(element, places)
+    links, points = path_numbers(element, places)
     steps, constants = program(element.formula, ("s", "ldot"))
     numbers = (*points, element.resting_length, 1.0 if element.clamped else 0.0, *constants)
     count = len(steps) // 3
@@ -171,7 +172,7 @@ def pack_path_formula(element: PathFormula, places: Places) -> list[Item]:
 
 def pack_ligament(element: LigamentElement, places: Places) -> list[Item]:
     """Tension, and the energy by integration."""
-    links, points = _path(element, places)
+    links, points = path_numbers(element, places)
     table = table_of_one(element.curve, f"the force_length_curve of '{element.path}'")
 
     def kept(record: Sequence[float]) -> tuple[float, ...]:
@@ -185,7 +186,7 @@ def pack_ligament(element: LigamentElement, places: Places) -> list[Item]:
 
 def pack_blankevoort(element: Blankevoort, places: Places) -> list[Item]:
     """Elastic part, damping, tension, length, rate, strain, its rate, energy."""
-    links, points = _path(element, places)
+    links, points = path_numbers(element, places)
     l0 = element.constants[0]
 
     def kept(record: Sequence[float]) -> tuple[float, ...]:
@@ -193,6 +194,13 @@ def pack_blankevoort(element: Blankevoort, places: Places) -> list[Item]:
         return elastic, tension - elastic, tension, length, rate, length / l0 - 1.0, rate / l0, energy
 
     return [Item(of_record(kept), "blankevoort", links, (*points, *element.constants), room=5)]
+
+
+def pack_station_contact(element: StationContact, places: Places) -> list[Item]:
+    """Force; the energy is not known."""
+    link, point = places.station(element.body, element.point)
+    kept = of_record(lambda record: (*record[:3], 0.0))
+    return [Item(kept, "station_contact", (link,), (*point, *element.constants), room=3)]
 
 
 def pack_smooth_contact(element: SmoothContact, places: Places) -> list[Item]:

@@ -7,6 +7,7 @@ from math import sqrt
 from osimlite.forces.bushing import bushing_load, xyz_angles, xyz_moment, xyz_rates
 from osimlite.forces.smooth_contact import smooth_contact_energy, smooth_contact_force, smooth_hertz
 from osimlite.forces.springs import coordinate_spring_force, point_spring_tension, spring_energy
+from osimlite.forces.station_contact import station_contact_force
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.layout import FINE, FREEDOMS, NUMBERS, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
@@ -160,6 +161,17 @@ def load_bushing(s: Ints, w: Floats, one: int, two: int, p: Floats, found: Float
     push(s, w, one, found[9], found[10], found[11], -fx, -fy, -fz)
     turn(s, w, two, tx, ty, tz)
     turn(s, w, one, -tx, -ty, -tz)
+
+
+def station_contact(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A point that the plane y = 0 of ground pushes."""
+    i = at(s, item)
+    link, p, found = i[OWN], at(x, i[NUMBERS]), at(w, i[RECORD])
+    px, py, pz = station(s, w, link, p[0], p[1], p[2])
+    vx, vy, vz = velocity(s, w, link, px, py, pz)
+    found[0], found[1], found[2] = station_contact_force(py, vx, vy, vz, p[3], p[4], p[5], p[6], p[7], p[8])
+    push(s, w, link, px, py, pz, found[0], found[1], found[2])
+    return FINE
 
 
 def smooth_contact(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
