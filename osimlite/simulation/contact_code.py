@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from osimlite.forces.hunt_crossley import simbody_pair_order
 
 if TYPE_CHECKING:
-    from osimlite.simulation.contact_elements import ContactPair, PairContact
+    from osimlite.simulation.contact_elements import ContactPair, ContactSurface, PairContact
     from osimlite.simulation.field import Writer
+    from osimlite.simulation.script import Scalar
 
 
 def write_contacts(element: PairContact, writer: Writer) -> None:
@@ -77,14 +78,16 @@ class _Pair:
             touching = f"{script.dot(gap, gap)} < {reach * reach!r}"
         with script.block(f"if {touching}:"):
             radius: float | str = self.two.radius
-            if self.two.radii and self.two.axes:
-                axes = script.multiply(writer.chain.body(script, self.two.body).rotation, self.two.axes)
-                entries = (entry for row in axes for entry in row)
+            if self.one.is_half_space and self.two.radii:
                 d, radius, *point = writer.call(
-                    "half_space_ellipsoid", *other, *normal, *center, *entries, *self.two.radii, a, results=5
+                    "half_space_ellipsoid", *other, *normal, *center, *self._ellipsoid(self.two), a, results=5
                 )
             elif self.one.is_half_space:
                 d, *point = writer.call("half_space_sphere", *other, *normal, *center, self.two.radius, a, results=4)
+            elif self.one.radii or self.two.radii:
+                ends = (*other, *self._ellipsoid(self.one), *center, *self._ellipsoid(self.two))
+                d, radius, nx, ny, nz, *point = writer.call("ellipsoid_ellipsoid", *ends, a, results=8)
+                normal = (nx, ny, nz)
             else:
                 d, radius, nx, ny, nz, *point = writer.call(
                     "sphere_sphere", *other, self.one.radius, *center, self.two.radius, a, results=8
@@ -104,3 +107,10 @@ class _Pair:
                 script.line("pass")
             if self.at_no_force:
                 script.line(f"else: {self.at_no_force}")
+
+    def _ellipsoid(self, surface: ContactSurface) -> tuple[Scalar, ...]:
+        """Axes in ground by rows, and half axes, of an ellipsoid or a sphere."""
+        if not (surface.radii and surface.axes):
+            return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, surface.radius, surface.radius, surface.radius
+        axes = self.script.multiply(self.writer.chain.body(self.script, surface.body).rotation, surface.axes)
+        return (*(entry for row in axes for entry in row), *surface.radii)

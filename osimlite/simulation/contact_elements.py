@@ -138,7 +138,7 @@ class HuntCrossley(PairContact):
 
 @dataclass(frozen=True)
 class EllipsoidContact(PairContact):
-    """One HuntCrossleyForce with ellipsoids among its surfaces, each of which may touch half spaces only."""
+    """One HuntCrossleyForce with ellipsoids among its surfaces."""
 
 
 def hunt_crossley(builder: ElementBuilder, force: HuntCrossleyForce) -> PairContact:
@@ -152,8 +152,6 @@ def hunt_crossley(builder: ElementBuilder, force: HuntCrossleyForce) -> PairCont
             continue
         if b.is_half_space:
             first, second, a, b = second, first, b, a
-        if not a.is_half_space and (a.radii or b.radii):
-            raise builder.unsupported(force, f" with an ellipsoid against a round surface, '{a.name}' and '{b.name}'")
         try:
             pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
         except ValueError as error:

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.forces.ellipsoid_contact import half_space_ellipsoid
-from osimlite.forces.hunt_crossley import half_space_sphere
+from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
+from osimlite.forces.hunt_crossley import half_space_sphere, sphere_sphere
 
 NUMBERS = st.floats(-1.0, 1.0)
 TRIPLES = st.tuples(NUMBERS, NUMBERS, NUMBERS)
@@ -39,3 +39,26 @@ def test_depth_and_point_against_a_search(seed, radii):
     own = axes.T @ (np.array(point) - (1.0, 2.0, 3.0)) / radii
     assert own @ own == pytest.approx(1.0)
     assert (np.array(point) - (1.0, 2.0, 3.0)) @ normal == pytest.approx(-d)
+
+
+IDENTITY = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+POSITIVE = st.floats(0.2, 2.0)
+
+
+@given(POSITIVE, POSITIVE, *[st.floats(-1.0, 1.0)] * 3, st.floats(0.0, 1.0))
+def test_two_round_ellipsoids_are_spheres(r1, r2, x, y, z, a):
+    sphere = sphere_sphere(0.0, 0.0, 0.0, r1, x, y, z, r2, a)
+    found = ellipsoid_ellipsoid(0.0, 0.0, 0.0, *IDENTITY, r1, r1, r1, x, y, z, *IDENTITY, r2, r2, r2, a)
+    if sphere[0] > 1e-9:
+        assert found == pytest.approx(sphere, rel=1e-9, abs=1e-12)
+    elif sphere[0] < -1e-9:
+        assert found[0] < 0.0
+
+
+def test_ellipsoids_end_to_end():
+    """Of half axes 2, 1, 1 and 1, 3, 1, along their X axes: curvatures there are 2, 2 and 1/9, 1."""
+    d, R, *found = ellipsoid_ellipsoid(
+        0.0, 0.0, 0.0, *IDENTITY, 2.0, 1.0, 1.0, 2.9, 0.0, 0.0, *IDENTITY, 1.0, 3.0, 1.0, 0.25
+    )
+    assert (d, R) == (pytest.approx(0.1), pytest.approx(((2.0 + 1.0 / 9.0) * (2.0 + 1.0)) ** -0.5))
+    assert found == pytest.approx([1.0, 0.0, 0.0, 1.975, 0.0, 0.0])

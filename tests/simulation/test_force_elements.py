@@ -235,7 +235,9 @@ def test_an_ellipsoid_lands_when_its_lowest_point_is_down():
     assert trajectory.summary["largest_contact_forces"]["contact"]["force_N"] > 9.8
 
 
-def test_an_ellipsoid_touches_planes_only():
-    model = egg_over_floor(ContactSphere(name="stone", socket_frame="/ground", radius=0.1))
-    with pytest.raises(UnsupportedError, match=r"'/forceset/contact' \(HuntCrossleyForce with an ellipsoid against"):
-        osimlite.simulate(model, 0.1)
+def test_an_ellipsoid_lands_on_a_stone():
+    stone = ContactSphere(name="stone", socket_frame="/ground", location=(0.0, 0.05, 0.0), radius=0.1)
+    trajectory = osimlite.simulate(egg_over_floor(stone), 0.5, accuracy=1e-8)
+    first = trajectory.summary["contact_events"][0]
+    assert first["contact"] == "contact (stone, shell)"
+    assert first["time_s"] == pytest.approx(math.sqrt(2.0 * 0.05 / 9.80665), rel=1e-4)
