@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
@@ -72,6 +72,12 @@ def plan_for(cls: type[Object]) -> Plan:
 
 
 _Late = tuple[NoteKind, int, str, FieldSpec | None, Any]
+
+
+def _factory_of(spec: FieldSpec, values: Mapping[str, Any]) -> Any:
+    """The object of a property whose element holds none."""
+    assert spec.factory is not None
+    return spec.factory()
 
 
 class _Extra:
@@ -187,7 +193,12 @@ class ObjectReader:
                     # The object of a property is called as the property is, also in the long form.
                     members[0].__dict__["name"] = spec.tag
                     members[0].model_fields_set.add("name")
-                values[field_name] = members[0] if members else None if optional else spec.factory()
+                if members:
+                    values[field_name] = members[0]
+                elif optional:
+                    values[field_name] = None
+                else:
+                    values[field_name] = getattr(cls, "in_place_of_none", _factory_of)(spec, values)
             count = self.count
             if late:
                 extra = extra or _Extra()

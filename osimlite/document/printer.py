@@ -96,6 +96,8 @@ class _Printer:
                     or (default is not None and value != getattr(default, spec.name))
                     or (default is None and layout is not None and spec.name in layout.inherited)
                     or (default is None and isinstance(spec.kind, Held) and has_content(value))
+                    # A part may start with a value that its class does not have elsewhere, as the axes of a transform.
+                    or (default is None and not isinstance(spec.kind, Held) and value != spec.default == spec.default)
                 ):
                     self._property(item, spec, value, depth + 1)
             if layout is not None and None in layout.before:

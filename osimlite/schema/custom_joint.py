@@ -1,10 +1,11 @@
 """The joint whose motion is made of six functions of its coordinates."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
-from osimlite.schema.base import Object, made
+from osimlite.schema.base import FieldSpec, Object, made
 from osimlite.schema.fields import Single, Unnamed, Vec3, vec3
-from osimlite.schema.functions import Constant, Function
+from osimlite.schema.functions import Constant, Function, LinearFunction
 from osimlite.schema.joints import Joint
 from osimlite.schema.references import OwnJointCoordinates
 
@@ -17,6 +18,16 @@ class TransformAxis(Object):
     coordinates: OwnJointCoordinates = ()
     axis: Annotated[Vec3, vec3()] = _X
     function: Single[Function] = made(Constant, name="function")
+
+    @classmethod
+    def in_place_of_none(cls, spec: FieldSpec, values: Mapping[str, Any]) -> Function:
+        """The function where an element ``<function>`` is there and empty: then the axis moves as its coordinate does.
+
+        Where there is no such element, the axis does not move. (Where it names several coordinates, OpenSim gives up.)
+        """
+        if len(values.get("coordinates", ())) == 1:
+            return LinearFunction(name=spec.tag, coefficients=(1.0, 0.0))
+        return Constant(name=spec.tag)
 
 
 def _axis(name: str, direction: Vec3) -> Any:

@@ -7,16 +7,16 @@ from osimlite.document.upgrade.draft import Draft, elements, families, step, tex
 
 @step(below=40000)
 def axis_functions(draft: Draft) -> None:
-    """An axis without a function moves as its coordinate does, or not at all."""
+    """An axis with an empty function moves as its coordinate does, one without any does not move."""
     for axis in draft.tagged("TransformAxis"):
         if any("Function" in families(child.tag) for child in elements(axis)):
             continue
         holder = axis.find("function")
+        if holder is not None and elements(holder):
+            continue
+        coordinates = (text_of(axis, "coordinates") or "").split() if holder is not None else []
         if holder is None:
             holder = draft.add(axis, "function", source=axis)
-        if elements(holder):
-            continue
-        coordinates = (text_of(axis, "coordinates") or "").split()
         if len(coordinates) == 1:
             draft.add(draft.add(holder, "LinearFunction", source=holder), "coefficients", "1 0", source=holder)
         elif not coordinates:
