@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,6 +26,22 @@ KEY = b"osimlite"
 
 ROWS_PER_GROUP = 65536
 """Of the Parquet file."""
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Put off an interruption by the keyboard until what is within is done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    interruptions: list[object] = []
+    before = signal.signal(signal.SIGINT, lambda *told: interruptions.append(told))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    if interruptions:
+        raise KeyboardInterrupt
 
 
 def _arrow() -> Any:
@@ -99,9 +118,10 @@ class Partial:
             pa.array(column, field.type, from_pandas=False) for column, field in zip(columns, self.schema, strict=True)
         ]
         batch = pa.record_batch(arrays, schema=self.schema)
-        self._stream.write(batch.serialize().to_pybytes())
-        self._stream.flush()
-        self.rows += batch.num_rows
+        with undisturbed():
+            self._stream.write(batch.serialize().to_pybytes())
+            self._stream.flush()
+            self.rows += batch.num_rows
 
     def read(self, take: Callable[[Any], object]) -> None:
         """Give every batch that is there to a function."""

@@ -15,7 +15,7 @@ from osimlite.errors import OsimliteError
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, differences, partial_of, schema, settings_of
+from osimlite.sweep.results import Partial, differences, partial_of, schema, settings_of, undisturbed
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
 
@@ -189,6 +189,10 @@ class _Work:
 
     def _save(self) -> None:
         """Write the rows before which none is missing."""
+        with undisturbed():
+            self._write()
+
+    def _write(self) -> None:
         rows: list[list[Any]] = []
         first = self.saved
         while self.saved in self.done:
