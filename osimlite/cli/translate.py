@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from osimlite.cli._geometry import Geometry, named_folders
+
 
 def translate(
     file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
@@ -35,15 +37,7 @@ def translate(
     velocity: Annotated[
         float | None, typer.Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit")
     ] = None,
-    geometry: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--geometry",
-            metavar="FOLDER",
-            help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
-            "Folders in the environment variable OSIMLITE_GEOMETRY, separated by colons, come last.",
-        ),
-    ] = None,
+    geometry: Geometry = None,
 ) -> None:
     """Translate a model: writes <model>.urdf, its meshes, <model>.coordinates.json and fidelity.json.
 
@@ -59,7 +53,7 @@ def translate(
     from rich.table import Table
 
     from osimlite.document.reader import read
-    from osimlite.errors import MissingFileError, OsimliteError
+    from osimlite.errors import OsimliteError
     from osimlite.text import listed
     from osimlite.translate.export import Limits, to_urdf
 
@@ -67,9 +61,6 @@ def translate(
         raise OsimliteError(f"--to is 'urdf', not '{to}'")
     if limits not in ("none", "range"):
         raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
-    for place in geometry or ():
-        if not place.is_dir():
-            raise MissingFileError("--geometry names a folder that is not there", file=str(place))
     urdf = to_urdf(
         read(file),
         limits=cast("Limits", limits),
@@ -78,7 +69,7 @@ def translate(
         effort=effort,
         velocity=velocity,
         folder=file.parent,
-        geometry=geometry or (),
+        geometry=named_folders(geometry),
     )
     written = urdf.write(output)
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from osimlite.cli._geometry import Geometry, named_folders
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -34,15 +36,7 @@ def view(
             show_default="computed, if the motion has speeds",
         ),
     ] = None,
-    geometry: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--geometry",
-            metavar="FOLDER",
-            help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
-            "Folders in the environment variable OSIMLITE_GEOMETRY, separated by colons, come last.",
-        ),
-    ] = None,
+    geometry: Geometry = None,
     page: Annotated[
         Path | None,
         typer.Option(
@@ -71,20 +65,16 @@ def view(
 
     from osimlite.cli.simulate import quantities
     from osimlite.document.reader import read
-    from osimlite.errors import MissingFileError
     from osimlite.lint.settings import settings_for
     from osimlite.multibody import build_mechanism
     from osimlite.translate.mesh_files import geometry_folders
     from osimlite.view.shown import Shown
 
-    for place in geometry or ():
-        if not place.is_dir():
-            raise MissingFileError("--geometry names a folder that is not there", file=str(place))
     model = read(file)
     mechanism = build_mechanism(model)
     given: Mapping[str, float] = quantities(values or [], mechanism, "--set")
     settings = [Path(path) for path in settings_for(file.resolve().parent).mesh_paths]
-    folders = geometry_folders(file.parent, [*(geometry or ()), *settings])
+    folders = geometry_folders(file.parent, [*named_folders(geometry), *settings])
     shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
     console = Console(highlight=False, soft_wrap=True)
     for remark in shown.remarks:

@@ -279,7 +279,7 @@ class _Collector:
         try:
             yield
         except OsimliteError as error:
-            self.remarks.append((path, f"not drawn: {error.message}"))
+            self.remarks.append((path, error.message))
 
     def _add(
         self,
@@ -318,7 +318,10 @@ class _Collector:
         return self.meshes[found]
 
     def _place(self, owner: Component, socket: str) -> tuple[int, Array]:
-        frame = self.tree.target(owner, socket, getattr(owner, socket))
+        value = getattr(owner, socket)
+        if not value:
+            raise ModelError(f"names no frame as {socket}")
+        frame = self.tree.target(owner, socket, value)
         return self.mechanism.placement(self.tree.path_of(frame) or "")
 
     def _coordinate(self, owner: Component, socket: str) -> int:

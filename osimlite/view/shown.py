@@ -85,7 +85,8 @@ class Shown:
         findings = validate(model if file is None else file, config=config).findings
         remarks = []
         if scene.remarks:
-            remarks.append(f"not drawn: {listed([path for path, _ in scene.remarks], most=4)} ({scene.remarks[0][1]})")
+            paths = listed([path for path, _ in scene.remarks], most=4)
+            remarks.append(f"not drawn: {paths}; the first because: {scene.remarks[0][1]}")
         if isinstance(motion, Path):
             motion = read_recording(model, mechanism, motion, forces, values)
         if isinstance(motion, Recording):

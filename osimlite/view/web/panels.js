@@ -132,7 +132,7 @@
     box.replaceChildren(
       make("strong", { textContent: `${node.name} ` }), make("span", { className: "hint", textContent: node.kind }),
       make("p", { className: "path", textContent: path }), ...found.map((item) => finding(viewer, item)),
-      ...remarks.map(([, said]) => make("p", { className: "hint", textContent: said })),
+      ...remarks.map(([, said]) => make("p", { className: "hint", textContent: `not drawn: ${said}` })),
       make("table", {}, ...rows));
     box.scrollTop = 0;
   };
