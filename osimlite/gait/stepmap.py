@@ -1,0 +1,198 @@
+"""The step map: from one heel strike to the next.
+
+The Poincaré section is the moment at which a foot begins to touch the ground. A state in it is written for the first
+foot as the one that has just touched down; where the legs are alike, they change parts after every step, so that the
+map goes from step to step, and otherwise from stride to stride.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.errors import OsimliteError
+from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.steps import Walk, along_slope, falls, room_for, walks_of
+from osimlite.gait.symmetry import leg_exchange, neutral_directions
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import Watch, run_many
+
+TIGHT = 1e-10
+"""Accuracy of the integrator for maps that are differentiated."""
+
+LONGEST = 4.0
+"""A step takes at most so long, s."""
+
+AT_ONCE = 1e-6
+"""What happens within so short a time belongs to the heel strike, s."""
+
+ALONG_A_STEP = 9
+"""At so many moments of a step the neutral directions are looked for."""
+
+
+@dataclass
+class Images:
+    """Where the step map takes W states.
+
+    Attributes:
+        states: on the section (W, 2n); not a number where there was no step.
+        lengths: of the step, m (W,); of a stride of two steps, the mean.
+        times: that the step takes, s (W,); of a stride of two steps, the mean.
+        scuffs: how many there were on the way (W,).
+    """
+
+    states: Floats
+    lengths: Floats
+    times: Floats
+    scuffs: Ints
+
+
+class StepMap:
+    """The step map of a walker.
+
+    Args:
+        engine: of the model.
+        near: a state (2n,) from which it makes a step, best one at a heel strike.
+        footing: its feet; looked for if left out.
+        accuracy: of the integrator.
+        numbers: of a model of the same structure, instead of the engine's own.
+        longest: a step takes at most so long, s.
+        threads: how many work.
+
+    Attributes:
+        start: the first heel strike after `near`, written for the first foot (2n,).
+        exchange: see `leg_exchange`.
+        neutral: orthonormal directions in which nothing acts (2n, m).
+        basis: orthonormal directions of all others (2n, 2n - m).
+
+    Raises:
+        OsimliteError: there are no two feet, or the walker makes no step from there.
+    """
+
+    def __init__(
+        self,
+        engine: CompiledEngine,
+        near: ArrayLike,
+        *,
+        footing: Footing | None = None,
+        accuracy: float = TIGHT,
+        numbers: ArrayLike | None = None,
+        longest: float = LONGEST,
+        threads: int | None = None,
+    ) -> None:
+        self.engine = engine
+        self.footing = footing or find_footing(engine)
+        self.accuracy = accuracy
+        self.numbers = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64)
+        self.longest = longest
+        self.threads = threads
+        self.exchange: Ints | None = None
+        here = np.array(near, dtype=float)
+        walk, times = self._first_step(here)
+        step = walk.steps[0]
+        reports = run_many(engine, here[None], step.time, report_times=times.tolist(), numbers=self.numbers).reports[0]
+        self.exchange = leg_exchange(engine, self.footing, reports)
+        self.neutral = neutral_directions(engine, reports)
+        full, _ = np.linalg.qr(np.hstack((self.neutral, np.eye(len(here)))))
+        self.basis: Floats = full[:, self.neutral.shape[1] :]
+        self.start = self.land(step.state, step.foot)
+        if step.foot != 0:
+            self.start = self._other_leg(self.start)
+
+    def _first_step(self, near: Floats) -> tuple[Walk, Floats]:
+        runs = run_many(
+            self.engine, near[None], self.longest, numbers=self.numbers, accuracy=self.accuracy,
+            watches=falls(self.footing), most_events=room_for(self.longest), event_states=True,
+        )  # fmt: skip
+        (walk,) = walks_of(self.engine, near[None], runs, self.footing, numbers=self.numbers)
+        if not walk.steps:
+            how = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
+            raise OsimliteError(
+                f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s ({how}); give another start"
+            )
+        # At its ends a foot only just touches, where the force has no derivative.
+        return walk, np.linspace(0.0, walk.steps[0].time, ALONG_A_STEP + 2)[1:-1]
+
+    def _other_leg(self, state: Floats) -> Floats:
+        if self.exchange is not None:
+            return state[self.exchange]
+        images = self._single(state[None], 1)
+        if np.isnan(images.states).any():
+            raise OsimliteError(f"'{self.engine.mechanism.name}' makes one step only; give another start")
+        second: Floats = images.states[0]
+        return second
+
+    def land(self, state: Floats, foot: int) -> Floats:
+        """A state (2n,) a billionth of a second from a heel strike, moved onto it."""
+        contacts = [self.engine.contacts.index(name) for name in self.footing.feet[foot]]
+        rate = np.array(self.engine.derivative(0.0, state.tolist())) if self._is_own else None
+        if rate is None:
+            return state
+        dt = 1e-7
+        _, depths = along_slope(self.engine, np.array([state, state + dt * rate]), self.numbers)
+        touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
+        speed = (depths[1, touching] - depths[0, touching]) / dt
+        moved: Floats = state - depths[0, touching] / speed * rate
+        return moved
+
+    @property
+    def _is_own(self) -> bool:
+        return bool(np.array_equal(self.numbers, self.engine.numbers))
+
+    # ----------------------------------------------------------------------------------------------- images
+    def __call__(self, states: ArrayLike) -> Images:
+        """Map states (W, 2n) in which the first foot has just touched down."""
+        first = self._single(np.asarray(states, dtype=float), 0)
+        if self.exchange is not None:
+            return Images(first.states[:, self.exchange], first.lengths, first.times, first.scuffs)
+        second = self._single(first.states, 1)
+        return Images(
+            second.states,
+            (first.lengths + second.lengths) / 2.0,
+            (first.times + second.times) / 2.0,
+            first.scuffs + second.scuffs,
+        )
+
+    def _single(self, states: Floats, leading: int) -> Images:
+        """One step of the foot behind."""
+        count, trailing = len(states), 1 - leading
+        found = Images(
+            np.full(states.shape, np.nan),
+            np.full(count, np.nan),
+            np.full(count, np.nan),
+            np.zeros(count, dtype=np.int64),
+        )
+        rows = np.flatnonzero(np.isfinite(states).all(axis=1))
+        if not len(rows):
+            return found
+        # A foot of several contacts may touch with one of them while it stands on another.
+        foot = self.footing.feet[trailing]
+        stops = [Watch("strike", contact=foot[0], stops=1)] if len(foot) == 1 else []
+        runs = run_many(
+            self.engine, states[rows], self.longest, numbers=self.numbers, accuracy=self.accuracy,
+            watches=[*falls(self.footing), *stops], most_events=room_for(self.longest), event_states=True,
+            threads=self.threads,
+        )  # fmt: skip
+        walks = walks_of(self.engine, states[rows], runs, self.footing, numbers=self.numbers)
+        for row, walk in zip(rows.tolist(), walks, strict=True):
+            step = next((step for step in walk.steps if step.foot == trailing), None)
+            if step is not None:
+                found.states[row] = self.land(step.state, trailing)
+                found.lengths[row], found.times[row] = step.length, step.time
+                # The first foot touches down at the start, or a rounding later.
+                found.scuffs[row] = sum(AT_ONCE < scuff.time < step.time for scuff in walk.scuffs)
+        return found
+
+    # -------------------------------------------------------------------------------------------- coordinates
+    def reduce(self, states: ArrayLike) -> Floats:
+        """States without the neutral directions (..., 2n - m)."""
+        reduced: Floats = np.asarray(states, dtype=float) @ self.basis
+        return reduced
+
+    def expand(self, reduced: ArrayLike) -> Floats:
+        """States (..., 2n) from reduced ones; along the neutral directions they are where `start` is."""
+        states: Floats = np.asarray(reduced) @ self.basis.T + self.start @ self.neutral @ self.neutral.T
+        return states

@@ -1,0 +1,106 @@
+"""What leaves the motion of a walker as it is: exchanging the legs, and directions that nothing acts along."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.gait.footing import Footing
+from osimlite.multibody.mechanism import GROUND
+from osimlite.simulation.contact_elements import HuntCrossley
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.kernels.pointers import Floats, Ints
+
+SAME = 1e-6
+"""Two derivatives are the same if they differ by less than this part."""
+
+NUDGE = 1e-6
+"""By how much a state is moved to differentiate, rad, m and per second."""
+
+
+def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) -> Ints | None:
+    """The places (2n,) from which the state is taken when the legs change parts, or None if they are not alike.
+
+    The coordinates of one leg, from where the legs part to the foot, change places with those of the other. Whether
+    that makes no difference to the motion is tried out.
+
+    Args:
+        engine: of the model.
+        footing: with two feet.
+        states: at which to try (k, 2n).
+    """
+    mechanism = engine.mechanism
+    body_of = {
+        element.pair_name(place): element.surfaces[pair.second].body
+        for element in engine.forces.elements
+        if isinstance(element, HuntCrossley)
+        for place, pair in enumerate(element.pairs)
+    }
+    legs = []
+    for foot in footing.feet:
+        chain = [body_of[foot[-1]]]
+        while mechanism.bodies[chain[-1]].parent != GROUND:
+            chain.append(mechanism.bodies[chain[-1]].parent)
+        legs.append(chain[::-1])
+    if len(legs) != 2 or legs[0][-1] == legs[1][-1]:
+        return None
+    own = [[body for body in leg if body not in other] for leg, other in (legs, legs[::-1])]
+    places = list(engine.order)
+    freedoms = [
+        [
+            engine.order.index(c)
+            for body in leg
+            for c in mechanism.bodies[body].mobilizer.coordinates
+            if c in engine.order
+        ]
+        for leg in own
+    ]
+    if len(freedoms[0]) != len(freedoms[1]):
+        return None
+    n = len(places)
+    source = np.arange(2 * n)
+    for one, two in zip(*freedoms, strict=True):
+        source[[one, two, n + one, n + two]] = two, one, n + two, n + one
+    for state in np.asarray(states, dtype=float):
+        here, there = (np.array(engine.derivative(0.0, y.tolist())) for y in (state, state[source]))
+        if not np.allclose(here[source], there, rtol=SAME, atol=SAME * np.abs(here).max()):
+            return None
+    return source
+
+
+def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
+    """Directions (2n, m) of the state in which the motion goes on unchanged, but for going that way; orthonormal.
+
+    A walker may be anywhere along an even slope; a body that hangs in its mass centre turns as fast as it pleases. The
+    derivative does not change in these directions or changes along one of them, at all of the states.
+
+    Args:
+        engine: of the model.
+        states: some that the walk goes through (k, 2n).
+    """
+    slopes = [derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)]
+    size = slopes[0].shape[0]
+    found = np.zeros((size, 0))
+    while True:
+        rest = np.eye(size) - found @ found.T
+        rows = np.concatenate([rest @ slope for slope in slopes])
+        sizes = np.linalg.norm(rows, axis=1)
+        rows = rows[sizes > SAME] / sizes[sizes > SAME, None]
+        _, values, vectors = np.linalg.svd(rows)
+        values = np.concatenate((values, np.zeros(size - len(values))))
+        larger = vectors[values < SAME * values[0]].T
+        if larger.shape[1] <= found.shape[1]:
+            return found
+        found = larger
+
+
+def derivative_matrix(engine: CompiledEngine, state: Floats) -> Floats:
+    """Derivative (2n, 2n) of the rate of change of the state by the state."""
+    columns = []
+    for k in range(len(state)):
+        ahead, back = state.copy(), state.copy()
+        ahead[k] += NUDGE
+        back[k] -= NUDGE
+        rates = [np.array(engine.derivative(0.0, y.tolist())) for y in (ahead, back)]
+        columns.append((rates[0] - rates[1]) / (2.0 * NUDGE))
+    return np.array(columns).T
