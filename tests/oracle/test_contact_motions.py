@@ -14,9 +14,10 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.schema.springs import ExpressionBasedPointToPointForce, PointToPointSpring, SpringGeneralizedForce
 from osimlite.simulation import read_sto
+from tests.oracle.opensim_runs import simulated
 from tests.simulation.meshes import ball, block, write_obj, write_vtp
 
-opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
@@ -25,16 +26,7 @@ UP = (0.0, 0.0, -1.5707963267948966)
 
 def by_opensim(path, to, accuracy):
     """The states at the end, by label."""
-    opensim.Logger.setLevelString("off")
-    model = opensim.Model(str(path))
-    state = model.initSystem()
-    manager = opensim.Manager(model)
-    manager.setIntegratorAccuracy(accuracy)
-    manager.initialize(state)
-    manager.integrate(to)
-    table = path.with_suffix(".sto")
-    opensim.STOFileAdapter.write(manager.getStatesTable(), str(table))
-    found = read_sto(table)
+    found = simulated(path, to, accuracy)
     return dict(zip(found.columns, found.rows[-1], strict=True))
 
 

@@ -14,12 +14,13 @@ from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.external_loads import read_external_loads
 from osimlite.simulation.recorded import RecordedMotion
-from osimlite.simulation.storage import read_sto, write_sto
+from osimlite.simulation.storage import write_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
+from tests.oracle.opensim_runs import inverse_dynamics  # noqa: E402
 from tests.oracle.test_forces import JOINTS, carrier  # noqa: E402
 
 LABELS = [f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"]
@@ -143,21 +144,8 @@ def test_inverse_dynamics(corpus, name, tmp_path, monkeypatch, capfd):
     write_data("data.mot", 700, -0.05, 1.02)
     bodies = [body.name for body in mechanism.bodies]
     write_loads(tmp_path / "loads.xml", (bodies[-1], bodies[0], bodies[len(bodies) // 2], f"/bodyset/{bodies[-2]}"))
-    opensim.Logger.setLevelString("off")
-    tool = opensim.InverseDynamicsTool()
-    tool.setModelFileName("model.osim")
-    tool.setCoordinatesFileName("motion.mot")
-    tool.setExternalLoadsFileName("loads.xml")
-    tool.setStartTime(0.0)
-    tool.setEndTime(1.0)
-    tool.setOutputGenForceFileName("forces.sto")
-    tool.setResultsDir(".")
-    excluded = opensim.ArrayStr()
-    excluded.append("ALL")
-    tool.setExcludedForces(excluded)
-    assert tool.run()
+    theirs = inverse_dynamics("model.osim", "motion.mot", "loads.xml")
     capfd.readouterr()
-    theirs = read_sto("forces.sto")
     motion = RecordedMotion.read(mechanism, "motion.mot")
     ours = motion.inverse_dynamics(read_external_loads(mechanism, "loads.xml"))
     assert ours.columns == theirs.columns

@@ -23,8 +23,9 @@ from osimlite.schema.springs import (
     SpringGeneralizedForce,
 )
 from osimlite.simulation import read_sto
+from tests.oracle.opensim_runs import simulated
 
-opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
@@ -126,23 +127,11 @@ def bouncing() -> Model:
     return model
 
 
-def opensim_states(path, to):
-    opensim.Logger.setLevelString("off")
-    model = opensim.Model(str(path))
-    state = model.initSystem()
-    manager = opensim.Manager(model)
-    manager.setIntegratorAccuracy(ACCURACY)
-    manager.initialize(state)
-    manager.integrate(to)
-    opensim.STOFileAdapter.write(manager.getStatesTable(), str(path.with_suffix(".sto")))
-    return read_sto(path.with_suffix(".sto"))
-
-
 @pytest.mark.parametrize("make", [double_pendulum, walker, bouncing])
 def test_motion(make, tmp_path):
     model, to = make(), 0.5
     osimlite.write(model, tmp_path / "model.osim")
-    theirs = opensim_states(tmp_path / "model.osim", to)
+    theirs = simulated(tmp_path / "model.osim", to, ACCURACY)
     trajectory = osimlite.simulate(model, to, accuracy=ACCURACY)
     trajectory.write(tmp_path)
     ours = read_sto(tmp_path / "states.sto")

@@ -12,7 +12,8 @@ import pytest
 from osimlite.document.reader import read_text
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.recorded import RecordedMotion
-from osimlite.simulation.storage import read_sto, write_sto
+from osimlite.simulation.storage import write_sto
+from tests.oracle.opensim_runs import inverse_dynamics
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -31,20 +32,8 @@ def test_inverse_dynamics_of_real_models(corpus: Any, name: str, tmp_path: Path,
     turned = [info.motion_type == "rotational" for info in mechanism.coordinates]
     degrees = np.where(turned, np.degrees(values), values)
     write_sto("motion.mot", "motion", times, mechanism.coordinate_names, degrees.tolist(), in_degrees=True)
-    opensim.Logger.setLevelString("off")
-    tool = opensim.InverseDynamicsTool()
-    tool.setModelFileName("model.osim")
-    tool.setCoordinatesFileName("motion.mot")
-    tool.setStartTime(0.0)
-    tool.setEndTime(1.0)
-    tool.setOutputGenForceFileName("forces.sto")
-    tool.setResultsDir(".")
-    excluded = opensim.ArrayStr()
-    excluded.append("ALL")
-    tool.setExcludedForces(excluded)
-    assert tool.run()
+    theirs = inverse_dynamics("model.osim", "motion.mot")
     capfd.readouterr()
-    theirs = read_sto("forces.sto")
     ours = RecordedMotion.read(mechanism, "motion.mot").inverse_dynamics()
     assert ours.columns == theirs.columns
     assert ours.times == pytest.approx(theirs.times, abs=1e-8)

@@ -1,0 +1,45 @@
+"""What OpenSim's own programs make of a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from osimlite.simulation.storage import StoTable, read_sto
+
+
+def simulated(path: Path, to: float, accuracy: float) -> StoTable:
+    """The states of a model over time."""
+    import opensim
+
+    opensim.Logger.setLevelString("off")
+    model = opensim.Model(str(path))
+    state = model.initSystem()
+    manager = opensim.Manager(model)
+    manager.setIntegratorAccuracy(accuracy)
+    manager.initialize(state)
+    manager.integrate(to)
+    table = path.with_suffix(".sto")
+    opensim.STOFileAdapter.write(manager.getStatesTable(), str(table))
+    return read_sto(table)
+
+
+def inverse_dynamics(model: str, motion: str, loads: str | None = None, *, to: float = 1.0) -> StoTable:
+    """The forces that a motion takes, the forces of the model left aside; files are in the current folder."""
+    import opensim
+
+    opensim.Logger.setLevelString("off")
+    tool: Any = opensim.InverseDynamicsTool()
+    tool.setModelFileName(model)
+    tool.setCoordinatesFileName(motion)
+    if loads is not None:
+        tool.setExternalLoadsFileName(loads)
+    tool.setStartTime(0.0)
+    tool.setEndTime(to)
+    tool.setOutputGenForceFileName("forces.sto")
+    tool.setResultsDir(".")
+    excluded = opensim.ArrayStr()
+    excluded.append("ALL")
+    tool.setExcludedForces(excluded)
+    assert tool.run()
+    return read_sto("forces.sto")
