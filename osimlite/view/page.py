@@ -246,6 +246,7 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
         forces.append(
             {
                 "path": push.on.path,
+                "surface": push.on.surface,
                 "body": push.on.body,
                 "near": push.on.near.tolist(),
                 "values": _base64(np.hstack((push.forces, torques)).astype("<f4")),

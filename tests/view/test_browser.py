@@ -154,6 +154,8 @@ def test_a_motion_plays_and_stops_and_can_be_scrubbed(open_page, tmp_path):
     assert page.run("v.time") == pytest.approx(0.2)
     (arrow,) = page.run("v.arrows")
     assert arrow["path"] == "/forceset/RFootForce"
+    loaded = "v.stage.layered.contact.filter((mesh) => mesh.userData.loaded).map((mesh) => mesh.name)"
+    assert page.run(loaded) == ["/contactgeometryset/RFootContact"]
     page.run("v.setTime(0.45)")
     assert page.run("v.arrows") == []
     page.page.select_option("#speed", "4")

@@ -44,6 +44,11 @@
     },
     "ellipsoid-point": (f) => (x) => f.radius * [
       Math.sin(x[1]), -Math.sin(x[0]) * Math.cos(x[1]), Math.cos(x[0]) * Math.cos(x[1])][f.component],
+    "arc-point": (f) => (x) => {
+      const a = x[0] + f.neutral[0], b = x[1] + f.neutral[1];
+      const t = Math.acos(Math.cos(a) * Math.cos(b)), across = t < 1e-4 ? 0.5 : (1 - Math.cos(t)) / (t * Math.sin(t));
+      return f.length * [-across * Math.sin(b), t < 1e-4 ? 1 : Math.sin(t) / t, across * Math.sin(a) * Math.cos(b)][f.component];
+    },
   };
 
   // The function that data describes; that of null is its first argument.

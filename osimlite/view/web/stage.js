@@ -3,7 +3,7 @@
 (() => {
   const { point } = window.osimlite;
   const T = window.THREE;
-  const FORCE = 0xd55e00, SELECTED = 0x1f6feb, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
+  const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
 
   const floats = (text) => new Float32Array(bytes(text).buffer);
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -149,9 +149,11 @@
         const group = new T.Group();
         group.name = force.path;
         group.userData = force;
-        const material = new T.MeshStandardMaterial({ color: FORCE, roughness: 0.5 });
+        const material = new T.MeshStandardMaterial({ color: FORCE, roughness: 0.5, depthTest: false, transparent: true });
         const shaft = new T.Mesh(new T.CylinderGeometry(1, 1, 1, 14).translate(0, 0.5, 0), material);
         const head = new T.Mesh(new T.ConeGeometry(1, 1, 18).translate(0, 0.5, 0), material);
+        // Seen through whatever stands before it: forces act inside of what they act on.
+        shaft.renderOrder = head.renderOrder = 10;
         group.add(shaft, head);
         this.layers.forces.add(group);
         return group;
@@ -226,10 +228,12 @@
 
     push(row) {
       const motion = this.data.motion, up = new T.Vector3(0, 1, 0);
+      const loaded = new Set();
       for (const arrow of this.arrows) {
         const record = arrow.userData, six = row < 0 ? null : record.values.subarray(6 * row, 6 * row + 6);
         const force = six ? vector(six) : new T.Vector3(), size = force.length();
         arrow.visible = size > 0.005 * motion.largest;
+        if (size > 0) loaded.add(record.surface);
         if (!arrow.visible) continue;
         const pose = this.poses[record.body < 0 ? this.poses.length - 1 : record.body];
         // A force F with the moment M about the body's origin acts along the line through F x M / F².
@@ -243,6 +247,11 @@
         arrow.children[0].scale.set(thick, Math.max(length - head, 1e-6), thick);
         arrow.children[1].position.y = length - head;
         arrow.children[1].scale.set(2.4 * thick, head, 2.4 * thick);
+      }
+      for (const mesh of this.layered.contact || []) {
+        const is = loaded.has(mesh.userData.path);
+        if (is !== mesh.userData.loaded) mesh.material.color.copy(is ? new T.Color(TOUCHING) : toned(mesh.userData.color));
+        mesh.userData.loaded = is;
       }
     }
 
