@@ -1,0 +1,84 @@
+"""Motions of meshes on an elastic foundation, and where their files are looked for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import Body, ContactHalfSpace, ContactMesh, Model, PlanarJoint
+from osimlite.errors import ModelError
+from osimlite.schema.contact_forces import ElasticFoundationForce
+from tests.simulation.meshes import ball, block, write_obj
+
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+
+
+def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
+    """An egg that falls on a hexagonal stone, which stands on the floor it may reach too."""
+    write_obj(folder / "egg.obj", *ball((0.15, 0.1, 0.1), 12, 8))
+    write_obj(folder / "stone.obj", *block((0.2, 0.2, 0.2)))
+    model = Model(name="thrown")
+    body = model.add(Body(name="egg", mass=1.0, inertia=(0.004, 0.006, 0.006, 0, 0, 0)))
+    joint = PlanarJoint(name="flies")
+    for place, (name, value) in enumerate((("turn", 0.3), ("along", 0.15), ("height", 0.33))):
+        joint.coordinates[place].name, joint.coordinates[place].default_value = name, value
+    model.add(joint.between(model.ground, body))
+    floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -np.pi / 2))
+    stone = ContactMesh(name="stone", socket_frame=model.ground, filename="stone.obj")
+    shell = ContactMesh(name="shell", socket_frame=body, filename="egg.obj")
+    model.add(floor, stone, shell)
+    force = ElasticFoundationForce(name="contact", transition_velocity=0.1)
+    force.contact_parameters.objects.append(
+        ElasticFoundationForce.ContactParameters(
+            geometry=(floor, stone, shell),
+            stiffness=1e6,
+            dissipation=dissipation,
+            static_friction=friction,
+            dynamic_friction=friction,
+        )
+    )
+    model.add(force)
+    return model
+
+
+def test_energy_on_a_plane_is_kept_without_dissipation(tmp_path):
+    model = thrown(tmp_path)
+    model.force_set.objects[0].contact_parameters.objects[0].geometry = ("floor", "shell")
+    trajectory = osimlite.simulate(model, 0.6, accuracy=1e-9, folder=tmp_path)
+    total, stored = trajectory.energy["total"], trajectory.energy["stored"]
+    assert stored.max() > 0.5
+    assert np.ptp(total) < 1e-6 * stored.max()
+
+
+def test_fixed_steps_converge_at_first_order(tmp_path):
+    model = thrown(tmp_path, dissipation=0.5, friction=0.5)
+    best = osimlite.simulate(model, 0.2, accuracy=1e-9, folder=tmp_path)
+    first = best.summary["contact_events"][0]
+    assert first["contact"] == "contact (shell, stone)" and first["time_s"] < 0.15
+    coarse, fine = (
+        np.abs(osimlite.simulate(model, 0.2, fixed_step=step, folder=tmp_path).values[-1] - best.values[-1]).max()
+        for step in (4e-4, 2e-4)
+    )
+    assert coarse / fine == pytest.approx(2.0, rel=0.2)
+    assert fine < 1e-2
+
+
+def test_where_mesh_files_are(tmp_path, monkeypatch):
+    model = thrown(tmp_path)
+    with pytest.raises(ModelError, match=r"the mesh file 'stone\.obj' is not there; put it beside the model's file"):
+        osimlite.simulate(model, 0.01)
+    monkeypatch.chdir(tmp_path)
+    osimlite.simulate(model, 0.01)
+    inner = tmp_path / "models"
+    inner.mkdir()
+    osimlite.write(model, inner / "thrown.osim")
+    (inner / "Geometry").mkdir()
+    for name in ("egg.obj", "stone.obj"):
+        (tmp_path / name).rename(inner / "Geometry" / name)
+    words = [sys.executable, "-m", "osimlite", "simulate", "models/thrown.osim", "--to", "0.02", "-o", "out"]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
