@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, ca
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
+from osimlite.schema.complaints import explained, misspelt
+from osimlite.schema.equality import same
 from osimlite.schema.fields import (
     Held,
     Kind,
@@ -122,12 +124,12 @@ class Object(BaseModel, metaclass=ObjectType):
         for given in properties.keys() - type(self).model_fields.keys():
             spec = field_specs(type(self)).get(given)
             if spec is None or spec.name in properties:
-                raise MissingNameError(_misspelt(type(self), given))
+                raise MissingNameError(misspelt(type(self), given))
             properties[spec.name] = properties.pop(given)
         try:
             super().__init__(**properties)
         except ValidationError as error:
-            raise ModelError(_explain(type(self), error)) from None
+            raise ModelError(explained(type(self), error)) from None
         _set(self, "_model", None)
         _set(self, "_index", None)
         _set(self, "_layout", None)
@@ -204,26 +206,26 @@ class Object(BaseModel, metaclass=ObjectType):
             spec = field_specs(type(self)).get(name)
             if spec is not None:
                 return getattr(self, spec.name)
-            raise MissingNameError(_misspelt(type(self), name))
+            raise MissingNameError(misspelt(type(self), name))
         raise AttributeError(name)
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in type(self).model_fields:
             spec = field_specs(type(self)).get(name)
             if spec is None:
-                raise MissingNameError(_misspelt(type(self), name))
+                raise MissingNameError(misspelt(type(self), name))
             name = spec.name
         epoch.count += 1
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
-            raise ModelError(_explain(type(self), error)) from None
+            raise ModelError(explained(type(self), error)) from None
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented
         assert isinstance(other, Object)
-        return _same(_whole(self), _whole(other)) and _unknown(self) == _unknown(other)
+        return same(_whole(self), _whole(other)) and _unknown(self) == _unknown(other)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -426,23 +428,6 @@ def _named_components(item: Object) -> Iterator[Component]:
                 yield word
 
 
-def _same(left: Any, right: Any) -> bool:
-    """Equality of stored values; NaN equals NaN, and a component given as a reference counts by its name."""
-    if left is right:
-        return True
-    if isinstance(left, dict):
-        return left.keys() == right.keys() and all(_same(value, right[key]) for key, value in left.items())
-    if isinstance(left, (tuple, list)):
-        return (
-            isinstance(right, (tuple, list))
-            and len(left) == len(right)
-            and all(_same(one, other) for one, other in zip(left, right, strict=True))
-        )
-    if isinstance(left, float) and isinstance(right, float):
-        return left == right or (left != left and right != right)
-    return bool(left == right)
-
-
 def _whole(item: Object) -> dict[str, Any]:
     """The values of an object by field name, those included that no one has asked for yet."""
     for name in defaults(type(item))[1]:
@@ -459,20 +444,3 @@ def _carry(original: Any, clone: Any, layout: Layout | None) -> Any:
     _set(clone, "_index", original._index)
     _set(clone, "_layout", layout)
     return clone
-
-
-def _misspelt(cls: type[Object], name: str) -> str:
-    from osimlite.text import did_you_mean
-
-    known = [field_name for field_name in cls.model_fields]
-    # Sockets are known by the middle of their names: ``frame`` is ``socket_frame``.
-    within = [field_name for field_name in known if f"_{name}_" in f"{field_name}_"]
-    better = f"; did you mean '{min(within, key=len)}'?" if within and len(name) > 3 else did_you_mean(name, known)
-    return f"{cls.__name__} has no property '{name}'{better}"
-
-
-def _explain(cls: type[Object], error: ValidationError) -> str:
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"]) or "?"
-    reason = first["msg"].removeprefix("Value error, ")
-    return f"{cls.__name__}.{place}: {reason}"

@@ -1,6 +1,7 @@
 """Typed references: a field's type says what it may name and by which of OpenSim's rules the text is resolved.
 
-The rules themselves are in :mod:`osimlite.schema.tree`. In Python every such field also takes the component itself.
+The rules themselves are in :mod:`osimlite.schema.resolution`. In Python every such field also takes the component
+itself.
 """
 
 from __future__ import annotations

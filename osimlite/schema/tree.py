@@ -1,7 +1,6 @@
-"""The component tree of a model: paths, and the rules by which a text resolves to a component.
+"""The component tree of a model: its paths, its objects by class, and what its references lead to.
 
-Every rule is OpenSim 4.6's (``schemas/references.json`` names the source of each): sockets walk exactly, other
-properties look a bare name up in one set, and nothing searches.
+The rules by which a text resolves to a component are in :mod:`osimlite.schema.resolution`.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.errors import ModelError
 from osimlite.schema.base import (
@@ -23,29 +22,16 @@ from osimlite.schema.base import (
     reference_specs,
 )
 from osimlite.schema.fields import Held, Reference, epoch
+from osimlite.schema.resolution import ILLEGAL_CHARACTERS as ILLEGAL_CHARACTERS
+from osimlite.schema.resolution import PATH_RULES, RULES, last_name
+from osimlite.schema.resolution import Failure as Failure
+from osimlite.schema.resolution import Resolution as Resolution
+from osimlite.schema.resolution import is_a as is_a
+from osimlite.schema.resolution import normalised as normalised
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
-
-Failure = Literal["missing", "wrong-type", "empty", "illegal"]
-
-ILLEGAL_CHARACTERS = "\\*+ \t\n/"
-"""Characters OpenSim refuses in the name of a component."""
-
-_NEVER_IN_PATHS = frozenset(ILLEGAL_CHARACTERS) - {"/"}
-
-
-class Resolution(NamedTuple):
-    """What a reference leads to.
-
-    `target` is the component, or None with the `failure`: nothing there, a component of another class (`found`), no
-    text, or a text that is not a path.
-    """
-
-    target: Component | None
-    failure: Failure | None = None
-    found: Component | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +117,7 @@ class Tree:
         """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
         found = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
         if found is None:
-            named = [known for known in self.by_path if _last(known) == _last(f"/{path}")]
+            named = [known for known in self.by_path if last_name(known) == last_name(f"/{path}")]
             better = f"; did you mean '{named[0]}'?" if named else did_you_mean(path, self.by_path)
             raise ModelError(f"no component at '{path}'{better}")
         return found
@@ -162,12 +148,12 @@ class Tree:
     def lookup(self, reference: Reference, text: str, owner: Component) -> Resolution:
         """Follow `text` as the value of a property of `owner` with this kind of reference."""
         text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target
-        if not text.startswith("/") or rule not in _PATH_RULES or target == "Frame":
-            return _RULES[rule](self, text, owner, target)
+        if not text.startswith("/") or rule not in PATH_RULES or target == "Frame":
+            return RULES[rule](self, text, owner, target)
         # An absolute path leads to the same component from everywhere, and hundreds of points name one body.
         known = self._resolved.get((rule, target, text))
         if known is None:
-            known = self._resolved[rule, target, text] = _RULES[rule](self, text, owner, target)
+            known = self._resolved[rule, target, text] = RULES[rule](self, text, owner, target)
         return known
 
     def target(self, owner: Component, name: str, value: str | Component) -> Component:
@@ -308,7 +294,8 @@ class Tree:
             return Resolution(None, "wrong-type", found)
         return Resolution(found)
 
-    def _walk(self, text: str, base: str, target: str) -> Resolution:
+    def walk(self, text: str, base: str, target: str) -> Resolution:
+        """What is at a path, absolute or from the path `base`."""
         path: str | None = text if text.startswith("/") else f"{base}/{text}"
         plain = self.by_path.get(path or "")
         if plain is not None:
@@ -326,56 +313,28 @@ class Tree:
             self._names[key] = names
         return self._names[key]
 
-    def _of_class(self, target: str) -> dict[str, Component]:
-        return self._named(target, lambda: ((_last(self._paths[id(c)]), c) for c in self.components if is_a(c, target)))
+    def of_class(self, target: str) -> dict[str, Component]:
+        """The components of a class by name, of equal names the first."""
+        return self._named(
+            target, lambda: ((last_name(self._paths[id(c)]), c) for c in self.components if is_a(c, target))
+        )
 
-    def _members(self, path: str, target: str) -> dict[str, Component]:
+    def members(self, path: str, target: str) -> dict[str, Component]:
+        """The components of a class that are right below a path, by name."""
         holder = self.by_path.get(path)
 
-        def members() -> Iterator[tuple[str, Component]]:
+        def below() -> Iterator[tuple[str, Component]]:
             for component in self._below.get(id(holder), ()):
                 if is_a(component, target):
-                    yield _last(self._paths[id(component)]), component
+                    yield last_name(self._paths[id(component)]), component
 
-        return self._named(f"{path}:{target}", members)
-
-    def _wrap_objects(self) -> dict[str, Component]:
-        return self._of_class("WrapObject")
-
-
-def is_a(component: Object, target: str) -> bool:
-    """Whether the component's class is `target` or derives from it."""
-    return _derives(type(component), target)
-
-
-@cache
-def _derives(cls: type[Object], target: str) -> bool:
-    return any(base.__name__ == target for base in cls.__mro__)
+        return self._named(f"{path}:{target}", below)
 
 
 @cache
 def _names_others(cls: type[Object]) -> bool:
     """Whether an object of this class can name a component."""
     return cls.name_reference is not None or bool(reference_specs(cls))
-
-
-def normalised(path: str) -> str | None:
-    """An absolute path without doubled slashes, ``.`` and ``..``; None if it climbs above the root."""
-    parts: list[str] = []
-    for part in path.split("/"):
-        if part in ("", "."):
-            continue
-        if part == "..":
-            if not parts:
-                return None
-            parts.pop()
-        else:
-            parts.append(part)
-    return "/" + "/".join(parts)
-
-
-def _last(path: str) -> str:
-    return path.rsplit("/", 1)[1] or "/"
 
 
 def _name_in_tree(spec: FieldSpec, item: Component) -> str:
@@ -385,88 +344,3 @@ def _name_in_tree(spec: FieldSpec, item: Component) -> str:
     if form == "unnamed" and is_a(item, "ModelComponentSet"):
         return type(item).__name__.lower()
     return item.name or str(getattr(item, "class_name", "") or type(item).tag).lower()
-
-
-def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    if _is_no_path(text):
-        return Resolution(None, "illegal")
-    if target == "Frame":
-        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever path the file
-        # gives; not of one that it merely holds among its components.
-        parent = tree.parent_of(owner)
-        if parent is not None and is_a(parent, "Frame") and not any(item is owner for item in parent.subcomponents):
-            return Resolution(parent)
-    if not text:
-        return Resolution(None, "empty")
-    base = tree.path_of(owner) or "/"
-    return tree._walk(text, "" if base == "/" else base, target)
-
-
-def _is_no_path(text: str) -> bool:
-    """Whether OpenSim cannot even read the text as a path, which it does of every socket when it loads the file."""
-    if not _NEVER_IN_PATHS.isdisjoint(text):
-        return True
-    return text.startswith("/") and normalised(text) is None
-
-
-def _model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    return tree._walk(text, "", target) if text else Resolution(None, "empty")
-
-
-def _path_or_member(set_path: str) -> Callable[[Tree, str, Component, str], Resolution]:
-    """First a path from the model, then OpenSim appends the text to the path of the set."""
-
-    def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-        if not text:
-            return Resolution(None, "empty")
-        first = tree._walk(text, "", target)
-        if first.target is not None:
-            return first
-        second = tree._walk(f"{set_path}/{text}", "", target)
-        return second if second.target is not None or second.failure == "wrong-type" else first
-
-    return rule
-
-
-def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Callable[..., Resolution]:
-    """A bare name among `members`; a path is no name."""
-
-    def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-        if not text:
-            return Resolution(None, "empty")
-        found = members(tree, owner, target).get(text)
-        if found is None:
-            other = next((c for c in tree.components if _last(tree.path_of(c) or "/") == text), None)
-            return Resolution(None, "missing" if other is None else "wrong-type", other)
-        return Resolution(found)
-
-    return rule
-
-
-def _nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """Files, columns and positions name nothing in the component tree."""
-    return Resolution(owner)
-
-
-_PATH_RULES = frozenset(("socket", "owner-path", "model-path"))
-
-_RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
-    "socket": _socket,
-    "owner-path": _socket,
-    "model-path": _model_path,
-    "coordinate-name": _bare(lambda tree, owner, target: tree._of_class("Coordinate")),
-    "body-name": _bare(lambda tree, owner, target: tree._members("/bodyset", "Body")),
-    "joint-name": _bare(lambda tree, owner, target: tree._members("/jointset", "Joint")),
-    "actuator-name": _bare(lambda tree, owner, target: tree._members("/forceset", "Actuator")),
-    "muscle-name": _bare(lambda tree, owner, target: tree._members("/forceset", "Muscle")),
-    "wrap-object-name": _bare(lambda tree, owner, target: tree._wrap_objects()),
-    "own-joint-coordinate": _bare(lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Coordinate")),
-    "set-member": _bare(lambda tree, owner, target: tree._members(tree.path_of(owner) or "/", "Component")),
-    "frame-path-or-body-name": _path_or_member("/bodyset"),
-    "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),
-    "input": _nothing_to_resolve,
-    "file": _nothing_to_resolve,
-    "column": _nothing_to_resolve,
-    "positional": _nothing_to_resolve,
-    "point-index": _nothing_to_resolve,
-}
