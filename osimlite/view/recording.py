@@ -39,6 +39,8 @@ def read_recording(
     path: str | Path,
     forces: str | Path | None = None,
     values: Mapping[str, float] | None = None,
+    *,
+    folder: Path | None = None,
 ) -> Recording:
     """The motion in a .sto or .mot file.
 
@@ -52,6 +54,7 @@ def read_recording(
         path: of the motion.
         forces: a file with forces, or None.
         values: of coordinates by name that are to be the same all the time.
+        folder: where the model's file is, for the files that contact meshes name.
 
     Raises:
         OsimliteError: a file is missing or no motion; see :meth:`osimlite.simulation.recorded.RecordedMotion.read`.
@@ -72,7 +75,7 @@ def read_recording(
         columns = _columns(read_sto(forces), recorded.times)
     elif speeds is not None:
         try:
-            columns = computed_forces(model, mechanism, recorded.times, rows, speeds)
+            columns = computed_forces(model, mechanism, recorded.times, rows, speeds, folder)
         except OsimliteError as error:
             remarks.append(f"no forces are shown: {error.message}")
     still = np.zeros_like(rows) if speeds is None else speeds
@@ -88,7 +91,9 @@ def _follow(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
         rows[:, coupler.dependent] = [coupler.function.evaluate(row[own])[0] for row in rows]
 
 
-def computed_forces(model: Model, mechanism: Mechanism, times: Array, values: Array, speeds: Array) -> dict[str, Array]:
+def computed_forces(
+    model: Model, mechanism: Mechanism, times: Array, values: Array, speeds: Array, folder: Path | None = None
+) -> dict[str, Array]:
     """What the forces of a model do at n states, as columns (n,) by the labels of OpenSim's ForceReporter.
 
     Forces that osimlite does not know are left out. No engine is needed.
@@ -99,8 +104,10 @@ def computed_forces(model: Model, mechanism: Mechanism, times: Array, values: Ar
         times: (n,), s.
         values: of the coordinates (n, k).
         speeds: generalized speeds (n, k).
+        folder: where the model's file is, for the files that contact meshes name.
 
     Raises:
+        OsimliteError: a file is missing or cannot be read.
         SimulationError: at a state the rates of coordinates are not defined.
     """
     from osimlite.simulation.elements import force_elements
@@ -108,7 +115,7 @@ def computed_forces(model: Model, mechanism: Mechanism, times: Array, values: Ar
     from osimlite.translate.passes.merge_fixed import merge_fixed
     from osimlite.translate.robot import build_robot
 
-    elements = force_elements(model, mechanism, skip_unsupported=True).elements
+    elements = force_elements(model, mechanism, skip_unsupported=True, folder=folder).elements
     if not elements:
         return {}
     robot = merge_fixed(build_robot(mechanism, body_frames=False))

@@ -88,7 +88,8 @@ class Shown:
             paths = listed([path for path, _ in scene.remarks], most=4)
             remarks.append(f"not drawn: {paths}; the first because: {scene.remarks[0][1]}")
         if isinstance(motion, Path):
-            motion = read_recording(model, mechanism, motion, forces, values)
+            folder = None if file is None else file.parent
+            motion = read_recording(model, mechanism, motion, forces, values, folder=folder)
         if isinstance(motion, Recording):
             remarks += motion.remarks
         q = mechanism.assemble(values or {})

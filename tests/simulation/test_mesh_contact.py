@@ -12,6 +12,7 @@ import osimlite
 from osimlite import Body, ContactHalfSpace, ContactMesh, Model, PlanarJoint
 from osimlite.errors import ModelError
 from osimlite.schema.contact_forces import ElasticFoundationForce
+from osimlite.view.shown import Shown
 from tests.simulation.meshes import ball, block, write_obj
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
@@ -82,3 +83,17 @@ def test_where_mesh_files_are(tmp_path, monkeypatch):
     words = [sys.executable, "-m", "osimlite", "simulate", "models/thrown.osim", "--to", "0.02", "-o", "out"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_recording_is_shown_with_the_forces_on_its_meshes(tmp_path):
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    model = thrown(inner)
+    osimlite.write(model, inner / "thrown.osim")
+    trajectory = osimlite.simulate(model, 0.15, folder=inner)
+    trajectory.to_sto(tmp_path / "states.sto")
+    shown = Shown.of(model, file=inner / "thrown.osim", motion=tmp_path / "states.sto")
+    assert shown.motion is not None
+    label = "contact.egg.force.Y"
+    assert shown.motion.forces[label] == pytest.approx(trajectory.forces[label], abs=1e-6)
+    assert trajectory.forces[label].max() > 1.0
