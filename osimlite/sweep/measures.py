@@ -42,8 +42,9 @@ class Batch:
     """Runs of models of one structure.
 
     Attributes:
-        engine: of one of the models.
-        engines: of each run.
+        engine: of a model of the same structure.
+        engine_of: the engine of the model of a run, by its place.
+        numbers: of the compiled engines (W, m); None if all are those of `engine`.
         starts: initial states (W, 2n), in the engine's order.
         runs: what came of them.
         values: of the variables (W, d).
@@ -53,7 +54,8 @@ class Batch:
     """
 
     engine: Any
-    engines: Sequence[Any]
+    engine_of: Callable[[int], Any]
+    numbers: Floats | None
     starts: Floats
     runs: Runs
     values: Floats
@@ -201,8 +203,12 @@ def energy(engine: Any) -> Measure:
 
     def gained(batch: Batch) -> Floats:
         runs = batch.runs
-        ends = zip(batch.engines, runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True)
-        return np.array([sum(one.energies(t, end)) - sum(one.energies(0.0, start)) for one, t, start, end in ends])
+        ends = zip(runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True)
+        found = []
+        for number, (t, start, end) in enumerate(ends):
+            one = batch.engine_of(number)
+            found.append(sum(one.energies(t, end)) - sum(one.energies(0.0, start)))
+        return np.array(found)
 
     return Measure("energy", gained)
 
@@ -214,7 +220,8 @@ def _ends(place: int | None, locked: float, batch: Batch) -> Floats:
 def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
     found = []
     names, contacts = batch.names, batch.engine.contacts
-    for k, engine in enumerate(batch.engines):
+    for k in range(len(batch.starts)):
+        engine = batch.engine_of(k)
         run = Run(
             dict(zip(names, batch.values[k].tolist(), strict=True)),
             State(engine, batch.starts[k]),

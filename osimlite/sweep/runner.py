@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from osimlite.sweep.variables import Floats
 from osimlite.sweep.variants import Variant, Variants
 
 DONE, STOPPED, FAILED = "done", "stopped", "failed"
+
+Endings = list[tuple[str, str | None]]
+"""How each run ended, and why."""
 
 
 @dataclass(frozen=True)
@@ -84,16 +88,21 @@ class Runner:
         for group in groups.values():
             places = [place for place, _ in group]
             starts = np.stack([self.variants.start(variant, values[place]) for place, variant in group])
-            runs, why = self._simulate([variant for _, variant in group], starts)
+            # Any of the same structure will do, and making one takes time.
+            given = self.variants.given
+            leading = given if group[0][1].structure == given.structure else group[0][1]
+            runs, why = self._simulate(leading.engine, [variant for _, variant in group], starts)
             for number, place in enumerate(places):
                 status[place], reasons[place] = why[number]
                 times[place] = runs.times[number]
             good = np.array([number for number, place in enumerate(places) if status[place] != FAILED], dtype=int)
             if len(good) == 0:
                 continue
+            chosen = [group[number][1] for number in good]
             batch = Batch(
-                group[0][1].engine,
-                [group[number][1].engine for number in good],
+                leading.engine,
+                partial(_engine, chosen),
+                self._numbers(chosen),
                 starts[good],
                 _chosen(runs, good),
                 values[places][good],
@@ -124,7 +133,7 @@ class Runner:
             if len(rows) > 1:
                 # One by one, to find which run it is.
                 for number, row in enumerate(rows):
-                    self._measure(made, _part(batch, np.array([number])), np.array([row]), column, status, reasons)
+                    self._measure(made, _part(batch, number), np.array([row]), column, status, reasons)
                 return
             import sys
 
@@ -133,15 +142,14 @@ class Runner:
         reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
 
     # --------------------------------------------------------------------------------------------- motions
-    def _simulate(self, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, list[tuple[str, str | None]]]:
+    def _simulate(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
         if self.plan.engine != "compiled":
-            return self._one_by_one(variants, starts)
-        fixed = self.variants.is_fixed
+            return self._one_by_one(engine, variants, starts)
         runs = run_many(
-            variants[0].engine,
+            engine,
             starts,
             self.plan.to,
-            numbers=None if fixed else np.stack([variant.engine.numbers for variant in variants]),
+            numbers=self._numbers(variants),
             accuracy=self.plan.accuracy,
             report_times=self._report_times.tolist(),
             watches=self._watches,
@@ -153,6 +161,9 @@ class Runner:
         finite = [bool(np.isfinite(state).all()) for state in runs.states]
         why = [self._ending(runs, number, finite[number]) for number in range(len(starts))]
         return runs, why
+
+    def _numbers(self, variants: Sequence[Variant]) -> Floats | None:
+        return None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
 
     def _ending(self, runs: Runs, number: int, is_finite: bool) -> tuple[str, str | None]:
         ending, t = ENDINGS[int(runs.endings[number])], runs.times[number]
@@ -173,11 +184,11 @@ class Runner:
         names = {stop.words: abs(y[stop.coordinate] - stop.level) for stop in self.plan.stops}
         return min(names, key=lambda name: names[name])
 
-    def _one_by_one(self, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, list[tuple[str, str | None]]]:
+    def _one_by_one(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
         """With an engine that computes one motion at a time."""
         plan = self.plan
-        why: list[tuple[str, str | None]] = []
-        order, contacts = variants[0].engine.order, variants[0].engine.contacts
+        why: Endings = []
+        order, contacts = engine.order, engine.contacts
         count, size = len(order), len(starts)
         times, states = np.zeros(size), starts.copy()
         reports = np.full((size, len(self._report_times), 2 * count), np.nan)
@@ -214,6 +225,10 @@ class Runner:
         return Runs(times, states, still, np.zeros((size, 3), dtype=np.int64), reports, events, peaks), why
 
 
+def _engine(variants: Sequence[Variant], place: int) -> Any:
+    return variants[place].engine
+
+
 def _chosen(runs: Runs, places: Any) -> Runs:
     return Runs(
         runs.times[places],
@@ -227,10 +242,13 @@ def _chosen(runs: Runs, places: Any) -> Runs:
     )
 
 
-def _part(batch: Batch, places: Any) -> Batch:
+def _part(batch: Batch, place: int) -> Batch:
+    """One run of several."""
+    places = np.array([place])
     return Batch(
         batch.engine,
-        [batch.engines[place] for place in places],
+        lambda number: batch.engine_of(place),
+        None if batch.numbers is None else batch.numbers[places],
         batch.starts[places],
         _chosen(batch.runs, places),
         batch.values[places],

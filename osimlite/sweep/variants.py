@@ -1,15 +1,16 @@
 """The models of a sweep: those that a sample's properties and parameters make of the given one.
 
-A model is made afresh for each new set of numbers, from where they have an effect: all of it in general, and the
-elements of the forces alone if only forces have changed. The numbers are those of a model that is built from a file,
-since the same functions make them.
+A model is made afresh for each new set of numbers. If only forces have changed, and the compiled engine computes them,
+their elements alone are made, and their numbers put into the engine's vector. The numbers are those of a model that is
+built from a file either way, since the same functions make them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.kernels.items import Item, Places, items_of
 from osimlite.simulation.run import Simulation
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.properties import Setter
@@ -30,21 +32,28 @@ MOST_KEPT = 64
 """So many models are kept: a grid asks for the same ones again and again."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Variant:
     """A model made ready.
 
     Attributes:
-        engine: of it.
         start: its default state (2n,), in the engine's order.
         structure: equal for variants that differ in numbers only.
-        simulation: that it was made for; None if only its forces are new.
+        numbers: all numbers of the compiled engine, empty for others.
+        maker: makes its engine.
+        simulation: that the engine is part of; None if only forces are new.
     """
 
-    engine: Any
     start: Floats
     structure: bytes
-    simulation: Simulation | None
+    numbers: Floats
+    maker: Callable[[], Any]
+    simulation: Simulation | None = None
+
+    @cached_property
+    def engine(self) -> Any:
+        """The engine of this very model."""
+        return self.maker()
 
 
 class Variants:
@@ -69,7 +78,7 @@ class Variants:
         self._adopt(plan.model())
         self.given = self._whole()
         self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
-        self._builder: ElementBuilder | None = None
+        self._force_numbers: ForceNumbers | None = None
 
     @property
     def is_fixed(self) -> bool:
@@ -100,7 +109,7 @@ class Variants:
 
     def start(self, variant: Variant, values: Sequence[float]) -> Floats:
         """Initial state of a sample (2n,)."""
-        row, engine = variant.start.copy(), variant.engine
+        row, engine = variant.start.copy(), self.given.engine
         for place, target in self._starts:
             number = engine.order.index(engine.mechanism.coordinate_index(target.coordinate))
             row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
@@ -170,31 +179,72 @@ class Variants:
 
     def _whole(self) -> Variant:
         simulation = Simulation(self.model, self._plan.engine, skip_unsupported=self._plan.skip_unsupported)
-        return _variant(simulation.engine, simulation)
+        engine: Any = simulation.engine
+        infos = engine.mechanism.coordinates
+        start = simulation.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
+        kind = (len(infos), *engine.order, *engine.contacts)
+        structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
+        return Variant(np.array(start), structure, getattr(engine, "numbers", np.zeros(0)), lambda: engine, simulation)
 
     def _make(self, values: Sequence[float]) -> Variant:
         self.put(values)
         if self._forces is None or self.given.simulation is None:
             return self._whole()
-        mechanism, forces = self.given.simulation.mechanism, self.given.simulation.forces
-        if self._builder is None:
-            self._builder = ElementBuilder(self.model, mechanism, False, Path())
-        made = {}
-        for force in self._forces:
+        if self._force_numbers is None:
+            self._force_numbers = ForceNumbers(self.model, self.given)
+        return self._force_numbers.variant(self._forces) or self._whole()
+
+
+class ForceNumbers:
+    """The numbers of forces within those of the compiled engine.
+
+    Args:
+        model: whose forces change, and nothing else.
+        given: the same model before.
+    """
+
+    def __init__(self, model: Model, given: Variant) -> None:
+        engine = given.engine
+        self._given, self._forces = given, engine.forces
+        self._builder = ElementBuilder(model, engine.mechanism, False, Path())
+        freedoms = {place: number for number, place in enumerate(engine.order)}
+        self._places = Places(engine.mechanism, freedoms, engine.placements)
+        self._items = {element.path: items_of(element, self._places) for element in engine.forces.elements}
+        # The numbers of all items are the last ones, in their order.
+        self._first, place = {}, len(given.numbers) - sum(_length(items) for items in self._items.values())
+        for path, items in self._items.items():
+            self._first[path] = place
+            place += _length(items)
+
+    def variant(self, forces: Sequence[Force]) -> Variant | None:
+        """The model with what some forces are now; None if more has changed than numbers."""
+        numbers, made = self._given.numbers.copy(), {}
+        for force in forces:
             element = self._builder.element(force)
+            old, items = self._items.get(element.path), items_of(element, self._places)
+            if old is None or [_kind(item) for item in items] != [_kind(item) for item in old]:
+                return None
+            place = self._first[element.path]
+            numbers[place : place + _length(items)] = [x for item in _computed(items) for x in item.numbers]
             made[element.path] = element
-        known = {element.path for element in forces.elements}
-        if not made.keys() <= known:
-            return self._whole()
-        changed = tuple(made.get(element.path, element) for element in forces.elements)
-        make = engine_factory(self._plan.engine)
-        return _variant(make(mechanism, replace(forces, elements=changed), Settings()), None)
+        elements = tuple(made.get(element.path, element) for element in self._forces.elements)
+        mechanism, changed = self._places.mechanism, replace(self._forces, elements=elements)
+        return Variant(
+            self._given.start,
+            self._given.structure,
+            numbers,
+            lambda: engine_factory("compiled")(mechanism, changed, Settings()),
+        )
 
 
-def _variant(engine: Any, simulation: Simulation | None) -> Variant:
-    infos = engine.mechanism.coordinates
-    state = engine.state if simulation is None else simulation.state
-    start = state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
-    parts = [np.array((len(infos), *engine.order)), *getattr(engine, "structure", ())]
-    structure = b"|".join((*(part.tobytes() for part in parts), *(name.encode() for name in engine.contacts)))
-    return Variant(engine, np.array(start), structure, simulation)
+def _computed(items: Sequence[Item]) -> list[Item]:
+    return [item for item in items if item.law is not None]
+
+
+def _length(items: Sequence[Item]) -> int:
+    return sum(len(item.numbers) for item in _computed(items))
+
+
+def _kind(item: Item) -> tuple[object, ...]:
+    """What of an item is not its numbers."""
+    return item.law, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part

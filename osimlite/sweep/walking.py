@@ -37,8 +37,6 @@ def _measure(name: str, engine: Any, number: Callable[[Walk], float]) -> Measure
 def _of(footing: Footing, number: Callable[[Walk], float], batch: Batch) -> Floats:
     walks = batch.memory.get("walks")
     if walks is None:
-        numbers = None
-        if any(engine is not batch.engine for engine in batch.engines):
-            numbers = np.stack([engine.numbers for engine in batch.engines])
-        walks = batch.memory["walks"] = walks_of(batch.engine, batch.starts, batch.runs, footing, numbers=numbers)
+        walks = walks_of(batch.engine, batch.starts, batch.runs, footing, numbers=batch.numbers)
+        batch.memory["walks"] = walks
     return np.array([number(walk) for walk in walks], dtype=float)

@@ -12,6 +12,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.sweep.plan import Plan, Stop, plan
 from osimlite.sweep.runner import Runner
+from osimlite.sweep.variants import Variants
 
 NUMBERS = {
     "RHip_rz": (0.2, 0.9),
@@ -91,10 +92,14 @@ def changed(chosen, values):
     return model, initial, speeds
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+FORCES = sorted(name for name in NUMBERS if name.startswith("/forceset/"))
+
+
+@settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_a_run_is_the_simulation_of_the_changed_model(data):
-    chosen = data.draw(st.lists(st.sampled_from(sorted(NUMBERS)), min_size=1, max_size=4, unique=True))
+    among = data.draw(st.sampled_from([sorted(NUMBERS), [*FORCES, "RHip_rz"]]))
+    chosen = data.draw(st.lists(st.sampled_from(among), min_size=1, max_size=4, unique=True))
     if "platform_rz" in chosen and "slope" in chosen:
         chosen.remove("slope")
     fractions = st.lists(st.sampled_from([0.0, 0.25, 0.5, 0.77, 1.0]), min_size=len(chosen), max_size=len(chosen))
@@ -107,6 +112,22 @@ def test_a_run_is_the_simulation_of_the_changed_model(data):
     assert block.status == ["done"] * len(rows)
     for number, row in enumerate(rows):
         assert [block.measures[name][number] for name in STATES] == simulated(*changed(chosen, row))
+
+
+def test_of_forces_only_the_numbers_are_made_afresh():
+    made = plan(dynamic_walker(), {name: NUMBERS[name] for name in FORCES}, measures=("energy",), to=0.6)
+    variants = Variants(made)
+    row = [NUMBERS[name][1] for name in FORCES]
+    variant = variants.variant(row)
+    assert variant.simulation is None and variant.structure == variants.given.structure
+    model, _, _ = changed(FORCES, row)
+    with Simulation(model, "compiled") as simulation:
+        engine = simulation.engine
+        assert np.array_equal(variant.numbers, engine.numbers)
+        assert np.array_equal(variant.engine.numbers, engine.numbers)
+        energies = simulation.run(0.6).summary["energy_J"]
+    energy = Runner(made).run(np.array([row])).measures["energy"][0]
+    assert energy == pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9)
 
 
 def test_parameters_of_a_function():
