@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, plain, step
+from osimlite.document.upgrade.draft import Draft, plain, reals, step
 
 _INERTIA = {"xx": "1", "yy": "1", "zz": "1", "xy": "0", "xz": "0", "yz": "0"}
 _JOINT = {"location": "location_in_child", "orientation": "orientation_in_child"}
@@ -17,7 +17,9 @@ def body_inertia(draft: Draft) -> None:
         parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
         given = [part for part in parts.values() if part is not None]
         words = [default if (part := parts[axes]) is None else plain(part) for axes, default in _INERTIA.items()]
-        draft.add(body, "inertia", " ".join(words), source=given[0] if given else body)
+        # The place of one that cannot be read, so that it can be found.
+        odd = next((part for part in given if reals(plain(part), 1) is None), given[0] if given else body)
+        draft.add(body, "inertia", " ".join(words), source=odd)
         for part in given:
             draft.remove(part)
         draft.changed(body, at=given[0] if given else body)

@@ -39,7 +39,9 @@ def linker_frames(draft: Draft) -> None:
             touched = True
             body = plain(socket)
             draft.rename(socket, f"socket_frame{side}")
-            if any(any(reals(plain(part), 3) or ()) for part in place if part is not None):
+            values = [reals(plain(part), 3) for part in place if part is not None]
+            # What cannot be read is kept, so that the reader can say so.
+            if any(numbers is None or any(numbers) for numbers in values):
                 socket.text = _frame(draft, linker, body, socket, place)
             else:
                 socket.text = body_path(body)

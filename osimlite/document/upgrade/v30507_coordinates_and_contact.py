@@ -12,7 +12,8 @@ def joint_coordinates(draft: Draft) -> None:
         old = joint.find("CoordinateSet")
         if old is None:
             continue
-        coordinates = [member for member in members(old) if member.tag == "Coordinate"]
+        # Also what is no coordinate, so that the reader can say so.
+        coordinates = list(members(old))
         if coordinates:
             listed = draft.add(joint, "coordinates", source=old)
             for coordinate in coordinates:
