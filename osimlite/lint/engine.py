@@ -49,6 +49,7 @@ _MODULES = (
     "wiring",
     "topology",
     "joints",
+    "custom_joints",
     "bodies",
     "physics",
     "coordinates",

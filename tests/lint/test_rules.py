@@ -102,6 +102,14 @@ def test_a_page_says_severity_mends_and_settings():
     assert "Settings" not in pages["OSIM104"]
 
 
+def test_a_body_with_a_blank_in_its_name_is_refused_in_old_files_too():
+    text = """<OpenSimDocument Version="30000"><Model name="m"><BodySet>
+        <objects> <Body name="ground"/> <Body name="my thigh"/> </objects>
+    </BodySet></Model></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode()), select="OSIM312").findings
+    assert finding.severity is Severity.ERROR and "frames of that name" in finding.message
+
+
 @pytest.mark.parametrize(
     ("version", "name", "severity"),
     [

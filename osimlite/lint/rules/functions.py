@@ -5,10 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import cast
 
+from osimlite.lint.axes import axes_of
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import quantity, times
-from osimlite.schema.functions import GCVSpline, PiecewiseConstantFunction, PiecewiseLinearFunction, SimmSpline
+from osimlite.lint.words import called, quantity, times
+from osimlite.schema.base import Object
+from osimlite.schema.functions import (
+    Function,
+    GCVSpline,
+    LinearFunction,
+    MultiplierFunction,
+    PiecewiseConstantFunction,
+    PiecewiseLinearFunction,
+    SimmSpline,
+)
 
 Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 
@@ -176,6 +186,135 @@ def too_few_points(subject: Subject, found: Found) -> None:
             fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "it has no value"
             given = times(len(function.x), "point")
             found(f"{subject.called_with(function)} has {given} and needs {least}: {fate}", function, tag="x")
+
+
+@rule("OSIM604", "coefficient-count", severity=WARNING)
+def coefficient_count(subject: Subject, found: Found) -> None:
+    """A linear function has not one coefficient for each variable and one more.
+
+    ## What it does
+    Reports linear functions without coefficients (an error), and those on the axis of a joint or of a coordinate
+    coupler that have more or fewer than the coordinates there and a constant.
+
+    ## Why is this bad
+    OpenSim crashes on an empty list. Otherwise it takes the first for the weights, the last for the constant, and drops
+    what is between: the joint moves by another law than was written.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function>
+                    <LinearFunction> <coefficients></coefficients> </LinearFunction>
+                </prescribed_function>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function>
+                    <LinearFunction> <coefficients>0 -0.2</coefficients> </LinearFunction>
+                </prescribed_function>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for function in subject.each(LinearFunction):
+        if not function.coefficients:
+            found(
+                f"{subject.called_with(function)} has no coefficients: OpenSim crashes when it needs a value",
+                function,
+                tag="coefficients",
+                severity=ERROR,
+            )
+    for holder, names, function in _linear(subject):
+        given, wanted = len(function.coefficients), names + 1
+        if given and given != wanted:
+            found(
+                f"the LinearFunction of {called(holder)} has {times(given, 'coefficient')} for "
+                f"{times(names, 'coordinate')}: {wanted} belong there",
+                function,
+                tag="coefficients",
+            )
+
+
+@rule("OSIM605", "missing-function", severity=ERROR)
+def missing_function(subject: Subject, found: Found) -> None:
+    """A multiplier has no function to multiply.
+
+    ## What it does
+    Reports MultiplierFunctions without a function inside.
+
+    ## Why is this bad
+    OpenSim refuses the model when it needs the value. Scaling a model wraps functions like this; one that was taken out
+    later leaves an empty multiplier.
+
+    ## Example
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function>
+                    <MultiplierFunction> <scale>2</scale> </MultiplierFunction>
+                </prescribed_function>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+
+    ## Use instead
+    ```xml
+    <PinJoint name="knee">
+        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+        <socket_child_frame>/bodyset/shank</socket_child_frame>
+        <coordinates>
+            <Coordinate name="knee_angle">
+                <prescribed_function>
+                    <MultiplierFunction>
+                        <function> <Constant> <value>-0.1</value> </Constant> </function> <scale>2</scale>
+                    </MultiplierFunction>
+                </prescribed_function>
+            </Coordinate>
+        </coordinates>
+    </PinJoint>
+    ```
+    """
+    for function in subject.each(MultiplierFunction):
+        if function.function is None and not subject.has_unknown:
+            found(
+                f"{subject.called_with(function)} has no function to multiply: OpenSim fails when it needs a value",
+                function,
+            )
+
+
+def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
+    """The linear functions of several variables: what they belong to, how many variables, and the function."""
+    holders: list[tuple[Object, int, Function | None]] = []
+    for joint in subject.named("CustomJoint"):
+        # An axis without coordinates takes any function that needs none.
+        holders += [(axis, len(axis.coordinates), axis.function) for axis in axes_of(joint) if axis.coordinates]
+    for coupler in subject.named("CoordinateCouplerConstraint"):
+        names = coupler.independent_coordinate_names
+        holders.append((coupler, len(names), coupler.coupled_coordinates_function))
+    for holder, count, held in holders:
+        function = held
+        while isinstance(function, MultiplierFunction):
+            function = function.function
+        if isinstance(function, LinearFunction) and (function._index is not None or subject.source is None):
+            yield holder, count, function
 
 
 def _tabulated(subject: Subject) -> Iterator[Tabulated]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
-
-from osimlite.lint.axes import axes_of, axes_refused, names_on_axes
+from osimlite.lint.axes import axes_refused, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
@@ -12,8 +10,7 @@ from osimlite.lint.words import called, times
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
-from osimlite.schema.tree import is_a
-from osimlite.text import listed, nearest
+from osimlite.text import listed
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)
@@ -89,6 +86,11 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
                 f"no axis of {called(custom)} uses {listed(unused)}: OpenSim refuses the model",
                 custom,
                 number=subject.element_of(custom, "coordinates"),
+            )
+        if not names and not declared_names:
+            found(
+                f"{called(custom)} has no coordinate: OpenSim crashes; a joint that does not move is a WeldJoint",
+                custom,
             )
     for joint in subject.each(Joint):
         if joint.motion_types is None:
@@ -260,147 +262,6 @@ def stray_joint_frame(subject: Subject, found: Found) -> None:
                 tag="socket_parent",
                 severity=ERROR if late else None,
             )
-
-
-@rule("OSIM410", "made-up-coordinate", severity=ERROR)
-def made_up_coordinate(subject: Subject, found: Found) -> None:
-    """An axis of a custom joint names a coordinate that the joint does not declare.
-
-    ## What it does
-    Reports such names where OpenSim takes the model all the same; where it refuses the model, the name is reported as
-    a reference that leads nowhere. It is a warning if the joint declares no coordinate at all.
-
-    ## Why is this bad
-    OpenSim makes a coordinate of that name up, without a word: the joint has one degree of freedom more, its value is
-    0, and the axis no longer follows the coordinate it was meant to follow.
-
-    ## Example
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <coordinates>ankle_angel</coordinates>
-                <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <coordinates>ankle_angle</coordinates>
-                <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-    """
-    for joint in subject.named("CustomJoint"):
-        declared = [coordinate.name for coordinate in joint.coordinates]
-        if axes_refused(joint):
-            continue
-        for axis in axes_of(joint):
-            for place, name in enumerate(axis.coordinates):
-                if not isinstance(name, str) or name in declared:
-                    continue
-                word, nth = subject.word_at(axis, "coordinates", place)
-                found(
-                    f"{axis.name} of {called(joint)} names '{name}', which the joint does not declare: OpenSim makes a "
-                    "coordinate of that name up",
-                    axis,
-                    tag="coordinates",
-                    word=word,
-                    nth=nth,
-                    suggestion=nearest(name, declared),
-                    severity=None if declared else WARNING,
-                )
-
-
-@rule("OSIM412", "axis-without-coordinate", severity=ERROR)
-def axis_without_coordinate(subject: Subject, found: Found) -> None:
-    """An axis of a custom joint has a function and no coordinate for it.
-
-    ## What it does
-    Reports axes that name no coordinate though their function wants a variable. Constant and linear functions do
-    without.
-
-    ## Why is this bad
-    OpenSim crashes, without a message.
-
-    ## Example
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <coordinates>ankle_angle</coordinates>
-                <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-    """
-    for joint in subject.named("CustomJoint"):
-        for axis in axes_of(joint):
-            function = axis.function
-            while is_a(function, "MultiplierFunction") and getattr(function, "function", None) is not None:
-                function = cast("Any", function).function
-            if not axis.coordinates and type(function).__name__ not in ("Constant", "LinearFunction", "Unknown"):
-                found(
-                    f"{axis.name} of {called(joint)} names no coordinate for its {called(axis.function)}: "
-                    "OpenSim crashes",
-                    axis,
-                    tag="coordinates",
-                )
 
 
 def a_joint(joint: Joint) -> str:

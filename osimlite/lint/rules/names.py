@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.rules.references import broken_references
+from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.sets import ModelComponentSet
-from osimlite.schema.tree import ILLEGAL_CHARACTERS
+from osimlite.schema.tree import ILLEGAL_CHARACTERS, is_a
 from osimlite.text import listed
 
 _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
@@ -110,12 +111,15 @@ def illegal_name(subject: Subject, found: Found) -> None:
             if any(character.isspace() for character in name) and not name.startswith("<"):
                 better = "".join(name.split())
                 used = subject.source.text.count(name) > 1
+                frame = subject.source.spans[change.number].tag in ("Body", "Ground")
+                fate = f"OpenSim makes it '{better}'" + (", and not where others use it" if used else "")
+                if frame:
+                    fate = "OpenSim makes frames of that name for the joints and refuses them"
                 found(
-                    f"the name '{name}' has white space in it: in a file of version {subject.version} OpenSim makes it "
-                    f"'{better}'" + (", and not where others use it" if used else ""),
+                    f"the name '{name}' has white space in it: in a file of version {subject.version} {fate}",
                     at=place,
                     suggestion=better,
-                    severity=None if used else INFO,
+                    severity=ERROR if frame else None if used else INFO,
                 )
 
 
@@ -143,20 +147,20 @@ def missing_name(subject: Subject, found: Found) -> None:
     """
     tree = subject.tree
     for component in tree.components:
-        if (
-            component.name
-            or isinstance(component, (Model, ModelComponentSet))
-            or not _should_have_name(subject, component)
-        ):
+        # What the file does not name has got a name while it was upgraded, as OpenSim does.
+        named = component.name and (not subject.upgraded or subject.names_itself(component))
+        if named or isinstance(component, (Model, ModelComponentSet)):
+            continue
+        frame = isinstance(component, PhysicalOffsetFrame) and isinstance(tree.parent_of(component), Joint)
+        if not frame and not _should_have_name(subject, component):
             continue
         wanted = _wanted_names(subject, component)
-        path = tree.path_of(component) or ""
-        message = f"this {called(component)} has no name; OpenSim calls it '{path.rpartition('/')[2]}'"
+        if not wanted and (frame or component.name):
+            continue
+        last = _last(tree.path_of(component) or "")
+        message = f"this {type(component).tag} has no name; OpenSim calls it '{last}'"
         if wanted:
-            count = times(
-                len([b for b in broken_references(subject) if _last(b.text) == wanted[0] and b.why == "missing"]),
-                "reference",
-            )
+            count = times(sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)), "reference")
             message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
         found(
             message,
@@ -173,27 +177,36 @@ def _should_have_name(subject: Subject, component: Component) -> bool:
     parent = subject.tree.parent_of(component)
     if isinstance(component, Coordinate):
         return isinstance(parent, Joint)
-    return isinstance(parent, ModelComponentSet)
+    if isinstance(parent, ModelComponentSet):
+        return True
+    return parent is not None and any(item is component for item in parent.subcomponents)
+
+
+def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
+    """The broken references that a component of this class would mend if it had the right name."""
+    parent = subject.tree.parent_of(component)
+    found = []
+    for broken in broken_references(subject):
+        use = broken.use
+        # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the name to load.
+        if use.reference.rule == "set-member" or use.spec.name == "name":
+            continue
+        if not is_a(component, use.reference.target):
+            continue
+        if isinstance(parent, Joint) and not isinstance(component, Coordinate):
+            # A joint names its own frames, where a frame elsewhere of that name is of no use.
+            near = use.owner is parent and "/" not in broken.text and broken.why in ("missing", "form")
+        else:
+            beside = f"{subject.path(component).rpartition('/')[0]}/{_last(broken.text)}"
+            near = broken.why == "missing" and ("/" not in broken.text or broken.text == beside)
+        if near:
+            found.append(broken)
+    return found
 
 
 def _wanted_names(subject: Subject, component: Component) -> list[str]:
     """Names that are missing and that a component of this class would bear."""
-    names: dict[str, None] = {}
-    for broken in broken_references(subject):
-        use = broken.use
-        # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the name to load.
-        if (
-            use.reference.rule == "set-member"
-            or use.spec.name == "name"
-            or broken.why != "missing"
-            or not any(base.__name__ == use.reference.target for base in type(component).__mro__)
-        ):
-            continue
-        name = _last(broken.text)
-        beside = f"{subject.path(component).rpartition('/')[0]}/{name}"
-        if "/" not in broken.text or broken.text == beside:
-            names[name] = None
-    return list(names)
+    return list(dict.fromkeys(_last(broken.text) for broken in _leading_nowhere(subject, component)))
 
 
 def _last(text: str) -> str:

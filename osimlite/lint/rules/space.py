@@ -16,7 +16,7 @@ from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Component, FieldSpec, Object, value_specs
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
-from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
+from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.markers import Station
 
 
@@ -247,8 +247,11 @@ def _on_body(subject: Subject, item: Object) -> bool:
     for tag in ("socket_parent_frame", "socket_parent", "socket_frame"):
         if owner is not None and tag in type(owner).field_specs():
             return isinstance(base_of(subject, subject.target_of(owner, tag)), Body)
-    above = subject.tree.parent_of(owner) if owner is not None else None
-    return isinstance(above, Body) and not isinstance(above, Ground)
+    # What is wrapped around a body stands in a set of its own in it.
+    above = owner
+    while above is not None and not isinstance(above, Body):
+        above = subject.tree.parent_of(above)
+    return above is not None
 
 
 def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
