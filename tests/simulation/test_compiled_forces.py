@@ -221,6 +221,11 @@ FORCES = {
         ContactEllipsoid(name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.3, 0.4), orientation=(0.2, 0.4, 0.1)),
         ContactHalfSpace(name="wall", socket_frame="/bodyset/b3", location=(0, -0.4, 0), orientation=(0, 0, 0.7)),
     ),
+    "ellipsoids on each other and a sphere": lambda: contact(
+        ContactEllipsoid(name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.7, 0.4), orientation=(0.2, 0.4, 0.1)),
+        ContactEllipsoid(name="g", socket_frame="/bodyset/b3", radii=(0.8, 0.6, 0.4), orientation=(0.1, 0.9, 0.3)),
+        ContactSphere(name="s", socket_frame="/ground", location=(0.1, 0.2, 0.0), radius=0.6),
+    ),
     "coordinate actuator": lambda: driven(
         CoordinateActuator(name="a", coordinate="q1_0", optimal_force=7.0),
         Sine(amplitude=1.0, omega=4.0, phase=0.0, offset=0.0),

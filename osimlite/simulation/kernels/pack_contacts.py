@@ -7,7 +7,7 @@ from typing import Any
 
 from osimlite.forces.coordinate_limit import limit_energy, limit_force
 from osimlite.forces.hunt_crossley import contact_energy
-from osimlite.simulation.contact_elements import ContactPair, PairContact
+from osimlite.simulation.contact_elements import ContactPair, ContactSurface, PairContact
 from osimlite.simulation.elements import CoordinateLimit
 from osimlite.simulation.kernels.items import Item, Places
 from osimlite.simulation.kernels.layout import CONTACT_WORK, DEPTH_OF, RADIUS_OF
@@ -20,14 +20,22 @@ def pack_pairs(element: PairContact, places: Places) -> list[Item]:
         one, two = element.surfaces[pair.first], element.surfaces[pair.second]
         links, numbers = pair_numbers(element, pair, places)
         law = "touch_half_space" if one.is_half_space else "touch_spheres"
-        if two.radii is not None and two.axes is not None:
-            law = "touch_ellipsoid"
-            axes = (places.direction(two.body, axis) for axis in zip(*two.axes, strict=True))
-            numbers = (*numbers, *(x for axis in axes for x in axis), *two.radii)
+        if one.radii or two.radii:
+            law = "touch_ellipsoid" if one.is_half_space else "touch_ellipsoids"
+            shapes = (surface for surface in (one, two) if not surface.is_half_space)
+            numbers = (*numbers, *(x for surface in shapes for x in _shape(surface, places)))
         found.append(Item(_kept(pair), law, links, numbers, is_contact=True, is_part=element.early_return))
     if element.early_return:
         found.append(_early_return(element, places))
     return found
+
+
+def _shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
+    """Axes in the link, and half axes, of an ellipsoid or a sphere."""
+    if surface.radii is None or surface.axes is None:
+        return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, surface.radius, surface.radius, surface.radius
+    axes = (places.direction(surface.body, axis) for axis in zip(*surface.axes, strict=True))
+    return (*(x for axis in axes for x in axis), *surface.radii)
 
 
 def _early_return(element: PairContact, places: Places) -> Item:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.forces.ellipsoid_contact import half_space_ellipsoid
+from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
 from osimlite.simulation.kernels.contacts import press, touch_half_space, touch_spheres
 from osimlite.simulation.kernels.layout import (
     CONTACT_AT,
@@ -34,6 +34,30 @@ def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
     d, radius, px, py, pz = half_space_ellipsoid(
         ox, oy, oz, nx, ny, nz, cx, cy, cz, xx, xy, xz, yx, yy, yz, zx, zy, zz, p[27], p[28], p[29], p[12]
     )
+    if d > 0.0:
+        press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
+    return FINE
+
+
+def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
+    i = at(s, item)
+    one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
+    ax, ay, az = station(s, w, one, p[0], p[1], p[2])
+    bx, by, bz = station(s, w, two, p[7], p[8], p[9])
+    gx, gy, gz = bx - ax, by - ay, bz - az
+    if gx * gx + gy * gy + gz * gz >= (p[6] + p[10]) * (p[6] + p[10]):
+        return FINE
+    axx, ayx, azx = direction(s, w, one, p[18], p[19], p[20])
+    axy, ayy, azy = direction(s, w, one, p[21], p[22], p[23])
+    axz, ayz, azz = direction(s, w, one, p[24], p[25], p[26])
+    bxx, byx, bzx = direction(s, w, two, p[30], p[31], p[32])
+    bxy, byy, bzy = direction(s, w, two, p[33], p[34], p[35])
+    bxz, byz, bzz = direction(s, w, two, p[36], p[37], p[38])
+    d, radius, nx, ny, nz, px, py, pz = ellipsoid_ellipsoid(
+        ax, ay, az, axx, axy, axz, ayx, ayy, ayz, azx, azy, azz, p[27], p[28], p[29],
+        bx, by, bz, bxx, bxy, bxz, byx, byy, byz, bzx, bzy, bzz, p[39], p[40], p[41], p[12],
+    )  # fmt: skip
     if d > 0.0:
         press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
     return FINE

@@ -20,6 +20,7 @@ LAW_MODULES = {
     "amount_by_several": "functions",
     "touch_spheres": "contacts",
     "touch_ellipsoid": "rare_contacts",
+    "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",
     "coordinate_spring": "springs",
     "point_spring": "springs",
