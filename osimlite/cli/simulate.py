@@ -53,6 +53,13 @@ def simulate(
     skip_unsupported: Annotated[
         bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")
     ] = False,
+    opensim_derivatives: Annotated[
+        bool,
+        typer.Option("--opensim-derivatives", help="Repeat OpenSim's mistakes in joints with several turns."),
+    ] = False,
+    rolling: Annotated[
+        bool, typer.Option("--rolling", help="Let rolling constraints act, which OpenSim leaves off.")
+    ] = False,
     external_loads: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
@@ -87,6 +94,8 @@ def simulate(
         model,
         engine,
         skip_unsupported=skip_unsupported,
+        opensim_derivatives=opensim_derivatives,
+        rolling=rolling,
         external_loads=external_loads,
         folder=file.parent,
         show=gui,

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import ModelError, SimulationError
-from osimlite.multibody.functions import Function
+from osimlite.multibody.arc import ArcPoint
+from osimlite.multibody.functions import Function, Linear
 from osimlite.multibody.motions import (
     AxisMotion,
     Fixed,
@@ -72,6 +73,25 @@ def scapulothoracic(radii: ArrayLike, winging_origin: ArrayLike, winging_directi
         rotate(axis, 3),
         place(None, (-x, -y, 0.0)),
     )
+
+
+def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[Motion, ...]:
+    """Motions of a ConstantCurvatureJoint: the end of a rod that bends about X, then Z, and twists about Y.
+
+    Args:
+        length: of the rod (m).
+        neutral: the three angles (rad) where the coordinates are zero.
+    """
+    bend, swing, twist = (float(angle) for angle in neutral)
+    slides = (
+        AxisMotion("translate", np.array(axis), (0, 1), ArcPoint(component, length, (bend, swing)))
+        for component, axis in enumerate((X, Y, Z))
+    )
+    turns = (
+        AxisMotion("rotate", np.array(axis), (place,), Linear(1.0, start))
+        for place, (axis, start) in enumerate(((X, bend), (Z, swing), (Y, twist)))
+    )
+    return (*slides, *turns)
 
 
 class TransformAxis(NamedTuple):

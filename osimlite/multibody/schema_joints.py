@@ -7,15 +7,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.multibody.joints import MOTIONS, TransformAxis, custom, ellipsoid, scapulothoracic
+from osimlite.multibody.joints import MOTIONS, TransformAxis, constant_curvature, custom, ellipsoid, scapulothoracic
 from osimlite.multibody.motions import Motion
 from osimlite.multibody.schema_functions import numeric
 from osimlite.schema import custom_joint as schema
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.joints import EllipsoidJoint, Joint, ScapulothoracicJoint
+from osimlite.schema.joints import ConstantCurvatureJoint, EllipsoidJoint, Joint, ScapulothoracicJoint
 from osimlite.text import listed
 
-JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "CustomJoint")
+JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "ConstantCurvatureJoint", "CustomJoint")
 """OpenSim's joint classes that osimlite computes."""
 
 
@@ -39,6 +39,10 @@ def joint_motions(
             joint.scapula_winging_axis_origin,
             joint.scapula_winging_axis_direction,
         )
+    elif isinstance(joint, ConstantCurvatureJoint):
+        if not 0.0 < joint.length < np.inf:
+            raise ModelError(f"the rod of '{path}' has the length {joint.length:g}; give a positive length in m")
+        motions = constant_curvature(joint.length, joint.neutral_angle_x_z_y)
     elif kind in MOTIONS:
         motions = MOTIONS[kind]
     else:

@@ -42,8 +42,8 @@ class Trajectory:
         self.mechanism = mechanism
         self.times: Array = np.array(times, dtype=float)
         self.coordinates = mechanism.coordinate_names
-        self.values: Array = np.array(values, dtype=float).reshape(-1, count)
-        self.speeds: Array = np.array(speeds, dtype=float).reshape(-1, count)
+        self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
+        self.speeds: Array = np.array(speeds, dtype=float).reshape(len(self.times), count)
         self._report: Report | None = report
 
     def __repr__(self) -> str:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from osimlite.errors import UnsupportedError
 from osimlite.multibody import functions as f
+from osimlite.multibody.arc import ArcPoint
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.motions import EllipsoidPoint
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
@@ -109,6 +110,8 @@ def as_data(function: f.Function) -> dict[str, Any]:
             return {"type": "piecewise-constant", "x": x, "y": y}
         case EllipsoidPoint(component, radius):
             return {"type": "ellipsoid-point", "component": component, "radius": radius}
+        case ArcPoint(component, length, neutral):
+            return {"type": "arc-point", "component": component, "length": length, "neutral": neutral}
         case f.SimmSpline():
             # The first and the last point go on in straight lines.
             first, *_, last = function.pieces

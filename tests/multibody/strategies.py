@@ -14,6 +14,7 @@ from osimlite.multibody.joints import (
     MOTIONS,
     Mobilizer,
     TransformAxis,
+    constant_curvature,
     custom,
     ellipsoid,
     motion_types,
@@ -33,7 +34,7 @@ from osimlite.multibody.spatial import Array, offset
 KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
 """Of constraints."""
 
-JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "CustomJoint")
+JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "ConstantCurvatureJoint", "CustomJoint")
 
 
 class Case(NamedTuple):
@@ -49,6 +50,8 @@ def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
     """The motions of a joint type with random properties."""
     if joint_type == "EllipsoidJoint":
         return ellipsoid(rng.uniform(0.1, 0.4, 3))
+    if joint_type == "ConstantCurvatureJoint":
+        return constant_curvature(rng.uniform(0.2, 0.5), rng.uniform(-0.2, 0.2, 3).tolist())
     if joint_type == "ScapulothoracicJoint":
         return scapulothoracic(rng.uniform(0.1, 0.4, 3), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0))
     if joint_type == "CustomJoint":

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from osimlite.errors import ModelError, SimulationError
 from osimlite.multibody.functions import IDENTITY
-from osimlite.multibody.joints import MOTIONS, Mobilizer, TransformAxis, custom, motion_types
+from osimlite.multibody.joints import MOTIONS, Mobilizer, TransformAxis, constant_curvature, custom, motion_types
 from osimlite.multibody.motions import AxisMotion, Fixed
 from osimlite.multibody.spatial import inverse, rotation_about, transform
 from osimlite.schema import joints
@@ -141,3 +141,20 @@ def test_bias_and_rate_bias_are_derivatives(joint_type, seed, turned_round):
     assert middle.velocity[3:] == pytest.approx(velocity, abs=2e-7)
     difference = (mobilizer.rate_matrix(later) - mobilizer.rate_matrix(earlier)) @ u / (2 * step)
     assert qddot == pytest.approx(difference, rel=1e-6, abs=2e-7)
+
+
+def test_a_rod_that_bends_evenly_is_an_arc():
+    """As long as the rod, upright at its start, along the child's Y axis at its end; straight where it is not bent."""
+    length, q = 0.7, np.array((0.6, -0.9, 0.3))
+    motions = constant_curvature(length, (0.1, 0.2, -0.3))
+    end = Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)).across(q)
+    along, place = end[:3, 1], end[:3, 3]
+    bend = np.arccos(along[1])
+    radius = length / bend
+    center = place[[0, 2]] / np.linalg.norm(place[[0, 2]]) * radius
+    arm = place - np.array((center[0], 0.0, center[1]))
+    assert np.linalg.norm(arm) == pytest.approx(radius, rel=1e-12)
+    assert arm @ along == pytest.approx(0.0, abs=1e-12)
+    assert np.arctan2(place[1], radius - np.linalg.norm(place[[0, 2]])) == pytest.approx(bend, rel=1e-12)
+    straight = Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)).across(np.array((-0.1, -0.2, 0.3)))
+    assert straight == pytest.approx(np.eye(4) + np.outer((0, 1, 0, 0), (0, 0, 0, length)), abs=1e-15)

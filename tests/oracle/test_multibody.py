@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.multibody import Mechanism
+from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.schema.joints import ConstantCurvatureJoint
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -131,3 +132,23 @@ def test_awkward_mass_properties(changed: dict[str, Any], kind: str, tmp_path: P
     for index in range(len(mechanism.coordinates)):
         model.getCoordinateSet().get(index).setSpeedValue(state, rng.uniform(-2.0, 2.0))
     _same_motion(model, state, mechanism)
+
+
+def test_a_rod_that_bends_evenly_ends_where_opensims_does(tmp_path):
+    model = osimlite.Model(name="m")
+    body = model.add(osimlite.Body(name="tip", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
+    joint = ConstantCurvatureJoint(name="rod", neutral_angle_x_z_y=(0.1, -0.2, 0.3), length=0.7)
+    for name, coordinate in zip("abc", joint.coordinates, strict=True):
+        coordinate.name = name
+    model.add(joint.between(model.ground, body, at=(0.1, 0.2, 0.3), turned=(0.1, 0.2, 0.3)))
+    osimlite.write(model, tmp_path / "rod.osim")
+    mechanism = build_mechanism(model)
+    theirs = opensim.Model(str(tmp_path / "rod.osim"))
+    state = theirs.initSystem()
+    for q in np.random.default_rng(3).uniform(-0.8, 0.8, (5, 3)):
+        for name, value in zip("abc", q.tolist(), strict=True):
+            theirs.getCoordinateSet().get(name).setValue(state, value, False)
+        theirs.realizePosition(state)
+        placed = theirs.getBodySet().get(0).getTransformInGround(state)
+        found = [[placed.R().get(row, k) for k in range(3)] + [placed.p().get(row)] for row in range(3)]
+        assert np.array(found) == pytest.approx(mechanism.body_transforms(q)["tip"][:3], abs=1e-12)

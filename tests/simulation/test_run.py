@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model, PinJoint
+from osimlite import Body, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model, PinJoint, WeldJoint
 from osimlite.errors import ModelError, OsimliteError, SettingError, SimulationError, UnsupportedError
 from osimlite.simulation import Simulation, read_sto
 from osimlite.simulation.run import report_times
@@ -272,3 +272,11 @@ def test_frame_says_what_to_install(walker):
         frame = trajectory.to_frame()
         assert frame["RHip_rz"].iloc[0] == trajectory.values[0, 4]
         assert frame["RFootForce.RightShank.force.Y"].iloc[0] > 300.0
+
+
+def test_a_model_without_coordinates_stands_still():
+    model = Model(name="block")
+    model.add(WeldJoint(name="w").between(model.ground, model.add(Body(name="b", mass=1.0))))
+    trajectory = osimlite.simulate(model, 0.1)
+    assert trajectory.values.shape == (11, 0)
+    assert "time" in trajectory.states_text()

@@ -45,6 +45,11 @@ def evaluate(law: Mapping[str, Any], x: Sequence[float]) -> float:
             a, b = x[0], x[1]
             normal = (math.sin(b), -math.sin(a) * math.cos(b), math.cos(a) * math.cos(b))
             return law["radius"] * normal[law["component"]]
+        case "arc-point":
+            a, b = (angle + start for angle, start in zip(x, law["neutral"], strict=True))
+            t = math.acos(math.cos(a) * math.cos(b))
+            s = (1.0 - math.cos(t)) / (t * math.sin(t))
+            return law["length"] * (-s * math.sin(b), math.sin(t) / t, s * math.sin(a) * math.cos(b))[law["component"]]
     raise ValueError(law["type"])
 
 

@@ -18,6 +18,7 @@ from osimlite.errors import UnsupportedError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.multibody import functions as f
+from osimlite.multibody.arc import ArcPoint
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.functions import Function, Linear, Scaled
 from osimlite.multibody.joints import TransformAxis, custom
@@ -147,6 +148,7 @@ FUNCTIONS: list[tuple[Function, int]] = [
     (smoothing_spline(X, Y, 2, 0.0), 1),
     (smoothing_spline(X, Y, 3, 0.01), 1),
     *((EllipsoidPoint(k, 0.2), 3) for k in range(3)),
+    *((ArcPoint(k, 0.7, (0.1, -0.2)), 2) for k in range(3)),
 ]
 
 
