@@ -11,6 +11,14 @@ from typing import BinaryIO
 
 from osimlite.errors import MissingFileError, OsimliteError
 
+GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
+"""Environment variable with folders to look for mesh files in, besides OpenSim's own places, separated as in PATH."""
+
+
+def named_mesh_folders() -> tuple[Path, ...]:
+    """The folders that the environment names."""
+    return tuple(Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name)
+
 
 def model_files(paths: Iterable[Path]) -> list[Path]:
     """The files named, and every ``.osim`` file below the folders named, sorted within each folder.

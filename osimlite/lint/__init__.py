@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from osimlite.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 
@@ -41,7 +42,8 @@ def validate(
     from osimlite.schema.model import Model
 
     if config is None:
-        config = Config(checked_words(select), checked_words(ignore))
+        meshes = tuple(map(str, named_mesh_folders()))
+        config = Config(checked_words(select), checked_words(ignore), mesh_paths=meshes)
     if isinstance(model, Model):
         return check_model(model, config)
     return check_source(model if isinstance(model, Source) else Source.of_file(model), config)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.errors import OsimliteError
+from osimlite.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Severity
 from osimlite.text import did_you_mean, listed
@@ -35,7 +36,7 @@ class Settings:
             overriding.select or self.select,
             (*self.ignore, *self._ignored_in(Path(path)), *overriding.ignore),
             {**self.severity, **overriding.severity},
-            (*overriding.mesh_paths, *self.mesh_paths),
+            (*overriding.mesh_paths, *self.mesh_paths, *map(str, named_mesh_folders())),
             {**self.thresholds, **overriding.thresholds},
         )
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
+from osimlite.files import GEOMETRY_VARIABLE, named_mesh_folders
 from osimlite.translate.passes.names import legal
 from osimlite.translate.stl import binary_stl
 from osimlite.translate.vtp import read_vtp
 
 MESH_FOLDER = "meshes"
 """Folder of the mesh files, beside the robot's own file."""
-
-GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
-"""Environment variable with more folders to look for mesh files in, separated as in PATH."""
 
 _WRITTEN = {".obj": ".obj", ".stl": ".stl", ".vtp": ".obj"}
 """Kinds of mesh files that OpenSim reads, and what they become."""
@@ -34,8 +31,7 @@ def geometry_folders(beside: Path | None, more: Sequence[Path] = ()) -> tuple[Pa
         more: folders that the user names; those in the environment variable follow them.
     """
     own = () if beside is None else (beside, beside / "Geometry")
-    named = os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep)
-    return (*own, *more, *(Path(name) for name in named if name))
+    return (*own, *more, *named_mesh_folders())
 
 
 def find_file(name: str, folders: Sequence[Path]) -> Path | None:

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
+import osimlite
 from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
 from osimlite.lint import Config, Severity, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
 from osimlite.lint.cache import key_of
 from osimlite.lint.engine import all_rules
-from osimlite.lint.settings import settings_for
+from osimlite.lint.settings import Settings, settings_for
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
 
@@ -133,3 +134,18 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path):
     (tmp_path / "odd.json").write_text("[1]")
     with pytest.raises(OsimliteError, match="this is no baseline"):
         without_baseline(tmp_path / "odd.json", validate(Source(TEXT.encode())))
+
+
+def test_mesh_folders_of_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bones = tmp_path / "bones"
+    bones.mkdir()
+    (bones / "femur.vtp").touch()
+    model = osimlite.Model(name="leg")
+    body = model.add(osimlite.Body(name="femur", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    body.attach(osimlite.Mesh(mesh_file="femur.vtp"))
+    file = tmp_path / "leg.osim"
+    osimlite.write(model, file)
+    assert osimlite.validate(file, select="OSIM701").codes == {"OSIM701": 1}
+    monkeypatch.setenv("OSIMLITE_GEOMETRY", str(bones))
+    assert not osimlite.validate(file, select="OSIM701").findings
+    assert Settings().config_for(file, Config()).mesh_paths == (str(bones),)
