@@ -16,7 +16,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.contact_elements import PairContact
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.engines.machine_code import address_of, entry_point, numba
+from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.integrators import Observer, RungeKuttaMerson, SemiImplicitEuler, Stepper
 from osimlite.simulation.kernels import layout, merson
@@ -54,7 +54,7 @@ class CompiledEngine:
     """
 
     name = "compiled"
-    version = f"numba {numba.__version__}"
+    version = VERSION
     route = "composite-rigid-body"
 
     def __init__(self, mechanism: Mechanism, forces: Forces) -> None:

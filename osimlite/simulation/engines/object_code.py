@@ -1,0 +1,114 @@
+"""Machine code in files: loaded in a moment, without the compiler that made it.
+
+A file holds one entry in the object format of the system. It is good for one version of the sources and of the compiler
+and for one kind of processor, which its name stands for.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
+
+from osimlite.errors import OsimliteError
+from osimlite.files import make_folder, write_atomically
+
+FOLDER = "NUMBA_CACHE_DIR"
+"""Environment variable that may name a folder for the files; numba uses it likewise."""
+
+HELPER = re.compile(rb"numba_[a-z_]+")
+"""What the compiler's own functions are called, which code that raises nothing names but never calls."""
+
+_kept: list[Any] = []
+"""Machine code stays where it is as long as this does."""
+
+
+def load(name: str, digest: str) -> int | None:
+    """Address of an entry from its file, None if there is none.
+
+    Args:
+        name: of the entry.
+        digest: of the sources.
+    """
+    for folder in _folders():
+        path = folder / _file(name, digest)
+        try:
+            head, _, code = path.read_bytes().partition(b"\n")
+            told = json.loads(head)
+        except (OSError, ValueError):
+            continue
+        if isinstance(told, dict) and told.get("sha256") == hashlib.sha256(code).hexdigest():
+            return _link(code, told["symbol"])
+    return None
+
+
+def store(name: str, digest: str, text: str, symbol: str) -> int:
+    """Translate an entry and keep it in a file, if there is a folder for that; returns its address.
+
+    Args:
+        name: of the entry.
+        digest: of the sources.
+        text: in the intermediate language of LLVM.
+        symbol: what it is called there.
+    """
+    code: bytes = _machine().emit_object(llvm.parse_assembly(text))
+    told = {"symbol": symbol, "sha256": hashlib.sha256(code).hexdigest()}
+    for folder in _folders():
+        try:
+            write_atomically(make_folder(folder) / _file(name, digest), json.dumps(told).encode() + b"\n" + code)
+            break
+        except OsimliteError:
+            continue
+    return _link(code, symbol)
+
+
+def _link(code: bytes, symbol: str) -> int:
+    """Make code ready to run; returns the address of a symbol in it."""
+    nowhere = ctypes.cast(ctypes.pythonapi.Py_FatalError, ctypes.c_void_p).value
+    for helper in {word.decode() for word in HELPER.findall(code)}:
+        if llvm.address_of_symbol(helper) is None:
+            llvm.add_symbol(helper, nowhere)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    _kept.append(engine)
+    found: int = engine.get_function_address(symbol)
+    return found
+
+
+def _machine() -> Any:
+    """This processor."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    cpu, features = _processor()
+    return llvm.Target.from_default_triple().create_target_machine(cpu=cpu, features=features, opt=3, jit=True)
+
+
+@cache
+def _processor() -> tuple[str, str]:
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+def _file(name: str, digest: str) -> str:
+    """What a file is called."""
+    told = digest, version("numba"), version("llvmlite"), sys.platform, *_processor()
+    return f"{name}-{hashlib.sha256(repr(told).encode()).hexdigest()[:16]}.code"
+
+
+def _folders() -> Iterator[Path]:
+    """Where files may be, the best place first."""
+    if os.environ.get(FOLDER):
+        yield Path(os.environ[FOLDER])
+    yield Path(__file__).parents[1] / "kernels" / "__pycache__"
+    home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    yield Path(home) / "osimlite"

@@ -1,0 +1,81 @@
+"""Machine code in files: found again, not taken when damaged or of other sources; and what is done without a folder."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.simulation.engines import object_code
+
+TEXT = """
+declare void @numba_never_there()
+define i64 @answer(i64 %x) {
+  %wrong = icmp eq i64 %x, 7
+  br i1 %wrong, label %bad, label %good
+bad:
+  call void @numba_never_there()
+  br label %good
+good:
+  %y = mul i64 %x, 6
+  ret i64 %y
+}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv(object_code.FOLDER, str(tmp_path / "new" / "folder"))
+    monkeypatch.setattr(object_code, "_folders", lambda: [tmp_path / "new" / "folder"])
+    return tmp_path / "new" / "folder"
+
+
+def run(address):
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(8)
+
+
+def test_what_is_stored_is_found_again(folder):
+    assert object_code.load("answer", "one") is None
+    assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    (kept,) = folder.iterdir()
+    assert run(object_code.load("answer", "one")) == 48
+    # Of other sources.
+    assert object_code.load("answer", "two") is None
+    for damaged in (kept.read_bytes()[:-8], b"", b"[]\n", b"{}\nrest"):
+        kept.write_bytes(damaged)
+        assert object_code.load("answer", "one") is None
+
+
+def test_without_a_folder(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    monkeypatch.setattr(object_code, "_folders", lambda: [blocked / "inside"])
+    assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+
+
+def test_folders(monkeypatch, tmp_path):
+    """The one that is named comes first, the user's own last."""
+    monkeypatch.setenv(object_code.FOLDER, str(tmp_path / "named"))
+    monkeypatch.delenv("LOCALAPPDATA", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    first, *_, last = object_code._folders()
+    assert (first, last) == (tmp_path / "named", tmp_path / "home" / "osimlite")
+
+
+def test_code_from_files_needs_no_compiler(walker):
+    """With the machine code in files, the compiler is not even imported."""
+    from osimlite.simulation import Simulation
+
+    with Simulation(walker, "compiled") as simulation:
+        simulation.run(0.01)
+    program = (
+        "import osimlite, sys; from osimlite.models.dynamic_walker import dynamic_walker; "
+        "osimlite.simulate(dynamic_walker(), 0.1, engine='compiled'); print('numba' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=dict(os.environ))
+    assert done.stdout.split() == ["False"], done.stderr
