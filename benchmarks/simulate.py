@@ -1,4 +1,4 @@
-"""The Dynamic Walker, two seconds: osimlite's PyBullet engine and OpenSim's Manager, side by side in one run.
+"""The Dynamic Walker, two seconds: osimlite's engines and OpenSim's Manager, side by side in one run.
 
 Warm: the model is read and made ready once; what is timed is the motion alone, from the default pose. Both integrate
 with Runge-Kutta-Merson, OpenSim records its states at every step, osimlite every 10 ms. Whole process: a new Python
@@ -27,7 +27,8 @@ ACCURACIES = (1e-3, 1e-5, 1e-6)
 CONVERGED = 1e-10
 ROUNDS, WARM_UP = 15, 2
 
-OURS = "import osimlite; osimlite.simulate(osimlite.read({model!r}), to={to}, accuracy={accuracy})"
+ENGINES = {"PyBullet": "bullet", "compiled": "compiled"}
+OURS = "import osimlite; osimlite.simulate(osimlite.read({model!r}), to={to}, accuracy={accuracy}, engine={engine!r})"
 THEIRS = """
 import opensim
 opensim.Logger.setLevelString("off")
@@ -45,24 +46,32 @@ def main() -> None:
     model = opensim.Model(str(MODEL))
     model.initSystem()
     console = Console()
-    with Simulation(osimlite.read(MODEL)) as simulation:
-        exact = run_ours(simulation, CONVERGED)()
-        errors = Table(title="Error at 2 s")
-        for heading in ("accuracy", "osimlite", "OpenSim"):
-            errors.add_column(heading, justify="right")
-        warm = []
-        for accuracy in ACCURACIES:
-            ours, theirs = run_ours(simulation, accuracy), run_opensim(model, accuracy, 1 + WARM_UP + ROUNDS)
-            ends = [max(abs(a - b) for a, b in zip(run(), exact, strict=True)) for run in (ours, theirs)]
-            errors.add_row(f"{accuracy:g}", *(f"{end:.2g}" for end in ends))
-            warm.append(pair(f"warm, {accuracy:g}", ours=ours, theirs=theirs, rounds=ROUNDS, warmup=WARM_UP))
+    simulations = {name: Simulation(osimlite.read(MODEL), engine) for name, engine in ENGINES.items()}
+    exact = run_ours(simulations["compiled"], CONVERGED)()
+    errors = Table(title="Error at 2 s")
+    for heading in ("accuracy", *ENGINES, "OpenSim"):
+        errors.add_column(heading, justify="right")
+    warm = []
+    for accuracy in ACCURACIES:
+        theirs = run_opensim(model, accuracy, 1 + len(ENGINES) * (WARM_UP + ROUNDS))
+        runs = {name: run_ours(simulation, accuracy) for name, simulation in simulations.items()}
+        ends = [max(abs(a - b) for a, b in zip(run(), exact, strict=True)) for run in (*runs.values(), theirs)]
+        errors.add_row(f"{accuracy:g}", *(f"{end:.2g}" for end in ends))
+        for name, run in runs.items():
+            row = pair(f"{name}, {accuracy:g}", ours=run, theirs=theirs, rounds=ROUNDS, warmup=WARM_UP)
+            warm.append(row)
+    for simulation in simulations.values():
+        simulation.close()
     console.print(errors)
     whole = []
     for accuracy in ACCURACIES[:2]:
-        words = {"model": str(MODEL), "to": TO, "accuracy": accuracy}
-        commands = [[sys.executable, "-c", text.format(**words)] for text in (OURS, THEIRS)]
-        whole.append(pair_commands(f"whole process, {accuracy:g}", ours=commands[0], theirs=commands[1], rounds=9))
-    report(f"Dynamic Walker, {TO:g} s, by accuracy", [*warm, *whole], console=console)
+        for name, engine in ENGINES.items():
+            words = {"model": str(MODEL), "to": TO, "accuracy": accuracy, "engine": engine}
+            commands = [[sys.executable, "-c", text.format(**words)] for text in (OURS, THEIRS)]
+            title = f"whole process, {name}, {accuracy:g}"
+            whole.append(pair_commands(title, ours=commands[0], theirs=commands[1], rounds=9))
+    report(f"Dynamic Walker, {TO:g} s, warm, by accuracy", warm, console=console)
+    report("Whole processes (machine code in the cache)", whole, console=console)
 
 
 def run_ours(simulation: Simulation, accuracy: float) -> Callable[[], list[float]]:
