@@ -25,6 +25,7 @@ COMMANDS = (
     "simulate",
     "sweep",
     "optimize",
+    "gait",
     "kinematics",
     "inverse-dynamics",
     "lsp",

@@ -185,7 +185,7 @@ class Simulation:
             {name: in_units_of(self.mechanism, name, value) for name, value in (given or {}).items()}
             for given in (initial, initial_speeds)
         )
-        y = self._initial_state(initial, initial_speeds)
+        y = self.initial_state(initial, initial_speeds)
         settings = Settings(accuracy=accuracy, fixed_step=fixed_step, route=self.engine.route, show=self._show)
         recorder = Recorder(self.engine)
         stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
@@ -215,7 +215,13 @@ class Simulation:
         self.close()
 
     # --------------------------------------------------------------------------------------------- helpers
-    def _initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
+    def initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
+        """State in the engine's order (2n) at the default values and speeds, but for those given (rad, m).
+
+        Raises:
+            ModelError: there is no such coordinate.
+            SimulationError: a coordinate is locked, or a number is not finite.
+        """
         infos = self.mechanism.coordinates
         q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
         places: list[list[int]] = []

@@ -279,7 +279,7 @@ def test_steps_are_those_of_opensim(fast):
 
 def test_compiled_loop_rounds_as_the_one_in_python_does(fast):
     """With the same accelerations the steps are the same to the last bit."""
-    y = fast._initial_state({}, {})
+    y = fast.initial_state({}, {})
     ours, theirs = (fast.engine.stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None) for _ in range(2))
     (_, end), steps = list(ours.reports([2.0]))[-1], list(theirs.steps(2.0))
     assert end == steps[-1][1]

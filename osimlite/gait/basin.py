@@ -1,0 +1,215 @@
+"""How far from its cycle a walker may start and still walk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.gait.cycle import Cycle
+from osimlite.gait.footing import Footing
+from osimlite.gait.stepmap import StepMap
+from osimlite.gait.steps import Walk, along_slope, walk_many
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.kernels.pointers import Floats, Ints
+
+SWEEP_ACCURACY = 1e-5
+"""Of the integrator, where many walkers walk many steps."""
+
+AT_ONCE = 64
+"""So many walkers between two reports of progress."""
+
+Progress = Callable[[int, int], object]
+"""Called with the number of walkers that have walked, and of all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One entry of the state that is changed.
+
+    Attributes:
+        label: what it is called, with its unit.
+        place: in the state.
+        values: (k,).
+    """
+
+    label: str
+    place: int
+    values: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Basin:
+    """How many steps walkers make from a grid of starts.
+
+    Attributes:
+        x: what changes along the columns.
+        y: what changes along the rows.
+        steps: made before the fall, at most `wanted` (rows, columns).
+        wanted: as many steps count as walking.
+        center: values of x and y on the cycle.
+    """
+
+    x: Axis
+    y: Axis
+    steps: Ints
+    wanted: int
+    center: tuple[float, float]
+
+    @property
+    def part(self) -> float:
+        """Which part of the starts walks."""
+        return float((self.steps >= self.wanted).mean())
+
+
+def upright(engine: CompiledEngine, footing: Footing) -> int | None:
+    """Place in the state of the coordinate that lifts the walker off the ground, if there is one (m)."""
+    n = len(engine.order)
+    names = [name for foot in footing.feet for name in foot] + list(footing.falls)
+    contacts = [engine.contacts.index(name) for name in names]
+    rng = np.random.default_rng(0)
+    poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
+    for place in range(n):
+        moved = poses.copy()
+        moved[:, place] += 0.1
+        change = along_slope(engine, moved)[1] - along_slope(engine, poses)[1]
+        if (change[:, contacts] < -0.01).all() and np.ptp(change[:, contacts]) < 1e-9:
+            return place
+    return None
+
+
+def stood(engine: CompiledEngine, footing: Footing, states: Floats, depth: float = 0.0, foot: int = 0) -> Floats:
+    """States (W, 2n) lifted or lowered until one foot is so deep (m) in the ground."""
+    place = upright(engine, footing)
+    if place is None:
+        return states
+    contacts = [engine.contacts.index(name) for name in footing.feet[foot]]
+    one = states.copy()
+    one[:, place] += 0.1
+    now, then = (along_slope(engine, rows)[1][:, contacts].max(axis=1) for rows in (states, one))
+    placed = states.copy()
+    placed[:, place] += (depth - now) * 0.1 / (then - now)
+    return placed
+
+
+def perturbed(step_map: StepMap, cycle: Cycle, part: float, count: int, seed: int) -> Floats:
+    """Random starts (count, 2n) near a cycle.
+
+    Every value and every speed that is not neutral is multiplied by a number that lies within `part` of 1; then the
+    walker is lifted or lowered until the foot that strikes is on the ground, as it was.
+
+    Args:
+        step_map: of the walker.
+        cycle: its cycle.
+        part: 0.05 for five per cent.
+        count: how many starts.
+        seed: of the random numbers.
+    """
+    change = np.random.default_rng(seed).uniform(-part, part, (count, len(cycle.state))) * cycle.state
+    across = step_map.basis @ step_map.basis.T
+    return stood(step_map.engine, step_map.footing, cycle.state + change @ across)
+
+
+def walks_from(
+    step_map: StepMap,
+    cycle: Cycle,
+    states: Floats,
+    wanted: int,
+    *,
+    accuracy: float = SWEEP_ACCURACY,
+    progress: Progress | None = None,
+) -> list[Walk]:
+    """Let walkers walk as long as a walker on the cycle takes for a number of steps, and half as long again.
+
+    Args:
+        step_map: of the walker.
+        cycle: its cycle.
+        states: starts (W, 2n).
+        wanted: number of steps.
+        accuracy: of the integrator.
+        progress: called now and then.
+    """
+    found: list[Walk] = []
+    for first in range(0, len(states), AT_ONCE):
+        found += walk_many(
+            step_map.engine, states[first : first + AT_ONCE], 1.5 * wanted * cycle.period, footing=step_map.footing,
+            numbers=step_map.numbers, accuracy=accuracy, threads=step_map.threads,
+        )  # fmt: skip
+        if progress is not None:
+            progress(len(found), len(states))
+    return found
+
+
+def find_basin(
+    step_map: StepMap,
+    cycle: Cycle,
+    x: str = "",
+    y: str = "",
+    *,
+    reach: float = 0.5,
+    grid: int = 21,
+    wanted: int = 20,
+    accuracy: float = SWEEP_ACCURACY,
+    progress: Progress | None = None,
+) -> Basin:
+    """Let walkers start on a grid around a cycle.
+
+    Args:
+        step_map: of the walker.
+        cycle: its cycle.
+        x: what changes along the columns: a coordinate, or with ``/speed`` behind its name its speed. By default the
+            speed of the first joint of the leg that strikes.
+        y: likewise along the rows; by default of the other leg.
+        reach: how far from the cycle, rad, m or per second.
+        grid: values of each.
+        wanted: steps after which a walker walks.
+        accuracy: of the integrator.
+        progress: called now and then.
+
+    Raises:
+        OsimliteError: there is no such coordinate, or nothing to take by default.
+    """
+    defaults = _leg_speeds(step_map)
+    places = [_place(step_map.engine, name) if name else other for name, other in zip((x, y), defaults, strict=True)]
+    axes = [_axis(step_map.engine, place, float(cycle.state[place]), reach, grid) for place in places]
+    columns, rows = np.meshgrid(axes[0].values, axes[1].values)
+    states = np.tile(cycle.state, (grid * grid, 1))
+    states[:, places[0]], states[:, places[1]] = columns.ravel(), rows.ravel()
+    starts = stood(step_map.engine, step_map.footing, states)
+    walks = walks_from(step_map, cycle, starts, wanted, accuracy=accuracy, progress=progress)
+    made = np.array([min(len(walk.steps), wanted) for walk in walks], dtype=np.int64)
+    return Basin(
+        axes[0],
+        axes[1],
+        made.reshape(grid, grid),
+        wanted,
+        (float(cycle.state[places[0]]), float(cycle.state[places[1]])),
+    )
+
+
+def _leg_speeds(step_map: StepMap) -> tuple[int, int]:
+    """Places of the speeds of the first joints of the two legs."""
+    n = len(step_map.engine.order)
+    if step_map.exchange is None:
+        raise OsimliteError("the legs are not alike; name what the basin is drawn over with --basin-x and --basin-y")
+    first = next(k for k in range(n) if step_map.exchange[k] != k)
+    return n + first, n + int(step_map.exchange[first])
+
+
+def _place(engine: CompiledEngine, name: str) -> int:
+    coordinate, slash, kind = name.rpartition("/")
+    is_speed = bool(slash) and kind == "speed"
+    place = engine.mechanism.coordinate_index(coordinate if is_speed else name)
+    if place not in engine.order:
+        raise OsimliteError(f"'{name}' is locked; name a coordinate that moves")
+    return engine.order.index(place) + (len(engine.order) if is_speed else 0)
+
+
+def _axis(engine: CompiledEngine, place: int, value: float, reach: float, grid: int) -> Axis:
+    n = len(engine.order)
+    info = engine.mechanism.coordinates[engine.order[place % n]]
+    unit = "rad" if info.motion_type == "rotational" else "m"
+    label = f"{info.name} ({unit})" if place < n else f"speed of {info.name} ({unit}/s)"
+    return Axis(label, place, value + np.linspace(-reach, reach, grid))
