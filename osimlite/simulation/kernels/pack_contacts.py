@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from osimlite.errors import UnsupportedError
 from osimlite.forces.coordinate_limit import limit_energy, limit_force
 from osimlite.forces.hunt_crossley import contact_energy
 from osimlite.simulation.contact_elements import ContactPair, ContactSurface, PairContact
 from osimlite.simulation.elements import CoordinateLimit
-from osimlite.simulation.kernels.items import Item, Places
+from osimlite.simulation.kernels.items import Item, Places, of_record
 from osimlite.simulation.kernels.layout import CONTACT_WORK, DEPTH_OF, RADIUS_OF
+from osimlite.simulation.kernels.meshes import MESH_WORK
+from osimlite.simulation.mesh_contact import ElasticFoundation
 
 
 def pack_pairs(element: PairContact, places: Places) -> list[Item]:
@@ -57,6 +60,38 @@ def pair_numbers(element: PairContact, pair: ContactPair, places: Places) -> tup
     second, other = places.station(two.body, two.center)
     normal, radius = places.direction(one.body, one.normal), 0.0 if one.is_half_space else one.radius
     return (first, second), (*center, *normal, radius, *other, two.radius, *pair.effective, element.vt)
+
+
+def pack_foundation(element: ElasticFoundation, places: Places) -> list[Item]:
+    """Two items for each pair of a mesh and a half space or a sphere: what computes it, and its place as a contact.
+
+    Raises:
+        UnsupportedError: two meshes touch.
+    """
+    found = []
+    for place, pair in enumerate(element.pairs):
+        one, two = element.surfaces[pair.first], element.surfaces[pair.second]
+        mesh = two.mesh
+        if mesh is None or one.mesh is not None:
+            raise UnsupportedError(
+                f"the compiled engine cannot compute '{element.path}', where meshes touch meshes; "
+                "take --engine bullet, or leave it out"
+            )
+        links, numbers = pair_numbers(element, pair, places)
+        stiffness, *material = two.material
+        middles = (places.station(two.body, middle)[1] for middle in mesh.centroids.tolist())
+        springs = (
+            x for area, middle in zip(mesh.areas.tolist(), middles, strict=True) for x in (stiffness * area, *middle)
+        )
+        ints = *links, len(mesh.areas), int(one.is_half_space), place
+        own = (*numbers[:11], *material, element.vt, *springs)
+        found.append(Item(lambda record, values, speeds: [], "touch_mesh", is_contact=True, is_part=True))
+        found.append(Item(of_record(_mesh_kept), "touch_mesh", ints, own, room=MESH_WORK))
+    return found
+
+
+def _mesh_kept(record: Sequence[float]) -> tuple[float, ...]:
+    return tuple(record[:MESH_WORK])
 
 
 def contact_kept(row: Sequence[float], stiffness: float) -> Any:

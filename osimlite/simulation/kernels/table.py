@@ -22,6 +22,7 @@ LAW_MODULES = {
     "touch_ellipsoid": "rare_contacts",
     "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",
+    "touch_mesh": "meshes",
     "coordinate_spring": "springs",
     "point_spring": "springs",
     "bushing": "springs",
@@ -46,6 +47,7 @@ LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 PACKERS = {
     "HuntCrossley": ("pack_contacts", "pack_pairs"),
     "EllipsoidContact": ("pack_contacts", "pack_pairs"),
+    "ElasticFoundation": ("pack_contacts", "pack_foundation"),
     "CoordinateLimit": ("pack_contacts", "pack_limit"),
     "CoordinateSpring": ("pack_springs", "pack_coordinate_spring"),
     "CoordinateFormula": ("pack_springs", "pack_coordinate_formula"),
