@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 from dataclasses import replace
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite import Body, Coordinate, Model
+from osimlite.document.reader import read_text
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.multibody import Mechanism, build_mechanism
 from osimlite.multibody import functions as f
@@ -20,6 +22,7 @@ from osimlite.multibody.joints import Mobilizer, TransformAxis, custom
 from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, MobileBody
 from osimlite.schema import constraint_types as kinds
 from osimlite.schema.custom_joint import CustomJoint
+from osimlite.schema.forces import Force
 from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline, Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
@@ -324,3 +327,17 @@ def test_settings_reach_the_summary():
     assert summary["settings"]["opensim_derivatives"] is True
     assert summary["constraints"] == ["/constraintset/beta"]
     assert Settings().route == "auto"
+
+
+def test_the_energy_of_a_real_model_with_patellas_is_kept(corpus: Any):
+    entry = next(item for item in corpus if item.id == "m0954")
+    model = read_text(gzip.decompress(entry.converted.read_bytes()).decode())
+    for force in model.components(Force):
+        force.appliesForce = False
+    speeds = {f"knee_angle_{side}": 3.0 for side in "rl"}
+    energies = []
+    for opensim_derivatives in (False, True):
+        trajectory = simulate(model, 0.2, accuracy=1e-9, initial_speeds=speeds, opensim_derivatives=opensim_derivatives)
+        energies.append(np.ptp(trajectory.energy["total"]) / trajectory.energy["kinetic"].max())
+    assert energies[0] < 1e-8
+    assert energies[1] > 1e-6
