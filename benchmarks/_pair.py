@@ -122,12 +122,14 @@ def report(title: str, pairs: Iterable[Pair], *, console: Console | None = None)
             row.name,
             _milliseconds(row.ours),
             _milliseconds(row.theirs),
-            f"{median(ratios):.2f}",
-            f"{min(ratios):.2f}",
-            f"{max(ratios):.2f}",
+            *(_ratio(value) for value in (median(ratios), min(ratios), max(ratios))),
             str(len(ratios)),
         )
     (console or Console()).print(table)
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.2f}" if value >= 0.1 else f"{value:.2g}"
 
 
 def _milliseconds(times: Sequence[float]) -> str:

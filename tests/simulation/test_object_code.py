@@ -59,12 +59,14 @@ def test_without_a_folder(tmp_path, monkeypatch):
 
 
 def test_folders(monkeypatch, tmp_path):
-    """The one that is named comes first, the user's own last."""
+    """The one that is named, or the package's own and then the user's."""
     monkeypatch.setenv(object_code.FOLDER, str(tmp_path / "named"))
+    assert list(object_code._folders()) == [tmp_path / "named"]
+    monkeypatch.delenv(object_code.FOLDER)
     monkeypatch.delenv("LOCALAPPDATA", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    first, *_, last = object_code._folders()
-    assert (first, last) == (tmp_path / "named", tmp_path / "home" / "osimlite")
+    first, last = object_code._folders()
+    assert (first.parent.name, last) == ("kernels", tmp_path / "home" / "osimlite")
 
 
 def test_code_from_files_needs_no_compiler(walker):

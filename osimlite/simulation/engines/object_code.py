@@ -24,7 +24,7 @@ from osimlite.errors import OsimliteError
 from osimlite.files import make_folder, write_atomically
 
 FOLDER = "NUMBA_CACHE_DIR"
-"""Environment variable that may name a folder for the files; numba uses it likewise."""
+"""Environment variable that may name the only folder for the files; numba uses it likewise."""
 
 HELPER = re.compile(rb"numba_[a-z_]+")
 """What the compiler's own functions are called, which code that raises nothing names but never calls."""
@@ -109,6 +109,7 @@ def _folders() -> Iterator[Path]:
     """Where files may be, the best place first."""
     if os.environ.get(FOLDER):
         yield Path(os.environ[FOLDER])
+        return
     yield Path(__file__).parents[1] / "kernels" / "__pycache__"
     home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     yield Path(home) / "osimlite"
