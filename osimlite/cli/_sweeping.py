@@ -78,7 +78,7 @@ def make_plan(
     if Path(source).suffix.lower() == ".osim":
         if parameter:
             raise SettingError(f"'{source}' is a file and takes no parameters; vary its properties by their paths")
-        return plan(read(source), ranges, **choices)
+        return plan(read(source), ranges, folder=str(Path(source).resolve().parent), **choices)
     given = _words(parameter or [], "-p")
     both = [name for name in ranges if name in given]
     if both:

@@ -20,7 +20,7 @@ import numpy as np
 
 from osimlite._load import module_named, module_of_file
 from osimlite.errors import ModelError, SettingError
-from osimlite.simulation.many import Runs, Watch
+from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep.variables import Floats
 from osimlite.text import did_you_mean, listed
 

@@ -58,6 +58,7 @@ class Plan:
         report_interval: time between the moments that a measure of one's own can look at (s), None for none.
         skip_unsupported: leave out forces that cannot be computed.
         make: makes the model from parameters, where some of them are varied.
+        folder: of the model's file, where the files are that it names.
     """
 
     text: str
@@ -70,6 +71,7 @@ class Plan:
     report_interval: float | None = None
     skip_unsupported: bool = False
     make: Maker | None = None
+    folder: str | None = None
 
     def model(self) -> Model:
         """The model, with none of the variables set."""

@@ -166,7 +166,7 @@ class ClusterPool:
         self._tasks: dict[Any, tuple[Any, Floats, int, Any]] = {}
         self._threads, self._asked = 0, 0.0
         try:
-            self._client: Any = distributed.Client(address, timeout=10, set_as_default=False)
+            self._client: Any = distributed.Client(address, timeout=min(10, PATIENCE), set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise ClusterLostError(

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.simulation.many import ENDINGS, Runs, Watch, run_many
 from osimlite.simulation.run import report_times
+from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep.measures import Batch, Measure, State, measure, measure_name
 from osimlite.sweep.plan import MOST_TRIES, Plan
 from osimlite.sweep.variables import Floats
@@ -63,7 +63,7 @@ class Runner:
         ]
         self._watches = list({item.name: item for made in self.measures for item in made.watches}.values()) + stops
         if self._watches and plan.engine != "compiled":
-            raise SettingError("what stops a run, and the measures of steps, need --engine compiled")
+            raise SettingError("what stops a run needs --engine compiled")
         # Without room for events, none is looked for.
         rooms = [made.room(plan.to) for made in self.measures]
         self._most_events = max([*rooms, 1 if self._watches else 0])
@@ -145,6 +145,8 @@ class Runner:
     def _simulate(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
         if self.plan.engine != "compiled":
             return self._one_by_one(engine, variants, starts)
+        from osimlite.simulation.many import ENDINGS, run_many
+
         runs = run_many(
             engine,
             starts,
@@ -159,14 +161,17 @@ class Runner:
             threads=1,
         )
         finite = [bool(np.isfinite(state).all()) for state in runs.states]
-        why = [self._ending(runs, number, finite[number]) for number in range(len(starts))]
+        why = [
+            self._ending(ENDINGS[int(runs.endings[number])], runs, number, finite[number])
+            for number in range(len(starts))
+        ]
         return runs, why
 
     def _numbers(self, variants: Sequence[Variant]) -> Floats | None:
         return None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
 
-    def _ending(self, runs: Runs, number: int, is_finite: bool) -> tuple[str, str | None]:
-        ending, t = ENDINGS[int(runs.endings[number])], runs.times[number]
+    def _ending(self, ending: str, runs: Runs, number: int, is_finite: bool) -> tuple[str, str | None]:
+        t = runs.times[number]
         if ending == "done" and is_finite:
             return DONE, None
         if ending == "stopped":

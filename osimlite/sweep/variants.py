@@ -178,7 +178,8 @@ class Variants:
         self._forces = forces if only_forces and self._plan.engine == "compiled" else None
 
     def _whole(self) -> Variant:
-        simulation = Simulation(self.model, self._plan.engine, skip_unsupported=self._plan.skip_unsupported)
+        plan = self._plan
+        simulation = Simulation(self.model, plan.engine, skip_unsupported=plan.skip_unsupported, folder=plan.folder)
         engine: Any = simulation.engine
         infos = engine.mechanism.coordinates
         start = simulation.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
@@ -191,7 +192,7 @@ class Variants:
         if self._forces is None or self.given.simulation is None:
             return self._whole()
         if self._force_numbers is None:
-            self._force_numbers = ForceNumbers(self.model, self.given)
+            self._force_numbers = ForceNumbers(self.model, self.given, Path(self._plan.folder or "."))
         return self._force_numbers.variant(self._forces) or self._whole()
 
 
@@ -201,12 +202,13 @@ class ForceNumbers:
     Args:
         model: whose forces change, and nothing else.
         given: the same model before.
+        folder: of its file.
     """
 
-    def __init__(self, model: Model, given: Variant) -> None:
+    def __init__(self, model: Model, given: Variant, folder: Path) -> None:
         engine = given.engine
         self._given, self._forces = given, engine.forces
-        self._builder = ElementBuilder(model, engine.mechanism, False, Path())
+        self._builder = ElementBuilder(model, engine.mechanism, False, folder)
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {element.path: items_of(element, self._places) for element in engine.forces.elements}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.errors import SettingError
 from osimlite.gait.footing import Footing, find_footing
 from osimlite.gait.steps import Walk, falls, room_for, walks_of
 from osimlite.sweep.measures import Batch, Measure
@@ -30,6 +31,8 @@ def time_to_fall(engine: Any) -> Measure:
 
 
 def _measure(name: str, engine: Any, number: Callable[[Walk], float]) -> Measure:
+    if engine.name != "compiled":
+        raise SettingError(f"the measure '{name}' needs --engine compiled")
     footing = find_footing(engine)
     return Measure(name, partial(_of, footing, number), tuple(falls(footing)), room_for, True)
 

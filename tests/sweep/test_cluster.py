@@ -14,6 +14,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.run import sweep
 from osimlite.sweep.sampling import samples
@@ -137,6 +138,15 @@ def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     with pytest.raises(OsimliteError, match="leave out --workers"):
         sweep(made, chosen, tmp_path / "r.parquet", cluster="tcp://127.0.0.1:1", workers=2)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_search_finds_the_same_there(cluster, walker, tmp_path):
+    pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+    made = plan(walker, {"RHip_rz": (0.3, 0.7), "LHip_rz": (-0.5, 0.0)}, to=0.5)
+    for name, where in (("there", {"cluster": cluster.address}), ("here", {})):
+        optimize(made, Objective("distance"), tmp_path / name, budget=24, popsize=8, **where)
+    for name in (HISTORY, BEST, SUMMARY):
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 
 
 def test_functions_that_cannot_travel_are_told(cluster, walker, tmp_path):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -206,3 +209,32 @@ def test_bullet_gives_the_same_rows(walker):
         close = 1e-3 if name == "largest_force" else 1e-5
         assert both[0].measures[name] == pytest.approx(both[1].measures[name], rel=close), name
     assert both[0].status == both[1].status == ["done", "done"]
+
+
+def test_bullet_needs_no_numba(fixtures):
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    code = """
+import sys
+sys.modules["numba"] = None
+import numpy as np
+import osimlite
+from osimlite.sweep.plan import plan
+from osimlite.sweep.runner import Runner
+model = osimlite.read(sys.argv[1])
+made = plan(model, {"RHip_rz": (0.3, 0.5)}, to=0.1, engine="bullet")
+assert Runner(made).run(np.array([[0.4]])).status == ["done"]
+try:
+    Runner(plan(model, {"RHip_rz": (0.3, 0.5)}))
+except osimlite.OsimliteError as error:
+    assert "osimlite[fast]" in str(error)
+else:
+    raise AssertionError
+"""
+    subprocess.run([sys.executable, "-c", code, fixtures / "walker" / "DynamicWalkerModel.osim"], check=True)
+
+
+def test_what_only_the_compiled_engine_watches(walker):
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    for choices in ({"measures": ("steps",)}, {"stops": (Stop("Pelvis_ty", 0.5),)}):
+        with pytest.raises(SettingError, match="--engine compiled"):
+            Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, engine="bullet", **choices))
