@@ -94,7 +94,7 @@ class Batch:
         """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
         vectors, room = self._vectors, np.zeros(self._room)
         entry_point("run_several")(
-            self._engine.program.ctypes.data,
+            self._engine.program_address,
             vectors.ctypes.data,
             room.ctypes.data,
             vectors.shape[1] if len(vectors) > 1 else 0,

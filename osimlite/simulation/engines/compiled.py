@@ -24,7 +24,7 @@ from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.table import LAW_NUMBERS
 
-LOGGED_STEPS = 2048
+LOGGED_STEPS = 512
 """So many steps are taken in one call of a motion that is watched."""
 
 
@@ -81,6 +81,8 @@ class CompiledEngine:
         self._pairs = self._w[start : start + layout.CONTACT_WORK * len(self.contacts)].reshape(-1, layout.CONTACT_WORK)
         self._y, self._f = np.zeros(2 * len(self.order)), np.zeros(2 * len(self.order))
         self._evaluate = entry_point("evaluate")
+        self._addresses = tuple(part.ctypes.data for part in (self._w, self._y, self._f))
+        self.program_address: int = self.program.ctypes.data
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
@@ -95,8 +97,7 @@ class CompiledEngine:
     def _at(self, t: float, y: Sequence[float], how_far: int) -> int:
         self._w[layout.TIME] = t
         self._y[:] = y
-        s, x, w, y_at, f = self.program, self.numbers, self._w, self._y, self._f
-        return self._evaluate(s.ctypes.data, x.ctypes.data, w.ctypes.data, y_at.ctypes.data, f.ctypes.data, how_far)
+        return self._evaluate(self.program_address, self.numbers.ctypes.data, *self._addresses, how_far)
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""

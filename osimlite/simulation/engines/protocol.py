@@ -121,7 +121,8 @@ class FreeState:
     def histories(self, states: Sequence[Sequence[float]]) -> tuple[Any, Any]:
         """Values and speeds (k, n) of all coordinates at k states."""
         rows, count = np.array(states, dtype=float).reshape(len(states), 2 * len(self.order)), len(self.order)
-        values, speeds = np.tile(self._q, (len(states), 1)), np.zeros((len(states), len(self._q)))
+        values, speeds = np.empty((len(states), len(self._q))), np.zeros((len(states), len(self._q)))
+        values[:] = self._q
         values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count:]
         return values, speeds
 
