@@ -1,4 +1,4 @@
-"""Time steppers: Runge-Kutta-Merson with Simbody's error control, and semi-implicit Euler with a fixed step.
+"""Time steppers, and the one that is usual: Runge-Kutta-Merson with Simbody's error control.
 
 A state is one list y = (q, u) or (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative
 comes from a function f(t, y) that returns (qdot, udot) or (qdot, udot, zdot) as a fresh sequence of Python floats
@@ -44,9 +44,6 @@ DEFAULT_ACCURACY = 1e-3
 
 INITIAL_STEP = 0.01
 """First step tried, s: a tenth of Simbody's default time scale."""
-
-FIXED_STEP_TOLERANCE = 1e-9
-"""What constraints may be off after a fixed step, before they are mended."""
 
 _ROUNDING = 2.0**-52
 
@@ -372,77 +369,6 @@ class RungeKuttaMerson(Stepper):
             t0,
             index,
         ) from cause
-
-
-class SemiImplicitEuler(Stepper):
-    """Fixed steps u1 = u0 + h udot(t0, q0, u0), q1 = q0 + h qdot(q0, u1): first order; PyBullet steps like that.
-
-    Args:
-        f: derivative of the state (q, u); only the speeds' part is used.
-        t: initial time, s.
-        y: initial state.
-        nq: number of coordinates in it.
-        h: step, s. Only a step that would pass the limit is shortened.
-        rates: qdot as a function of (q, u); by default qdot = u.
-        observe: called with (time, state) after each step taken.
-        names: what the entries of y are called in messages.
-        projection: what moves the end of a step to where the constraints hold.
-    """
-
-    def __init__(
-        self,
-        f: Derivative,
-        t: float,
-        y: Iterable[float],
-        nq: int,
-        h: float,
-        *,
-        rates: Callable[[list[float], list[float]], Sequence[float]] | None = None,
-        observe: Observer | None = None,
-        names: Sequence[str] | None = None,
-        projection: Projection | None = None,
-    ) -> None:
-        if not 0.0 < h < inf:
-            raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
-        super().__init__(f, t, y, observe, names)
-        if rates is None and len(self.state) != 2 * nq:
-            raise ValueError(f"{nq} coordinates and {len(self.state) - nq} speeds need a function for qdot")
-        self._nq = nq
-        self._h = h
-        self._rates = rates
-        self._projection = projection
-        self._origin, self._since = t, 0
-
-    def step(self, limit: float = inf) -> None:
-        """Take one step of the fixed size, or up to the limit if that comes first."""
-        self._require_room(limit)
-        h = self._h
-        # Counted from an origin, so that rounding does not pile up in the time.
-        self._since += 1
-        t = self._origin + h * self._since
-        if t > limit - 1e-9 * h:
-            if t > limit + 1e-9 * h:
-                h = limit - self.time
-            t = limit
-            self._origin, self._since = limit, 0
-        q = self.state[: self._nq]
-        u = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
-        rates = u if self._rates is None else self._rates(q, u)
-        y = [x + h * v for x, v in zip(q, rates, strict=True)] + u
-        if self._projection is not None:
-            found = self._projection.project(t, y, None, FIXED_STEP_TOLERANCE)
-            if found is None:
-                raise IntegrationError(
-                    f"the constraints cannot be kept up at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
-                    "or control the error (--accuracy)",
-                    t,
-                )
-            y, _ = found
-        self._advance(t, y)
-
-    def interpolant(self) -> Callable[[float], list[float]]:
-        """The straight line between the ends of the last step."""
-        return partial(straight_line, *self._previous[:2], self.time, self.state)
 
 
 def merson_step(

@@ -14,11 +14,11 @@ from osimlite import Body, Coordinate, Model
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines import bullet as engine_module
-from osimlite.simulation.engines import bullet_file
-from osimlite.simulation.engines.bullet import BulletEngine, _Body
+from osimlite.simulation.engines import bullet_file, bullet_world
+from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.bullet_world import World
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.integrators import SemiImplicitEuler
+from osimlite.simulation.euler import SemiImplicitEuler
 
 bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 
@@ -41,20 +41,20 @@ def error(mechanism, route="articulated-body", *, q=Q, u=U):
 
 def test_1_damping(mechanism, monkeypatch):
     assert error(mechanism) < 1e-12
-    monkeypatch.setattr(_Body, "DAMPING", 0.04)
+    monkeypatch.setattr(World, "DAMPING", 0.04)
     assert error(mechanism) > 1e-3
 
 
 def test_2_motors(mechanism, monkeypatch):
     assert error(mechanism) < 1e-12
-    monkeypatch.setattr(_Body, "_switch_motors_off", lambda self: None)
+    monkeypatch.setattr(World, "_switch_motors_off", lambda self: None)
     assert error(mechanism) > 1e-3
 
 
 @pytest.mark.parametrize("route", ROUTES)
 def test_3_inertia_from_the_file(mechanism, monkeypatch, route):
     assert error(mechanism, route) < 1e-12
-    monkeypatch.setattr(_Body, "FLAGS", 0)
+    monkeypatch.setattr(World, "FLAGS", 0)
     assert error(mechanism, route) > 1e-3
 
 
@@ -78,7 +78,7 @@ def spinning(speed):
 
 def test_7_fast_joints_are_not_clipped(monkeypatch):
     assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01).speeds[-1, 0] == pytest.approx(150.0)
-    monkeypatch.setattr(_Body, "FASTEST", 100.0)
+    monkeypatch.setattr(World, "FASTEST", 100.0)
     with pytest.raises(OsimliteError, match="bursts"):
         osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01)
 
@@ -106,9 +106,9 @@ def test_11_inertia_that_no_body_has(monkeypatch, capfd):
     with pytest.raises(UnsupportedError, match=r"'b0'.*articulated-body"):
         BulletEngine(mechanism, Forces(()), route="mass-matrix")
     with monkeypatch.context() as without:
-        without.setattr(_Body, "_set_inertias", lambda *_: None)
+        without.setattr(World, "_set_inertias", lambda *_: None)
         assert error(mechanism, "auto", **state) > 1e-3
-    monkeypatch.setattr(engine_module, "excess", lambda link: 0.0)
+    monkeypatch.setattr(bullet_world, "excess", lambda link: 0.0)
     monkeypatch.setattr(bullet_file, "excess", lambda link: 0.0)
     assert error(mechanism, "articulated-body", **state) > 1e-3
     # Bullet's own complaint stays in the buffer of the C library until then.
@@ -130,27 +130,27 @@ def test_13_to_16_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
     """A step is exactly semi-implicit Euler with the forces at its start: no stale places, no force twice."""
     ours, expected = steps(walker)
     assert ours == pytest.approx(expected, abs=1e-9)
-    plain = _Body.step
+    plain = World.step
 
     def twice(self, h, forces):
         both = [2.0 * force for force in forces]
         plain(self, h, both)
 
-    monkeypatch.setattr(_Body, "step", twice)
+    monkeypatch.setattr(World, "step", twice)
     ours, expected = steps(walker)
     assert np.abs(ours - expected).max() > 1e-3
 
 
 def test_13_stale_places_would_show(walker, monkeypatch):
     """With forces one step old, as Bullet's own link positions are, the motion differs."""
-    plain = _Body.step
+    plain = World.step
     held = []
 
     def stale(self, h, forces):
         held.append(list(forces))
         plain(self, h, held[-2] if len(held) > 1 else held[-1])
 
-    monkeypatch.setattr(_Body, "step", stale)
+    monkeypatch.setattr(World, "step", stale)
     ours, expected = steps(walker)
     assert np.abs(ours - expected).max() > 1e-3
 
@@ -169,14 +169,14 @@ def test_18_slow_motion_does_not_fall_asleep(monkeypatch):
         return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01).values[-1, 0]
 
     assert far() == pytest.approx(0.25)
-    monkeypatch.setattr(_Body, "FLAGS", _Body.FLAGS | bullet.URDF_ENABLE_SLEEPING)
+    monkeypatch.setattr(World, "FLAGS", World.FLAGS | bullet.URDF_ENABLE_SLEEPING)
     assert far() < 0.2
 
 
 def test_20_joints_are_matched_by_name(mechanism, monkeypatch):
     assert error(mechanism, "mass-matrix") < 1e-12
     assert error(mechanism) < 1e-12
-    monkeypatch.setattr(_Body, "_by_name", staticmethod(lambda robot, infos: list(robot.moving)))
+    monkeypatch.setattr(World, "_by_name", staticmethod(lambda robot, infos: list(robot.moving)))
     assert error(mechanism) > 1e-3
 
 

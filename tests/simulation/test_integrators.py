@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError, SimulationError
+from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.integrators import (
     IntegrationError,
     RungeKuttaMerson,
-    SemiImplicitEuler,
     merson_step,
     next_step_size,
 )

@@ -24,8 +24,9 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RECURSION, BulletEngine
 from osimlite.simulation.engines.bullet_file import excess
 from osimlite.simulation.engines.protocol import FreeState, Settings
+from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.field import ForceField
-from osimlite.simulation.integrators import Observer, SemiImplicitEuler, Stepper
+from osimlite.simulation.integrators import Observer, Stepper
 from osimlite.simulation.reduction import Reduction
 from osimlite.translate.robot import Robot
 

@@ -18,7 +18,8 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
 from osimlite.simulation.engines.protocol import FreeState, Settings
-from osimlite.simulation.integrators import Observer, RungeKuttaMerson, SemiImplicitEuler, Stepper
+from osimlite.simulation.euler import SemiImplicitEuler
+from osimlite.simulation.integrators import Observer, RungeKuttaMerson, Stepper
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats

@@ -1,0 +1,206 @@
+"""A robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
+
+Bullet is made for games; what has to be changed so that it computes mechanics is here, one method or constant for each.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from osimlite._require import require
+from osimlite.errors import SimulationError
+from osimlite.simulation.engines.bullet_file import excess, robot_text, temporary_file
+from osimlite.translate.passes.principal_axes import principal_axes
+from osimlite.translate.robot import Robot, RobotJoint
+
+__all__ = ["World", "bullet"]
+
+
+@contextmanager
+def _muted() -> Iterator[None]:
+    """Nothing goes to standard error meanwhile: on its import, PyBullet says there when it was built."""
+    try:
+        kept = os.dup(2)
+    except OSError:
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    sys.stderr.flush()
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+with _muted():
+    require("pybullet", extra="sim", purpose="the PyBullet engine")
+    import pybullet as bullet
+
+NO_LIMIT = 1e9
+
+
+class World:
+    """One robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
+
+    Attributes:
+        client: Bullet's number of the world.
+        id: Bullet's number of the robot.
+        joints: the robot's joints in the order of Bullet's degrees of freedom.
+        impossible: names of links whose inertia no real body has.
+        zeros: as many as there are joints.
+    """
+
+    # Without this flag Bullet makes up inertias from collision shapes, of which there are none. Sleeping stays off.
+    FLAGS = bullet.URDF_USE_INERTIA_FROM_FILE
+
+    DAMPING = 0.0
+    """Bullet's default is 0.04, in every link."""
+
+    FASTEST = NO_LIMIT
+    """Bullet clips joint speeds at 100 by default."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        gravity: Sequence[float],
+        *,
+        show: bool = False,
+        files: Mapping[str, bytes] | None = None,
+        exact: bool = True,
+    ) -> None:
+        self.client = _connect(show)
+        self._step = 0.0
+        self._exact = exact
+        try:
+            self._load(robot, gravity, files or {})
+        except BaseException:
+            self.close()
+            raise
+
+    def _load(self, robot: Robot, gravity: Sequence[float], files: Mapping[str, bytes]) -> None:
+        client = self.client
+        bullet.setGravity(*gravity, physicsClientId=client)
+        bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
+        self.impossible = [link.name for link in robot.links if excess(link) > 0.0]
+        with temporary_file(robot_text(robot), files) as path:
+            self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)
+        infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
+        self.joints = self._by_name(robot, infos)
+        self._indices = [int(info[0]) for info in infos if info[3] >= 0]
+        self.zeros = [0.0] * len(self._indices)
+        self._release(infos)
+        if self.impossible and self._exact:
+            self._set_inertias(robot, infos)
+
+    @staticmethod
+    def _by_name(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
+        """The joints in Bullet's order, which is not that of the model nor of the robot."""
+        joints = {joint.name: joint for joint in robot.moving}
+        return [joints[info[1].decode()] for info in infos if info[3] >= 0]
+
+    def _release(self, infos: Sequence[Sequence[Any]]) -> None:
+        """Take away everything that slows a joint down."""
+        client = self.client
+        for index in (-1, *(int(info[0]) for info in infos)):
+            bullet.changeDynamics(
+                self.id,
+                index,
+                linearDamping=self.DAMPING,
+                angularDamping=self.DAMPING,
+                jointDamping=self.DAMPING,
+                maxJointVelocity=self.FASTEST,
+                physicsClientId=client,
+            )
+        self._switch_motors_off()
+
+    def _switch_motors_off(self) -> None:
+        """Bullet starts every joint with a motor that holds it."""
+        if self._indices:
+            bullet.setJointMotorControlArray(
+                self.id, self._indices, bullet.VELOCITY_CONTROL, forces=self.zeros, physicsClientId=self.client
+            )
+
+    def _set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
+        """Give Bullet the inertias that it refuses to read; only its articulated-body algorithm takes them."""
+        links = {link.name: link for link in robot.links}
+        for info in infos:
+            link = links[info[12].decode()]
+            if link.name in self.impossible:
+                moments, _ = principal_axes(link.inertia)
+                bullet.changeDynamics(
+                    self.id,
+                    int(info[0]),
+                    localInertiaDiagonal=[float(moment) for moment in moments],
+                    physicsClientId=self.client,
+                )
+
+    @property
+    def mass_matrix_works(self) -> bool:
+        """Whether Bullet's inverse dynamics accepts the inertias that it has."""
+        return not (self.impossible and self._exact)
+
+    def mass_matrix(self, q: list[float]) -> Sequence[Sequence[float]]:
+        """M (n, n) of the joints."""
+        matrix: Sequence[Sequence[float]] = bullet.calculateMassMatrix(self.id, q, 0, self.client)
+        return matrix
+
+    def bias(self, q: list[float], rates: list[float]) -> Sequence[float]:
+        """Forces (n,) on the joints without which they would accelerate."""
+        return self.joint_forces(q, rates, self.zeros)
+
+    def joint_forces(self, q: list[float], rates: list[float], accelerations: list[float]) -> Sequence[float]:
+        """Forces (n,) that give the joints these accelerations (n,) against gravity."""
+        forces: Sequence[float] = bullet.calculateInverseDynamics(self.id, q, rates, accelerations, 0, self.client)
+        return forces
+
+    def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
+        """Put the joints into a state, and all links where they then are."""
+        bullet.resetJointStatesMultiDof(self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client)
+
+    def get_state(self) -> tuple[list[float], list[float]]:
+        """Values and rates of the joints."""
+        states = bullet.getJointStates(self.id, self._indices, self.client)
+        return [state[0] for state in states], [state[1] for state in states]
+
+    def step(self, h: float, forces: Sequence[float]) -> None:
+        """Let Bullet take one step of length h (s) under forces on the joints, which hold for this step only."""
+        client = self.client
+        if h != self._step:
+            bullet.setTimeStep(h, client)
+            self._step = h
+        bullet.setJointMotorControlArray(
+            self.id, self._indices, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=client
+        )
+        bullet.stepSimulation(client)
+
+    def accelerations_by_step(self, q: list[float], rates: list[float], forces: Sequence[float]) -> list[float]:
+        """Second derivatives of the joint values: what one second changes the rates by."""
+        self.set_state(q, rates)
+        self.step(1.0, forces)
+        states = bullet.getJointStates(self.id, self._indices, self.client)
+        return [state[1] - rate for state, rate in zip(states, rates, strict=True)]
+
+    def close(self) -> None:
+        """Leave the world."""
+        if self.client >= 0:
+            bullet.disconnect(self.client)
+            self.client = -1
+
+
+def _connect(show: bool) -> int:
+    if show and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise SimulationError(
+            "there is no screen to show the motion on (DISPLAY is not set); leave out --gui, "
+            "and take --animate for a film"
+        )
+    client = int(bullet.connect(bullet.GUI if show else bullet.DIRECT))
+    if client < 0:
+        raise SimulationError("Bullet opens no more worlds; close the engines that are not needed any more")
+    return client
