@@ -283,6 +283,7 @@ class Component(Object, abstract=True):
     """Names and classes of the parts that OpenSim makes for itself: they have a path and stand in no file."""
 
     subcomponents: Annotated[Many[Component], Tag("components")] = none()
+    """Further components that belong to this one; they may be of any class."""
 
     @property
     def model(self) -> Model | None:

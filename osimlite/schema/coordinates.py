@@ -8,18 +8,21 @@ from osimlite.schema.functions import Function
 
 
 class Coordinate(ModelComponent):
-    """One generalized coordinate of a joint.
-
-    Values of rotational coordinates are in radians. `range` limits nothing in a simulation: it is where a user
-    interface lets the coordinate go, and where `clamped` requires the default to be. `locked` holds the coordinate at
-    its default value.
-    """
+    """One generalized coordinate of a joint; values of rotational coordinates are in radians."""
 
     default_value: Annotated[float, real("rad | m")] = 0.0
+    """Value at the start of a simulation, before assembly satisfies the constraints."""
     default_speed_value: Annotated[float, real("rad/s | m/s")] = 0.0
+    """Generalized speed at the start of a simulation; if the coordinate is locked, it starts with 0."""
     range: Annotated[tuple[float, float], reals("rad | m", least=2, most=2)] = (-10.0, 10.0)
+    """Lowest and highest value that a user interface offers; it limits nothing in a simulation."""
     clamped: Flag = False
+    """Whether values that are set must lie within `range`, the default also; motion may leave it all the same."""
     locked: Flag = False
+    """Whether a constraint holds the coordinate at its default value, at speed 0."""
     prescribed_function: Optional[Function] = None
+    """The value as a function of time; its first two derivatives are used also."""
     prescribed: Flag = False
+    """Whether the coordinate follows `prescribed_function`; without a function it is free."""
     is_free_to_satisfy_constraints: Flag = False
+    """Whether assembly may move the coordinate at will; otherwise it keeps near the default value."""

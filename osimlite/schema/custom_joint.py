@@ -16,8 +16,11 @@ class TransformAxis(Object):
     """A rotation about or a translation along an axis, by a function of coordinates of the joint."""
 
     coordinates: OwnJointCoordinates = ()
+    """Coordinates of the joint that are the arguments of `function`, in this order."""
     axis: Annotated[Vec3, vec3()] = _X
+    """Direction that the motion is about or along; its length does not matter."""
     function: Single[Function] = made(Constant, name="function")
+    """Angle (rad) or displacement (m) as a function of the coordinates."""
 
     @classmethod
     def in_place_of_none(cls, spec: FieldSpec, values: Mapping[str, Any]) -> Function:
@@ -38,14 +41,21 @@ class SpatialTransform(Object):
     """Three body-fixed rotations in order, then three translations along axes of the parent frame."""
 
     rotation1: Single[TransformAxis] = _axis("rotation1", _X)
+    """First rotation, about an axis of the parent frame."""
     rotation2: Single[TransformAxis] = _axis("rotation2", _Y)
+    """Second rotation, about an axis that the first has turned."""
     rotation3: Single[TransformAxis] = _axis("rotation3", _Z)
+    """Third rotation, about an axis that the first two have turned."""
     translation1: Single[TransformAxis] = _axis("translation1", _X)
+    """First translation, along an axis of the parent frame that no rotation turns."""
     translation2: Single[TransformAxis] = _axis("translation2", _Y)
+    """Second translation, along an axis of the parent frame that no rotation turns."""
     translation3: Single[TransformAxis] = _axis("translation3", _Z)
+    """Third translation, along an axis of the parent frame that no rotation turns."""
 
 
 class CustomJoint(Joint):
     """Any motion of up to six degrees of freedom; `spatial_transform` says how the coordinates make it."""
 
     spatial_transform: Unnamed[SpatialTransform] = made(SpatialTransform)
+    """How the coordinates make the rotations and translations of the joint."""

@@ -13,7 +13,7 @@ from osimlite.schema.fields import Held, Reference, Value
 
 
 def meaning_of(spec: FieldSpec) -> str:
-    """What a property means: the text below its declaration; "" if there is none."""
+    """What a property means: the text below its declaration; "" if there is none, or no source to read it from."""
     declared = spec.declared_in
     return _described(declared.__module__).get((declared.__name__, spec.name), "")
 
@@ -63,7 +63,11 @@ def _shown(value: object) -> str:
 def _described(module: str) -> dict[tuple[str, str], str]:
     """The texts below the declarations of a module, by class and property. Python itself drops them."""
     found: dict[tuple[str, str], str] = {}
-    for node in ast.parse(inspect.getsource(import_module(module))).body:
+    try:
+        source = inspect.getsource(import_module(module))
+    except OSError:
+        return found
+    for node in ast.parse(source).body:
         if not isinstance(node, ast.ClassDef):
             continue
         for field, text in zip(node.body, node.body[1:], strict=False):

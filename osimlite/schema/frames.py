@@ -15,7 +15,9 @@ class Frame(ModelComponent, abstract=True):
     """An orthogonal set of axes with an origin."""
 
     frame_geometry: Single[FrameGeometry] = made(FrameGeometry, name="frame_geometry")
+    """How the frame's own axes are drawn, where a viewer shows frames."""
     attached_geometry: Many[Geometry] = none()
+    """Shapes drawn along the axes of this frame; they move with it and do nothing to the motion."""
 
     def attach(self, *shapes: Geometry) -> None:
         """Draw shapes in this frame; one without a name is called ``<frame>_geom_<number>`` as OpenSim does."""
@@ -29,6 +31,7 @@ class PhysicalFrame(Frame, abstract=True):
     """A frame fixed to a body or to ground."""
 
     wrap_object_set: Unnamed[WrapObjectSet] = made(WrapObjectSet)
+    """Surfaces fixed in this frame that paths can wrap around."""
 
 
 class Ground(PhysicalFrame):
@@ -36,54 +39,62 @@ class Ground(PhysicalFrame):
 
 
 class Body(PhysicalFrame):
-    """A rigid body: mass, mass centre and inertia, in its own frame.
-
-    `inertia` is about the mass centre, in body axes, in the order xx yy zz xy xz yz.
-    """
+    """A rigid body: mass, mass centre and inertia, in its own frame."""
 
     mass: Annotated[float, real("kg", ">= 0")] = math.nan
+    """Mass of the whole body; OpenSim does not simulate a body without one."""
     mass_center: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the mass centre is, in the frame of the body."""
     inertia: Annotated[Vec6, Value("double", "Vec6", "kg*m^2")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Entries xx yy zz xy xz yz of the inertia matrix about the mass centre, along the axes of the body."""
 
 
 class PhysicalOffsetFrame(PhysicalFrame):
-    """A frame fixed in another physical frame, displaced by `translation` and turned by `orientation`.
-
-    `orientation` holds body-fixed X-Y-Z angles.
-    """
+    """A frame fixed in another physical frame, displaced by `translation` and turned by `orientation`."""
 
     socket_parent: PhysicalFrameSocket = ""
+    """The frame that this one is fixed in."""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the origin of this frame is, in the parent frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    """Body-fixed X-Y-Z angles that turn the axes of the parent frame into those of this one."""
 
 
 _AXES = ("+x", "-x", "x", "+y", "-y", "y", "+z", "-z", "z")
 
 
 class StationDefinedFrame(PhysicalFrame):
-    """A frame laid through stations of one body: from a to b runs `ab_axis`, across a, b and c `ab_x_ac_axis`.
-
-    The second axis is the cross product of b - a and c - a. The origin is the fourth station.
-    """
+    """A frame laid through stations of one body: from a to b runs `ab_axis`, across a, b and c `ab_x_ac_axis`."""
 
     socket_point_a: StationSocket = ""
+    """Corner a of the triangle; all four stations are in one body."""
     socket_point_b: StationSocket = ""
+    """Corner b of the triangle; `ab_axis` points here from a."""
     socket_point_c: StationSocket = ""
+    """Corner c of the triangle, not on the line through a and b."""
     socket_origin_point: StationSocket = ""
+    """Where the origin of the frame is; it may be one of the corners."""
     ab_axis: Annotated[str, word(*_AXES)] = "+x"
+    """Axis of the frame that points from a to b; with a minus sign, from b to a."""
     ab_x_ac_axis: Annotated[str, word(*_AXES)] = "+y"
+    """Axis along the cross product of b - a and c - a; another one than `ab_axis`."""
 
 
 class TwoFrameLinker(ModelComponent, abstract=True):
-    """What joins two frames; `frames` holds the offset frames made for it."""
+    """What joins two frames."""
 
     socket_frame1: PhysicalFrameSocket = ""
+    """The frame in which the place and the turning of the second one are measured."""
     socket_frame2: PhysicalFrameSocket = ""
+    """The frame whose place and turning in the first one count."""
     frames: Many[PhysicalFrame] = none()
+    """Offset frames that belong to this component, so that its sockets can name places on bodies."""
 
 
 class BodySet(ModelComponentSet):
     """The bodies of a model."""
 
     objects: LegacyMany[Body] = none()
+    """The bodies; joints say how they hang together."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the bodies; the mechanics ignore them."""

@@ -8,28 +8,38 @@ from osimlite.schema.references import FileName, FrameSocket, TransformInput
 
 
 class SurfaceProperties(Object):
-    """How a surface is drawn: 0 not at all, 1 as points, 2 as wireframe, 3 filled, -1 as the viewer likes."""
+    """How a surface is drawn."""
 
     representation: Annotated[int, Value("int", choices=(-1, 0, 1, 2, 3))] = 3
+    """0 is not drawn, 1 points, 2 wireframe, 3 filled, -1 as the viewer likes."""
     texture: Annotated[str | None, Value("string", "optional")] = None
+    """Name of a texture; viewers may ignore it."""
 
 
 class Appearance(Object):
     """Colour, opacity and visibility."""
 
     visible: Flag = True
+    """Whether a viewer draws the thing at all."""
     opacity: Annotated[float, real(domain="0 to 1")] = 1.0
+    """0 lets everything through, 1 nothing."""
     color: Annotated[Vec3, vec3(domain="0 to 1")] = (1.0, 1.0, 1.0)
+    """Red, green and blue."""
     surface_properties: Unnamed[SurfaceProperties] = made(SurfaceProperties)
+    """Whether points, edges or faces are drawn."""
 
 
 class Geometry(Component, abstract=True):
     """A shape drawn in the frame that owns it."""
 
     socket_frame: FrameSocket = ""
+    """The frame that the shape is drawn in; OpenSim fills in the one that owns it."""
     input_transform: TransformInput = ""
+    """An output that places the shape in ground, in the stead of a frame."""
     scale_factors: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
+    """Factors of the size along the axes X, Y and Z of the frame."""
     appearance: Unnamed[Appearance] = made(Appearance)
+    """Colour, opacity and style of the shape."""
 
 
 class FrameGeometry(Geometry):
@@ -37,6 +47,7 @@ class FrameGeometry(Geometry):
 
     scale_factors: Annotated[Vec3, vec3()] = (0.2, 0.2, 0.2)
     display_radius: Annotated[float, real(domain=">= 0")] = 0.004
+    """Thickness of the three arrows, as the radius of their shafts."""
 
 
 class AnalyticGeometry(Geometry, abstract=True):
@@ -47,49 +58,63 @@ class Brick(Geometry):
     """A box centred on the frame origin, given by half its edge lengths."""
 
     half_lengths: Annotated[Vec3, vec3("m", ">= 0")] = (0.1, 0.2, 0.3)
+    """Half of each edge, along X, Y and Z."""
 
 
 class Arrow(Geometry):
     """An arrow from a point along a direction."""
 
     start_point: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    """The end without the tip."""
     direction: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
+    """Where the tip points; the length of this vector does not matter."""
     length: Annotated[float, real(domain=">= 0")] = 1.0
+    """Distance of the tip from the start."""
 
 
 class LineGeometry(Geometry):
     """A straight line between two points."""
 
     start_point: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    """One end of the line, in the frame."""
     end_point: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
+    """The other end of the line, in the frame."""
 
 
 class Sphere(AnalyticGeometry):
     """A ball centred on the frame origin."""
 
     radius: Annotated[float, real("m", ">= 0")] = 1.0
+    """Radius of the ball before it is scaled."""
 
 
 class Ellipsoid(AnalyticGeometry):
     """An ellipsoid with its half axes along the frame's."""
 
     radii: Annotated[Vec3, vec3("m", ">= 0")] = (0.5, 1.0, 2.0)
+    """Half axes along X, Y and Z."""
 
 
 class Cylinder(AnalyticGeometry):
     """A cylinder along the frame's Y axis, centred on the frame origin."""
 
     radius: Annotated[float, real("m", ">= 0")] = 0.5
+    """Radius of the round faces."""
     half_height: Annotated[float, real("m", ">= 0")] = 0.5
+    """Half of the extent along Y."""
 
 
 class Cone(AnalyticGeometry):
     """A cone: where it is, which way it points, how wide and how high."""
 
     origin: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    """Middle of the base, in the frame."""
     direction: Annotated[Vec3, vec3()] = (0.0, 1.0, 0.0)
+    """From the base to the tip; the length of this vector does not matter."""
     base_radius: Annotated[float, real(domain=">= 0")] = 0.5
+    """Radius at the base."""
     height: Annotated[float, real(domain=">= 0")] = 1.0
+    """Distance of the tip from the base."""
 
 
 class Torus(AnalyticGeometry):
@@ -100,25 +125,38 @@ class Mesh(Geometry):
     """A surface read from a file (.vtp, .stl or .obj)."""
 
     mesh_file: FileName = ""
+    """File of the surface, sought beside the model and in folders of geometry; a missing one is only warned of."""
 
 
 class ModelDisplayHints(Object):
     """What a viewer should show of a model."""
 
     show_wrap_geometry: Flag = True
+    """Whether surfaces that paths wrap around are drawn."""
     show_contact_geometry: Flag = True
+    """Whether contact surfaces are drawn."""
     show_path_geometry: Flag = True
+    """Whether the paths of muscles and springs are drawn."""
     show_path_points: Flag = True
+    """Whether the points that paths run through are drawn."""
     show_markers: Flag = True
+    """Whether markers are drawn."""
     show_stations: Flag = False
+    """Whether stations that are no markers are drawn."""
     marker_color: Annotated[Vec3, vec3(domain="0 to 1")] = (1.0, 0.6, 0.8)
+    """Red, green and blue of the markers."""
     show_frames: Flag = False
+    """Whether the axes of frames are drawn."""
     show_labels: Flag = False
+    """Whether names stand beside the components."""
     show_forces: Flag = True
+    """Whether forces are drawn as arrows or lines."""
     show_debug_geometry: Flag = False
+    """Whether helpers for those who look for faults are drawn."""
 
 
 class ModelVisualPreferences(Object):
     """Preferences of a viewer for this model."""
 
     model_display_hints: Unnamed[ModelDisplayHints] = made(ModelDisplayHints)
+    """Which kinds of components a viewer draws."""

@@ -22,15 +22,19 @@ _ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 
 
 class Joint(ModelComponent, abstract=True):
-    """Connects a child frame to a parent frame; `frames` holds the offset frames made for it."""
+    """Connects a child frame to a parent frame."""
 
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
     """The motion of each coordinate in order, or None if the joint's own properties decide it."""
 
     socket_parent_frame: PhysicalFrameSocket = ""
+    """The frame F in which the joint measures its motion, most often an offset frame of the joint."""
     socket_child_frame: PhysicalFrameSocket = ""
+    """The frame M that the joint moves, most often an offset frame of the joint."""
     coordinates: Many[Coordinate] = none()
+    """The generalized coordinates in the order of the class; a CustomJoint has the order of its axes."""
     frames: Many[PhysicalOffsetFrame] = none()
+    """Offset frames that belong to the joint, so that its sockets can name places on bodies."""
 
     def between(
         self,
@@ -140,7 +144,9 @@ class EllipsoidJoint(Joint):
 
     coordinates: Many[Coordinate] = _coordinates(3)
     radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
+    """Half axes of the ellipsoid along the axes of the parent frame."""
     appearance: Unnamed[Appearance] = made(Appearance)
+    """How the ellipsoid is drawn."""
 
 
 class ScapulothoracicJoint(Joint):
@@ -150,8 +156,11 @@ class ScapulothoracicJoint(Joint):
 
     coordinates: Many[Coordinate] = _coordinates(4)
     thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
+    """Half axes of the ellipsoid of the chest along the axes of the parent frame."""
     scapula_winging_axis_origin: Annotated[tuple[float, float], reals("m", least=2, most=2)] = (0.0, 0.0)
+    """x and y of a point on the axis of winging, in the plane of the shoulder blade."""
     scapula_winging_axis_direction: Annotated[float, real("rad")] = 0.0
+    """Angle of the axis of winging in that plane, from Y towards -X."""
 
 
 class ConstantCurvatureJoint(Joint):
@@ -161,11 +170,15 @@ class ConstantCurvatureJoint(Joint):
 
     coordinates: Many[Coordinate] = _coordinates(3)
     neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    """Added to the coordinates: the shape of the rod where they are 0."""
     length: Annotated[float, real("m", "> 0")] = 1.0
+    """Length of the rod along its middle line, however it is bent."""
 
 
 class JointSet(ModelComponentSet):
     """The joints of a model."""
 
     objects: LegacyMany[Joint] = none()
+    """The joints; each carries its own coordinates."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the joints; the mechanics ignore them."""

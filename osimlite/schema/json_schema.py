@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from osimlite.schema.base import FieldSpec, Object, Unknown, field_specs
+from osimlite.schema.descriptions import meaning_of
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES
 
@@ -79,16 +80,18 @@ def _unknown() -> dict[str, Any]:
 
 
 def _property(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
+    text = _text(spec)
+    return {**({"description": text} if text else {}), **_content(spec, classes)}
+
+
+def _content(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
     if isinstance(spec.kind, Held):
         return _held(spec, spec.kind, classes)
     if isinstance(spec.kind, Reference):
-        listed = {"type": "array", "items": {"type": "string"}}
-        return {**_about_reference(spec.kind), **(listed if spec.kind.shape == "list" else {"type": "string"})}
+        return {"type": "array", "items": {"type": "string"}} if spec.kind.shape == "list" else {"type": "string"}
     assert isinstance(spec.kind, Value)
-    found = {**_about_value(spec.kind), **_value(spec.kind)}
-    if _is_plain(spec.default):
-        found["default"] = spec.default
-    return found
+    found = _value(spec.kind)
+    return {**found, "default": spec.default} if _is_plain(spec.default) else found
 
 
 def _held(spec: FieldSpec, kind: Held, classes: list[type[Object]]) -> dict[str, Any]:
@@ -100,7 +103,7 @@ def _held(spec: FieldSpec, kind: Held, classes: list[type[Object]]) -> dict[str,
     if members is None:
         return one
     # A set that is nothing but its members may be given as the list of them.
-    return {"anyOf": [one, _property(members, classes)]}
+    return {"anyOf": [one, _content(members, classes)]}
 
 
 def _one(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
@@ -130,13 +133,14 @@ def _value(kind: Value) -> dict[str, Any]:
     return {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
 
 
-def _about_value(kind: Value) -> dict[str, str]:
-    words = ", ".join(word for word in (kind.unit, kind.domain) if word)
-    return {"description": words} if words else {}
-
-
-def _about_reference(kind: Reference) -> dict[str, str]:
-    return {"description": f"names a {kind.target} ({kind.rule})"}
+def _text(spec: FieldSpec) -> str:
+    """What an editor shows of a property: its meaning, and what its type leaves open."""
+    words = ""
+    if isinstance(spec.kind, Reference):
+        words = f"names a {spec.kind.target}, {spec.kind.rule}"
+    elif isinstance(spec.kind, Value):
+        words = ", ".join(word for word in (spec.kind.unit, spec.kind.domain) if word)
+    return " ".join(part for part in (meaning_of(spec), words and f"({words})") if part)
 
 
 def _summary(cls: type[Object]) -> str:

@@ -16,23 +16,29 @@ class Station(Point):
     """A point fixed in a physical frame, `location` given in that frame."""
 
     socket_parent_frame: PhysicalFrameSocket = ""
+    """The frame that the point is fixed in."""
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the point is, in its parent frame."""
 
 
 class Marker(Station):
     """A station that motion capture sees."""
 
     fixed: Flag = False
+    """Whether placing markers on a scaled model leaves this one where it is."""
 
 
 class MarkerSet(ModelComponentSet):
     """The markers of a model."""
 
     objects: LegacyMany[Marker] = none()
+    """The markers, named as the columns of measured data."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the markers; the mechanics ignore them."""
 
 
 class IMU(ModelComponent):
     """An inertial measurement unit at the origin of a frame."""
 
     socket_frame: PhysicalFrameSocket = ""
+    """The frame that the sensor is fixed in, at its origin and along its axes."""

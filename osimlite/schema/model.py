@@ -31,31 +31,48 @@ CURRENT_VERSION = 40600
 
 
 class Model(ModelComponent):
-    """A musculoskeletal or mechanical model. `gravity` is in ground; the units texts are words for people."""
+    """A musculoskeletal or mechanical model."""
 
     __slots__ = ("_tree",)
 
     assembly_accuracy: Annotated[float, real(domain="> 0")] = 1e-9
+    """How well assembly at the start of a simulation must satisfy constraints; it fails where it cannot."""
     ground: Single[Ground] = made(
         Ground, name="ground", wrap_object_set=lambda: WrapObjectSet.build({"name": "wrapobjectset"}, set())
     )
+    """The inertial frame: bodies hang on it, and gravity is given in it."""
     gravity: Annotated[Vec3, vec3("m/s^2")] = (0.0, -9.80665, 0.0)
+    """Acceleration of free fall, along the axes of ground."""
     credits: Text = "Frank Anderson, Peter Loan, Ayman Habib, Ajay Seth, Michael Sherman"
+    """Who made the model, as text for readers."""
     publications: Text = "List of publications related to model..."
+    """What to cite, as text for readers."""
     length_units: Text = "meters"
+    """Unit of all lengths, in a word; tools convert marker data to it, the mechanics assume metres."""
     force_units: Text = "N"
+    """Unit of all forces, in a word for readers; the mechanics assume newtons."""
     body_set: Unnamed[BodySet] = made(BodySet, name="bodyset")
+    """The rigid bodies; joints say how they hang together."""
     joint_set: Unnamed[JointSet] = made(JointSet, name="jointset")
+    """The joints: every body is the child of one, or has a free joint to ground made for it."""
     controller_set: Unnamed[ControllerSet] = made(ControllerSet, name="controllerset")
+    """What sets the controls of actuators."""
     constraint_set: Unnamed[ConstraintSet] = made(ConstraintSet, name="constraintset")
+    """Conditions on positions beyond the joints, which close loops and couple coordinates."""
     force_set: Unnamed[ForceSet] = made(ForceSet, name="forceset")
+    """Everything that pushes or pulls but gravity: forces, contact, actuators, muscles."""
     marker_set: Unnamed[MarkerSet] = made(MarkerSet, name="markerset")
+    """Points that motion capture sees."""
     contact_geometry_set: Unnamed[ContactGeometrySet] = made(ContactGeometrySet, name="contactgeometryset")
+    """Surfaces that contact forces name."""
     probe_set: Unnamed[ProbeSet] = made(ProbeSet, name="probeset")
+    """Quantities that a simulation reports."""
     component_set: Unnamed[ComponentSet] = made(ComponentSet, name="componentset")
+    """Components of any class that no other set takes, such as reporters."""
     model_visual_preferences: Unnamed[ModelVisualPreferences] = made(
         ModelVisualPreferences, name="modelvisualpreferences"
     )
+    """What a viewer should show of the model."""
 
     @property
     def document_version(self) -> int:

@@ -24,6 +24,7 @@ class AbstractPathPoint(Point, abstract=True):
     """A point that a path runs through."""
 
     socket_parent_frame: PhysicalFrameSocket = ""
+    """The frame in which the location is given."""
 
 
 class PathPoint(AbstractPathPoint):
@@ -32,31 +33,42 @@ class PathPoint(AbstractPathPoint):
     internal = (("station", Station),)
 
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the point is, in its parent frame."""
 
 
 class ConditionalPathPoint(PathPoint):
     """A point that belongs to the path only while a coordinate is within `range`."""
 
     socket_coordinate: CoordinateSocket = ""
+    """The coordinate that decides whether the path runs through the point."""
     range: Annotated[tuple[float, float], reals("rad (rotational)", least=2, most=2)] = (0.0, 0.0)
+    """Lowest and highest value of the coordinate with which the point counts, both included."""
 
 
 class MovingPathPoint(AbstractPathPoint):
     """A point whose place in its frame follows a coordinate; the three sockets must name the same one."""
 
     socket_x_coordinate: CoordinateSocket = ""
+    """The argument of `x_location`."""
     socket_y_coordinate: CoordinateSocket = ""
+    """The argument of `y_location`."""
     socket_z_coordinate: CoordinateSocket = ""
+    """The argument of `z_location`."""
     x_location: Optional[Function] = made(Constant)
+    """x of the point in its parent frame, as a function of the coordinate."""
     y_location: Optional[Function] = made(Constant)
+    """y of the point in its parent frame, as a function of the coordinate."""
     z_location: Optional[Function] = made(Constant)
+    """z of the point in its parent frame, as a function of the coordinate."""
 
 
 class PathPointSet(Object):
     """The points of a path, in order."""
 
     objects: LegacyMany[AbstractPathPoint] = none()
+    """The points, in the order in which the path runs through them; the ends are the attachments."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the points; the mechanics ignore them."""
 
 
 class PathWrapPoint(AbstractPathPoint, abstract=True):
@@ -64,42 +76,51 @@ class PathWrapPoint(AbstractPathPoint, abstract=True):
 
 
 class PathWrap(ModelComponent):
-    """Says that a path wraps around a surface; `range` counts the points between which it may, from 1.
-
-    A number below 1 means the first or the last point. `method` matters for ellipsoids only.
-    """
+    """Says that a path wraps around a surface, and where."""
 
     internal = (("pwpt1", PathWrapPoint), ("pwpt2", PathWrapPoint))
 
     wrap_object: WrapObjectName = ""
+    """Name of the surface; the physical frames of the model are searched for it."""
     method: Annotated[str, word("hybrid", "midpoint", "axial", "Unassigned")] = "hybrid"
+    """How the wrap over an ellipsoid is found; other surfaces do not ask."""
     range: Annotated[tuple[int, int], Value("int", "list", least=2, most=2)] = (-1, -1)
+    """First and last point, counted from 1, between which the path may wrap; below 1 there is no such limit."""
 
 
 class PathWrapSet(Object):
     """The surfaces a path wraps around."""
 
     objects: LegacyMany[PathWrap] = none()
+    """The surfaces that the path may wrap around, with an entry for each."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the wraps; the mechanics ignore them."""
 
 
 class AbstractGeometryPath(ModelComponent, abstract=True):
     """A path, and what it looks like."""
 
     appearance: Unnamed[Appearance] = made(Appearance, color=(0.5, 0.5, 0.5))
+    """How the path is drawn."""
 
 
 class GeometryPath(AbstractGeometryPath):
     """A path through points in frames, bent around wrap surfaces."""
 
     path_point_set: Unnamed[PathPointSet] = made(PathPointSet)
+    """The points that the path runs through, from one attachment to the other."""
     path_wrap_set: Unnamed[PathWrapSet] = made(PathWrapSet)
+    """The surfaces that the path may wrap around."""
 
 
 class FunctionBasedPath(AbstractGeometryPath):
     """A path of which only length, lengthening speed and moment arms are known, as functions of coordinates."""
 
     coordinate_paths: CoordinatePaths = ()
+    """Paths of the coordinates that are the arguments of all functions, in this order."""
     length_function: Optional[Function] = None
+    """Length of the path (m) as a function of the coordinates."""
     moment_arm_functions: Many[Function] = none()
+    """A moment arm for each coordinate; left out, they are the derivatives of the length times -1."""
     lengthening_speed_function: Optional[Function] = None
+    """Speed as a function of all values, then all speeds; left out, it follows from the length."""

@@ -9,6 +9,7 @@ class ObjectGroup(Object):
     """A named selection of the members of the set it belongs to."""
 
     members: SetMemberNames = ()
+    """Names of the members that the selection holds."""
 
 
 class ModelComponentSet(ModelComponent, abstract=True):
@@ -19,4 +20,6 @@ class ComponentSet(ModelComponentSet):
     """Further components of a model."""
 
     objects: LegacyMany[ModelComponent] = none()
+    """Components of any class that no other set takes, such as reporters."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the components; the mechanics ignore them."""

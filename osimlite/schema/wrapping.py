@@ -9,48 +9,58 @@ from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
 class WrapObject(ModelComponent, abstract=True):
-    """A surface fixed in the frame that owns it, turned by body-fixed X-Y-Z angles.
-
-    `quadrant` keeps paths on one half of the surface: the half where that coordinate has that sign.
-    """
+    """A surface fixed in the frame that owns it, for paths to wrap around."""
 
     active: Flag = True
+    """Whether paths wrap around the surface."""
     xyz_body_rotation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    """Body-fixed X-Y-Z angles of the surface in the frame that owns it."""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the middle of the surface is, in the frame that owns it."""
     quadrant: Annotated[str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")] = (
         "Unassigned"
     )
+    """Keeps paths to the half where this coordinate of the surface has this sign; `all` leaves both."""
     appearance: Unnamed[Appearance] = made(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
+    """How the surface is drawn."""
 
 
 class WrapCylinder(WrapObject):
     """A cylinder along its own Z axis."""
 
     radius: Annotated[float, real("m", "> 0")] = 1.0
+    """Distance of the surface from the Z axis."""
     length: Annotated[float, real("m", "> 0")] = 1.0
+    """Extent along Z, half of it to either side; a path that would touch only beyond it does not wrap."""
 
 
 class WrapEllipsoid(WrapObject):
-    """An ellipsoid; `dimensions` are its half axes."""
+    """An ellipsoid with half axes `dimensions`."""
 
     dimensions: Annotated[Vec3, vec3("m", "> 0")] = (0.05, 0.05, 0.05)
+    """Half axes along X, Y and Z of the surface."""
 
 
 class WrapSphere(WrapObject):
     """A ball."""
 
     radius: Annotated[float, real("m", "> 0")] = 0.05
+    """Distance of the surface from the middle."""
 
 
 class WrapTorus(WrapObject):
-    """A ring about its own Z axis, between two radii; paths run through its hole."""
+    """A ring about its own Z axis; paths run through its hole."""
 
     inner_radius: Annotated[float, real("m", "> 0")] = 0.01
+    """Radius of the tube itself; must be less than the outer one."""
     outer_radius: Annotated[float, real("m", "> 0")] = 0.05
+    """Radius of the circle in the middle of the tube."""
 
 
 class WrapObjectSet(ModelComponentSet):
     """The wrap surfaces of one frame."""
 
     objects: LegacyMany[WrapObject] = none()
+    """The surfaces; a path names those that it wraps around."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the surfaces; the mechanics ignore them."""
