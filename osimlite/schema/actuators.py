@@ -16,59 +16,86 @@ class ScalarActuator(Actuator, abstract=True):
     """A force with one control, kept between two limits."""
 
     min_control: Number = -math.inf
+    """Least control that tools choose when they solve for controls; a simulation does not clip to it."""
     max_control: Number = math.inf
+    """Greatest control that tools choose when they solve for controls; a simulation does not clip to it."""
 
 
 class CoordinateActuator(ScalarActuator):
     """Pushes one coordinate with `optimal_force` times the control."""
 
     coordinate: MaybeCoordinateName = None
+    """Name of the coordinate that is pushed."""
     optimal_force: Annotated[float, real("N | N*m")] = 1.0
+    """Generalized force at a control of 1."""
 
 
 class ActivationCoordinateActuator(CoordinateActuator):
     """A coordinate actuator whose activation follows the control with a delay of first order."""
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
+    """Time constant with which the activation follows the control."""
     default_activation: Number = 0.5
+    """Activation at the start of a simulation."""
 
 
 class PointActuator(ScalarActuator):
     """Pushes one point of a body along a fixed direction."""
 
     body: MaybeBodyName = None
+    """Name of the body that is pushed."""
     point: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the force acts."""
     point_is_global: Flag = False
+    """Whether `point` is in ground rather than in the body."""
     direction: Annotated[Vec3, vec3()] = (1.0, 0.0, 0.0)
+    """Direction of a positive force; its length does not matter."""
     force_is_global: Flag = False
+    """Whether `direction` is along the axes of ground rather than of the body."""
     optimal_force: Annotated[float, real("N")] = 1.0
+    """Force at a control of 1."""
 
 
 class PointToPointActuator(ScalarActuator):
     """Pushes two points apart along the line between them."""
 
     bodyA: MaybeBodyName = None
+    """Name of the first body, which a positive force pushes away from B."""
     bodyB: MaybeBodyName = None
+    """Name of the second body, which is pushed the other way."""
     points_are_global: Flag = False
+    """Whether both points are in ground rather than in their bodies."""
     pointA: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the force acts on body A."""
     pointB: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the force acts on body B."""
     optimal_force: Annotated[float, real("N")] = 1.0
+    """Force at a control of 1."""
 
 
 class TorqueActuator(ScalarActuator):
     """Turns body A about an axis, and body B the other way."""
 
     bodyA: MaybeFrameName = None
+    """The frame that a positive torque turns about the axis."""
     bodyB: MaybeFrameName = None
+    """The frame that is turned the other way; left out, there is none."""
     torque_is_global: Flag = True
+    """Whether `axis` is along the axes of ground rather than of A."""
     axis: Annotated[Vec3, vec3()] = (0.0, 0.0, 1.0)
+    """Direction of a positive torque; its length does not matter."""
     optimal_force: Annotated[float, real("N*m")] = 1.0
+    """Torque at a control of 1."""
 
 
 class BodyActuator(Actuator):
     """Pushes a body with six controls: a torque, then a force at `point`."""
 
     socket_body: BodySocket = ""
+    """The body that is pushed."""
     point: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the force acts; the torque has no place."""
     point_is_global: Flag = False
+    """Whether `point` is in ground rather than in the body."""
     spatial_force_is_global: Flag = True
+    """Whether torque and force are along the axes of ground rather than of the body."""

@@ -14,38 +14,56 @@ class ConstantDistanceConstraint(Constraint):
     """Keeps a point of one frame at a distance from a point of another, as a rod with ball joints would."""
 
     socket_body_1: PhysicalFrameSocket = ""
+    """The frame of the first point."""
     socket_body_2: PhysicalFrameSocket = ""
+    """The frame of the second point."""
     location_body_1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the first point is, in its frame."""
     location_body_2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the second point is, in its frame."""
     constant_distance: Annotated[float, real("m", "> 0")] = math.nan
+    """Distance that the points keep."""
 
 
 class CoordinateCouplerConstraint(Constraint):
     """Makes one coordinate a function of others: dependent = `scale_factor` f(independent ones)."""
 
     coupled_coordinates_function: Optional[Function] = None
+    """Function of the independent coordinates; its first two derivatives are used also."""
     independent_coordinate_names: CoordinateNames = ()
+    """Names of the coordinates that are the arguments of the function, in this order."""
     dependent_coordinate_name: CoordinateName = ""
+    """Name of the coordinate that the function determines."""
     scale_factor: Number = 1.0
+    """Factor of the function; scaling a model changes it where the dependent coordinate is a length."""
 
 
 class PointConstraint(Constraint):
     """Keeps a point of one frame on a point of another, as a ball joint would."""
 
     socket_body_1: PhysicalFrameSocket = ""
+    """The frame of the first point."""
     socket_body_2: PhysicalFrameSocket = ""
+    """The frame of the second point."""
     location_body_1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the first point is, in its frame."""
     location_body_2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the second point is, in its frame."""
 
 
 class PointOnLineConstraint(Constraint):
     """Keeps a point of the follower on a line fixed in the line's body."""
 
     socket_line_body: PhysicalFrameSocket = ""
+    """The frame that the line is fixed in."""
     socket_follower_body: PhysicalFrameSocket = ""
+    """The frame of the point that keeps to the line."""
     line_direction_vec: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    """Direction of the line, along the axes of its frame; its length does not matter."""
     point_on_line: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Any point of the line, in its frame."""
     point_on_follower: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """The point that keeps to the line, in the follower."""
 
 
 class UnilateralConstraint(Constraint, abstract=True):
@@ -53,17 +71,20 @@ class UnilateralConstraint(Constraint, abstract=True):
 
 
 class RollingOnSurfaceConstraint(UnilateralConstraint):
-    """A round body that rolls on a plane of another, and may lift off or slip.
-
-    The plane is `surface_height` along `surface_normal` from the origin of the surface's body.
-    """
+    """A round body that rolls on a plane of another, and may lift off or slip."""
 
     socket_rolling_body: PhysicalFrameSocket = ""
+    """The frame of the body that rolls."""
     socket_surface_body: PhysicalFrameSocket = ""
+    """The frame that the plane is fixed in."""
     surface_normal: Annotated[Vec3, vec3()] = (0.0, 1.0, 0.0)
+    """Normal of the plane, along the axes of its frame."""
     surface_height: Number = 0.0
+    """Distance of the plane from the origin of its frame, along the normal (m)."""
     friction_coefficient: Annotated[float, real(domain=">= 0")] = 0.5
+    """Friction over normal force above which the constraint against slip lets go."""
     contact_radius: Annotated[float, real(domain="> 0")] = 0.01
+    """Radius (m) of the patch whose friction bears a torque about the normal."""
 
 
 class WeldConstraint(TwoFrameLinker, Constraint):

@@ -6,13 +6,16 @@ from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
 class Constraint(ModelComponent, abstract=True):
-    """A condition on positions that the motion keeps, while `isEnforced`."""
+    """A condition that the motion keeps."""
 
     isEnforced: Flag = True
+    """Whether the constraint holds during a simulation."""
 
 
 class ConstraintSet(ModelComponentSet):
     """The constraints of a model."""
 
     objects: LegacyMany[Constraint] = none()
+    """The constraints; one that is not enforced does nothing."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the constraints; the mechanics ignore them."""

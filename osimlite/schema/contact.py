@@ -10,16 +10,20 @@ from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
 class ContactGeometry(ModelComponent, abstract=True):
-    """A surface at `location`, turned by `orientation` (body-fixed X-Y-Z angles), in the frame it is fixed to."""
+    """A surface that contact forces act on, fixed in a physical frame."""
 
     socket_frame: PhysicalFrameSocket = ""
+    """The frame that the surface is fixed in."""
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the middle of the surface is, in that frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    """Body-fixed X-Y-Z angles of the surface in that frame."""
     appearance: Unnamed[Appearance] = made(
         Appearance,
         color=(0.0, 1.0, 1.0),
         surface_properties=lambda: SurfaceProperties.build({"representation": 2}, set()),
     )
+    """How the surface is drawn."""
 
 
 class ContactHalfSpace(ContactGeometry):
@@ -30,35 +34,43 @@ class ContactSphere(ContactGeometry):
     """A ball."""
 
     radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Distance of the surface from the middle."""
 
 
 class ContactCylinder(ContactGeometry):
     """An endless cylinder along its own Z axis, for paths to wrap around."""
 
     radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Distance of the surface from the Z axis."""
 
 
 class ContactEllipsoid(ContactGeometry):
     """An ellipsoid with half axes `radii`."""
 
     radii: Annotated[Vec3, vec3("m", "> 0")] = (0.0, 0.0, 0.0)
+    """Half axes along X, Y and Z of the surface."""
 
 
 class ContactTorus(ContactGeometry):
-    """A ring about its own Z axis: a tube whose middle line is a circle of `torus_radius`."""
+    """A ring about its own Z axis: a tube whose middle line is a circle."""
 
     torus_radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Radius of the circle in the middle of the tube."""
     tube_radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Distance of the surface from that circle."""
 
 
 class ContactMesh(ContactGeometry):
     """A closed surface read from a file."""
 
     filename: FileName = ""
+    """File of a closed surface of triangles (.obj, .stl, .vtp)."""
 
 
 class ContactGeometrySet(ModelComponentSet):
     """The contact surfaces of a model."""
 
     objects: LegacyMany[ContactGeometry] = none()
+    """The surfaces; contact forces name those that touch."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the surfaces; the mechanics ignore them."""

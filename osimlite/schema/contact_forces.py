@@ -18,22 +18,30 @@ from osimlite.schema.sets import ObjectGroup
 class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::ContactParameters"):
     """The layer of springs on some contact meshes.
 
-    `stiffness` is pressure per depth. Only the meshes of a contact need parameters.
+    Only the meshes of a contact need parameters.
     """
 
     geometry: ContactGeometryNames = ()
+    """Contact surfaces of this material; a mesh carries the springs, others are rigid."""
     stiffness: Annotated[float, real("N/m^3", "> 0")] = 0.0
+    """Pressure of the springs on the mesh per depth."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
+    """The c of 1 + c v, by which the approach at v raises the pressure and parting lowers it."""
     static_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force at the transition velocity."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force to which faster slip falls."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
 
 
 class ElasticFoundationContactParametersSet(Object, tag="ElasticFoundationForce::ContactParametersSet"):
     """The layers of one elastic foundation force."""
 
     objects: LegacyMany[ElasticFoundationContactParameters] = none()
+    """The materials, each with the surfaces that are made of it."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the materials; the mechanics ignore them."""
 
 
 class ElasticFoundationForce(Force):
@@ -45,57 +53,84 @@ class ElasticFoundationForce(Force):
     contact_parameters: Single[ElasticFoundationContactParametersSet] = made(
         ElasticFoundationContactParametersSet, name="contact_parameters"
     )
+    """The surfaces that touch each other by this force, and their materials."""
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
+    """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
 
 
 class SmoothSphereHalfSpaceForce(Force):
-    """Contact of one ball with one half-space by the Hunt-Crossley law, made smooth for optimisation.
-
-    The two smoothing numbers say how sharp the transitions into and out of contact are; `constant_contact_force` is
-    there without contact too.
-    """
+    """Contact of one ball with one half-space by the Hunt-Crossley law, made smooth for optimisation."""
 
     socket_sphere: ContactSphereSocket = ""
+    """The ball that touches the plane."""
     socket_half_space: ContactHalfSpaceSocket = ""
+    """The half space that is touched."""
     stiffness: Annotated[float, real("N/m^2", "> 0")] = 1.0
+    """Plane-strain modulus of both surfaces."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
+    """The c of 1 + 1.5 c v, by which the approach at v raises the force and parting lowers it."""
     static_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force at the transition velocity."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force to which faster slip falls."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
+    """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
     constant_contact_force: Annotated[float, real("N", ">= 0")] = 1e-5
+    """A small number under the roots of depth and slip, which keeps derivatives from vanishing."""
     hertz_smoothing: Annotated[float, real(domain="> 0")] = 300.0
+    """How sharply the force sets in where the surfaces meet; higher is sharper."""
     hunt_crossley_smoothing: Annotated[float, real(domain="> 0")] = 50.0
+    """How sharply the force ends where surfaces part too fast to push; higher is sharper."""
     force_visualization_radius: Annotated[float, real("m", ">= 0")] = 0.01
+    """Radius of the cylinder that shows the force."""
     force_visualization_scale_factor: Annotated[float | None, maybe()] = None
+    """Force that is drawn one metre long; left out, the weight of the model."""
 
 
 class ExponentialContactForce(Force):
     """Contact of one station with a plane by a force that grows exponentially with depth.
 
-    `contact_plane_transform` places the plane in ground: body-fixed X-Y-Z angles (rad), then the origin (m).
-    `exponential_shape_parameters` are d0, d1, d2 of d1 exp(-d2 (height - d0)). Friction is a spring that slips.
+    Friction is a spring that slips.
     """
 
     contact_plane_transform: Annotated[Vec6, Value("double", "Transform")] = (-0.0, 0.0, -0.0, 0.0, 0.0, 0.0)
+    """The plane in ground: body-fixed X-Y-Z angles (rad), then origin (m); its Z axis is the normal."""
     exponential_shape_parameters: Annotated[Vec3, vec3("m, N, 1/m")] = (0.0065905, 0.5336, 1150.0)
+    """d0, d1, d2 of the normal force d1 exp(-d2 (z - d0)) at height z."""
     normal_viscosity: Annotated[float, real("s/m", ">= 0")] = 0.5
+    """The c of 1 - c v, by which the speed v away from the plane lowers the normal force."""
     max_normal_force: Annotated[float, real("N", "> 0")] = 100000.0
+    """Normal force above which it grows no further."""
     friction_elasticity: Annotated[float, real("N/m", "> 0")] = 20000.0
+    """Stiffness of the spring that holds the station to its anchor in the plane."""
     friction_viscosity: Annotated[float, real("N*s/m", ">= 0")] = 282.842712474619
+    """Damping of the slip, beside the spring and while sliding."""
     settle_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
+    """Speed of the anchor from which on the station slides; below, friction turns static."""
     initial_mu_static: Annotated[float, real(domain=">= 0")] = 0.7
+    """Static coefficient at the start; it is a state that programs can change."""
     initial_mu_kinetic: Annotated[float, real(domain=">= 0")] = 0.5
+    """Sliding coefficient at the start, at most the static one; also a state."""
     station: Single[Station] = made(Station, name="station")
+    """The point of a body that touches the plane."""
 
 
 class MeyerFregly2016Force(ForceProducer):
     """Contact of one station with the plane y = 0 of ground: a damped spring with smooth onset (Meyer et al. 2016)."""
 
     socket_station: StationSocket = ""
+    """The point of a body that touches ground."""
     stiffness: Annotated[float, real("N/m", "> 0")] = 10000.0
+    """Stiffness of the spring below its resting height."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.01
+    """The c of 1 - c v, by which the upward speed v lowers the force."""
     spring_resting_length: Annotated[float, real("m")] = 0.0
+    """Height of the station over the plane y = 0 at which the spring sets in."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force at fast slip, which sets in as a hyperbolic tangent."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 5.0
+    """Friction over normal force per slip velocity (s/m)."""
     latch_velocity: Annotated[float, real("m/s", "> 0")] = 0.05
+    """Slip over which dynamic friction sets in."""

@@ -9,9 +9,10 @@ from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
 class Force(ModelComponent, abstract=True):
-    """Anything that pushes bodies or coordinates; `appliesForce` switches it."""
+    """Anything that pushes bodies or coordinates."""
 
     appliesForce: Flag = True
+    """Whether the force acts; one that does not stays in the tree and reports zeros."""
 
 
 class ForceProducer(Force, abstract=True):
@@ -19,32 +20,33 @@ class ForceProducer(Force, abstract=True):
 
 
 class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParameters"):
-    """The material of some contact surfaces.
-
-    `stiffness` is that of the plane-strain material in N/m^2, `dissipation` in s/m, the friction coefficients have
-    no unit but for `viscous_friction` in s/m.
-    """
+    """The material of some contact surfaces."""
 
     geometry: ContactGeometryNames = ()
+    """Contact surfaces of this material; all surfaces of one force touch each other."""
     stiffness: Annotated[float, real("N/m^2", "> 0")] = 0.0
+    """Plane-strain modulus: of two surfaces the softer one yields more; with 0 on both, OpenSim's force is NaN."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
+    """The c of 1 + 1.5 c v, by which the approach at v raises the force and parting lowers it."""
     static_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force at the transition velocity; two surfaces count with their harmonic mean."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force to which faster slip falls; two surfaces count with their harmonic mean."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 0.0
+    """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
 
 
 class HuntCrossleyContactParametersSet(Object, tag="HuntCrossleyForce::ContactParametersSet"):
     """The materials of one Hunt-Crossley force."""
 
     objects: LegacyMany[HuntCrossleyContactParameters] = none()
+    """The materials, each with the surfaces that are made of it."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the materials; the mechanics ignore them."""
 
 
 class HuntCrossleyForce(Force):
-    """Contact between all surfaces it lists: Hertz stiffness, Hunt-Crossley dissipation, Stribeck friction.
-
-    `transition_velocity` is the slip velocity at which friction reaches its static value.
-    """
+    """Contact between all surfaces it lists: Hertz stiffness, Hunt-Crossley dissipation, Stribeck friction."""
 
     ContactParameters: ClassVar = HuntCrossleyContactParameters
     ContactParametersSet: ClassVar = HuntCrossleyContactParametersSet
@@ -52,28 +54,39 @@ class HuntCrossleyForce(Force):
     contact_parameters: Single[HuntCrossleyContactParametersSet] = made(
         HuntCrossleyContactParametersSet, name="contact_parameters"
     )
+    """The surfaces that touch each other by this force, and their materials."""
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
+    """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
 
 
 class CoordinateLimitForce(ForceProducer):
     """A spring-damper that acts once a coordinate has left its limits.
 
-    For a rotational coordinate everything is in degrees. Stiffness and damping rise smoothly over `transition` beyond
-    the limit.
+    For a rotational coordinate everything is in degrees.
     """
 
     coordinate: CoordinateName = "UNASSIGNED"
+    """Name of the coordinate that is limited; its own `range` has no part in it."""
     upper_stiffness: Annotated[float, real("N*m/deg (rotational)", "> 0")] = 1.0
+    """Stiffness against values above the upper limit, beyond the transition."""
     upper_limit: Annotated[float, real("deg (rotational)")] = 0.0
+    """Value above which the spring begins to push back."""
     lower_stiffness: Annotated[float, real("N*m/deg (rotational)", "> 0")] = 1.0
+    """Stiffness against values below the lower limit, beyond the transition."""
     lower_limit: Annotated[float, real("deg (rotational)")] = 0.0
+    """Value below which the spring begins to push back."""
     damping: Annotated[float, real("N/(m/s) | N*m/(deg/s)", ">= 0")] = 0.001
+    """Damping beyond a limit; it sets in smoothly as the stiffness does."""
     transition: Annotated[float, real("deg (rotational)", "> 0")] = 0.1
+    """Distance beyond a limit over which stiffness and damping rise smoothly from 0 to all."""
     compute_dissipation_energy: Flag = False
+    """Whether the energy that damping takes is a state of the simulation."""
 
 
 class ForceSet(ModelComponentSet):
     """The forces, actuators and muscles of a model."""
 
     objects: LegacyMany[Force] = none()
+    """The forces; actuators and muscles are forces with controls."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the forces, which tools can leave out; the mechanics ignore them."""

@@ -25,9 +25,13 @@ class PathSpring(ForceProducer):
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
         GeometryPath, name="path", appearance=_green
     )
+    """The line along which the spring pulls."""
     resting_length: Annotated[float, real("m", ">= 0")] = math.nan
+    """Length of the path up to which the spring is slack."""
     stiffness: Annotated[float, real("N/m", ">= 0")] = math.nan
+    """Tension per stretch beyond the resting length."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = math.nan
+    """The c of 1 + c v, by which the lengthening speed v raises the tension."""
 
 
 class ExpressionBasedPathForce(ForceProducer):
@@ -36,25 +40,38 @@ class ExpressionBasedPathForce(ForceProducer):
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
         GeometryPath, name="path", appearance=_green
     )
+    """The line along which the force pulls."""
     resting_length: Annotated[float, real("m", ">= 0")] = 0.0
+    """Length of the path from which the stretch `s` counts."""
     expression: Text = "0.0"
+    """Formula of the tension in `s` and `ldot`."""
     clamp_stretch: Flag = True
+    """Whether `s` is 0 where the path is shorter than its resting length, instead of negative."""
 
 
 class Ligament(ForceProducer):
     """A ligament: `pcsa_force` times a curve of its length over `resting_length`."""
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
+    """The line along which the ligament pulls."""
     resting_length: Annotated[float, real("m", ">= 0")] = 0.0
+    """Length of the path up to which the ligament is slack."""
     pcsa_force: Annotated[float, real("N", ">= 0")] = 0.0
+    """Factor of the curve, from the cross-section of the ligament."""
     force_length_curve: Single[Function] = Field(default_factory=partial(passive_force_length, "force_length_curve"))
+    """Tension over `pcsa_force`, as a function of length over resting length."""
 
 
 class Blankevoort1991Ligament(ForceProducer):
     """A ligament whose force rises as the square of strain, and linearly beyond `transition_strain`."""
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
+    """The line along which the ligament pulls."""
     linear_stiffness: Annotated[float, real("N", ">= 0")] = 1.0
+    """Tension per strain beyond the transition."""
     transition_strain: Annotated[float, real("strain", ">= 0")] = 0.06
+    """Strain at which the tension goes over from a square to a line."""
     damping_coefficient: Annotated[float, real("N*s/strain", ">= 0")] = 0.003
+    """Tension per rate of strain, only while the ligament is taut and lengthens."""
     slack_length: Annotated[float, real("m", ">= 0")] = 0.0
+    """Length of the path up to which there is no tension; strain counts from it."""

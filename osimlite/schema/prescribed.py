@@ -18,32 +18,44 @@ class PrescribedForce(ForceProducer):
     """A force and a torque on a frame as functions of time: none, or three functions each for force, point, torque."""
 
     socket_frame: PhysicalFrameSocket = ""
+    """The frame that is pushed."""
     pointIsGlobal: Flag = False
+    """Whether the point is in ground rather than in the frame."""
     forceIsGlobal: Flag = True
+    """Whether force and torque are along the axes of ground rather than of the frame."""
     forceFunctions: Single[FunctionSet] = made(FunctionSet, name="forceFunctions")
+    """x, y and z of the force over time; empty for none."""
     pointFunctions: Single[FunctionSet] = made(FunctionSet, name="pointFunctions")
+    """x, y and z over time of where the force acts; empty for the origin of the frame."""
     torqueFunctions: Single[FunctionSet] = made(FunctionSet, name="torqueFunctions")
+    """x, y and z of the torque over time; empty for none."""
 
 
 class ExternalForce(ForceProducer):
-    """A measured force, such as that of a force plate.
-
-    Each identifier is the beginning that the labels of three columns share; without a point the force acts at the
-    origin of the frame.
-    """
+    """A measured force, such as that of a force plate."""
 
     applied_to_body: FrameName = ""
+    """The frame that is pushed."""
     force_expressed_in_body: ExpressedInFrame = "ground"
+    """The frame along whose axes force and torque are measured."""
     point_expressed_in_body: ExpressedInFrame = "ground"
+    """The frame in which the point is measured."""
     force_identifier: MaybeColumnName = None
+    """What the labels of the three columns of the force begin with; left out, there is no force."""
     point_identifier: MaybeColumnName = None
+    """What the labels of the three columns of the point begin with; left out, the origin of the frame."""
     torque_identifier: MaybeColumnName = None
+    """What the labels of the three columns of the torque begin with; left out, there is no torque."""
     data_source_name: MaybeColumnName = None
+    """Name that the table must have; a table of another name is refused."""
 
 
 class ExternalLoads(ModelComponentSet):
     """Measured forces that share a data file."""
 
     objects: LegacyMany[ExternalForce] = none()
+    """The forces, each with its columns of the file."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the forces; the mechanics ignore them."""
     datafile: LegacyFileName = ""
+    """File of the columns (.sto, .mot); it replaces what the forces name as their source."""

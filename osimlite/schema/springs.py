@@ -19,37 +19,54 @@ class PointToPointSpring(Force):
     """A straight spring between a point of one body and a point of another."""
 
     socket_body1: PhysicalFrameSocket = ""
+    """The frame of the first end."""
     socket_body2: PhysicalFrameSocket = ""
+    """The frame of the second end."""
     point1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the first end is, in its frame."""
     point2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the second end is, in its frame."""
     stiffness: Annotated[float, real("N/m", ">= 0")] = 1.0
+    """Force per change of the distance; a spring that is too short pushes."""
     rest_length: Annotated[float, real("m", ">= 0")] = 0.0
+    """Distance of the ends at which there is no force."""
 
 
 class SpringGeneralizedForce(ForceProducer):
     """A damped spring on one coordinate: -`stiffness` (q - `rest_length`) - `viscosity` u."""
 
     coordinate: MaybeCoordinateName = None
+    """The coordinate that the spring acts on."""
     stiffness: Annotated[float, real(domain=">= 0")] = 0.0
+    """Generalized force per value of the coordinate."""
     rest_length: Number = 0.0
+    """Value of the coordinate at which the spring is slack."""
     viscosity: Annotated[float, real(domain=">= 0")] = 0.0
+    """Generalized force per speed of the coordinate, against the motion."""
 
 
 class ExpressionBasedCoordinateForce(ForceProducer):
     """A force on one coordinate by a formula in its value `q` and its speed `qdot`."""
 
     coordinate: CoordinateName = "UNASSIGNED"
+    """Name of the coordinate that the force acts on."""
     expression: Text = "0.0"
+    """Formula of the generalized force in `q` and `qdot`; positive drives the coordinate up."""
 
 
 class ExpressionBasedPointToPointForce(ForceProducer):
     """A force along the line between two points by a formula in their distance `d` and its rate `ddot`."""
 
     body1: MaybeFrameName = None
+    """The frame of the first point."""
     body2: MaybeFrameName = None
+    """The frame of the second point."""
     point1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the first point is, in its frame."""
     point2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+    """Where the second point is, in its frame."""
     expression: Text = "0.0"
+    """Formula of the force in `d` and `ddot`; positive pulls the points together."""
 
 
 class BushingForce(TwoFrameLinker, Force):
@@ -59,38 +76,64 @@ class BushingForce(TwoFrameLinker, Force):
     """
 
     rotational_stiffness: Annotated[Vec3, vec3("N*m/rad", ">= 0")] = (0.0, 0.0, 0.0)
+    """Moment against each of the three angles."""
     translational_stiffness: Annotated[Vec3, vec3("N/m", ">= 0")] = (0.0, 0.0, 0.0)
+    """Force against each displacement along the axes of frame 1."""
     rotational_damping: Annotated[Vec3, vec3("N*m/(rad/s)", ">= 0")] = (0.0, 0.0, 0.0)
+    """Moment against the rate of each of the three angles."""
     translational_damping: Annotated[Vec3, vec3("N/(m/s)", ">= 0")] = (0.0, 0.0, 0.0)
+    """Force against the velocity along each axis of frame 1."""
 
 
 class ExpressionBasedBushingForce(TwoFrameLinker, ForceProducer):
     """A bushing whose moments and forces are formulas in `theta_x` ... `delta_z`; damping stays linear."""
 
     Mx_expression: Text = "0.0"
+    """Formula of the moment against the first angle, positive where it drives `theta_x` down."""
     My_expression: Text = "0.0"
+    """Formula of the moment against the second angle, positive where it drives `theta_y` down."""
     Mz_expression: Text = "0.0"
+    """Formula of the moment against the third angle, positive where it drives `theta_z` down."""
     Fx_expression: Text = "0.0"
+    """Formula of the force against displacement along x, positive where it drives `delta_x` down."""
     Fy_expression: Text = "0.0"
+    """Formula of the force against displacement along y, positive where it drives `delta_y` down."""
     Fz_expression: Text = "0.0"
+    """Formula of the force against displacement along z, positive where it drives `delta_z` down."""
     rotational_damping: Annotated[Vec3, vec3(domain=">= 0")] = (0.0, 0.0, 0.0)
+    """Moment against the rate of each of the three angles."""
     translational_damping: Annotated[Vec3, vec3(domain=">= 0")] = (0.0, 0.0, 0.0)
+    """Force against the velocity along each axis of frame 1."""
     moment_visual_scale: Annotated[float | None, maybe()] = 1.0
+    """Length drawn per moment."""
     force_visual_scale: Annotated[float | None, maybe()] = 1.0
+    """Length drawn per force."""
     visual_aspect_ratio: Annotated[float | None, maybe()] = 1.0
+    """Length over diameter of what is drawn."""
 
 
 class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
     """A bushing whose every moment and force is a function of its own deviation; damping stays linear."""
 
     m_x_theta_x_function: Optional[Function] = made(Constant)
+    """Moment against the first angle, as a function of it (rad)."""
     m_y_theta_y_function: Optional[Function] = made(Constant)
+    """Moment against the second angle, as a function of it (rad)."""
     m_z_theta_z_function: Optional[Function] = made(Constant)
+    """Moment against the third angle, as a function of it (rad)."""
     f_x_delta_x_function: Optional[Function] = made(Constant)
+    """Force against displacement along x of frame 1, as a function of it (m)."""
     f_y_delta_y_function: Optional[Function] = made(Constant)
+    """Force against displacement along y of frame 1, as a function of it (m)."""
     f_z_delta_z_function: Optional[Function] = made(Constant)
+    """Force against displacement along z of frame 1, as a function of it (m)."""
     rotational_damping: Annotated[Vec3, vec3(domain=">= 0")] = (0.0, 0.0, 0.0)
+    """Moment against the rate of each of the three angles."""
     translational_damping: Annotated[Vec3, vec3(domain=">= 0")] = (0.0, 0.0, 0.0)
+    """Force against the velocity along each axis of frame 1."""
     moment_visual_scale: Annotated[float | None, maybe()] = 1.0
+    """Length drawn per moment."""
     force_visual_scale: Annotated[float | None, maybe()] = 1.0
+    """Length drawn per force."""
     visual_aspect_ratio: Annotated[float | None, maybe()] = 1.0
+    """Length over diameter of what is drawn."""
