@@ -12,7 +12,7 @@ from osimlite.errors import UnsupportedError
 from osimlite.multibody.functions import IDENTITY
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SphericalMotion
+from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyDrift, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.kernels import layout as at
@@ -103,6 +103,12 @@ def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tup
         still = [mechanism.coordinates[place].locked for place in places]
         if isinstance(motion, Fixed):
             frame = frame @ (inverse(motion.matrix) if mobilizer.reversed else motion.matrix)
+        elif isinstance(motion, SimbodyDrift):
+            if motion.elementary():
+                raise UnsupportedError(
+                    f"the compiled engine cannot repeat OpenSim's derivatives in '{mobilizer.joint}'; "
+                    "take --engine bullet, or leave out --opensim-derivatives"
+                )
         elif all(still):
             q = np.zeros(len(own))
             q[list(motion.coordinates)] = [mechanism.coordinates[place].default_value for place in places]
