@@ -72,7 +72,7 @@ def info(
     text = textwrap.fill(f"Classes: {listed}", console.width, subsequent_indent="  ", break_long_words=False)
     console.print("\n" + text.replace("\0", " "), soft_wrap=True, highlight=False, markup=False)
     if len(counts) > len(shown):
-        console.print(f"and {len(counts) - len(shown)} classes more (--all lists them)")
+        console.print(f"and {len(counts) - len(shown)} classes more (--all lists them)", highlight=False)
 
 
 def _coordinates(model: Model) -> Iterator[str]:

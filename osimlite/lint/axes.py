@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
 
 if TYPE_CHECKING:
+    from osimlite.lint.subject import Subject
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
 
@@ -53,3 +54,18 @@ def axes_refused(joint: CustomJoint) -> bool:
             made.append(name)
     moved = any(names.index(name) != place for place, name in enumerate(declared) if name in names)
     return moved and len(declared) != len(names)
+
+
+def made_up_paths(subject: Subject) -> set[str]:
+    """The paths of the coordinates that OpenSim makes up because only an axis names them; made once per subject."""
+    known = subject.kept.get("made-up coordinates")
+    if isinstance(known, set):
+        return known
+    found = {
+        f"{subject.path(joint)}/{name}"
+        for joint in subject.named("CustomJoint")
+        if not axes_refused(joint)
+        for name in set(names_on_axes(joint)) - {coordinate.name for coordinate in joint.coordinates}
+    }
+    subject.kept["made-up coordinates"] = found
+    return found

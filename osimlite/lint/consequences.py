@@ -13,15 +13,17 @@ from osimlite.schema.base import Object
 REFUSED: Final = "OpenSim refuses the model"
 TOUCHING: Final = "forces and motion become NaN as soon as the surfaces touch"
 NAN: Final = "accelerations become NaN, without a message"
+STUCK: Final = "OpenSim finds no equilibrium for the muscle and fails when it computes accelerations"
 
 _REFUSED_OUTSIDE: Final = {
     "ActiveForceLengthCurve": "min_norm_active_fiber_length transition_norm_fiber_length max_norm_active_fiber_length "
     "shallow_ascending_slope minimum_value",
     "Body": "mass",
+    "BushingForce": "rotational_stiffness translational_stiffness rotational_damping translational_damping",
     "ConstantDistanceConstraint": "constant_distance",
     "DeGrooteFregly2016Muscle": "pennation_angle_at_optimal activation_time_constant deactivation_time_constant "
     "default_activation default_normalized_tendon_force fiber_damping passive_fiber_strain_at_one_norm_force "
-    "tendon_strain_at_one_norm_force activation_dynamics_smoothing",
+    "tendon_strain_at_one_norm_force activation_dynamics_smoothing active_force_width_scale",
     "FiberForceLengthCurve": "strain_at_one_norm_force stiffness_at_low_force stiffness_at_one_norm_force curviness",
     "ForceVelocityCurve": "concentric_slope_at_vmax concentric_slope_near_vmax isometric_slope eccentric_slope_at_vmax "
     "eccentric_slope_near_vmax max_eccentric_velocity_force_multiplier concentric_curviness eccentric_curviness",
@@ -34,6 +36,7 @@ _REFUSED_OUTSIDE: Final = {
     "KshapeActive KshapePassive Af Flen fv_linear_extrap_threshold maximum_pennation_angle activation_time_constant "
     "deactivation_time_constant minimum_activation",
     "WrapCylinder": "radius length",
+    "WrapEllipsoid": "dimensions",
     "WrapSphere": "radius",
     "WrapTorus": "inner_radius outer_radius",
 }
@@ -49,9 +52,13 @@ _NAN_OUTSIDE: Final = {
 _NAN_AT_ZERO: Final = {
     "CoordinateLimitForce": "upper_stiffness lower_stiffness",
     "DeGrooteFregly2016Muscle": "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity",
+    "Ligament": "resting_length",
     "RigidTendonMuscle": "optimal_fiber_length max_contraction_velocity",
-    "Schutte1993Muscle_Deprecated": "optimal_fiber_length",
+    "Schutte1993Muscle_Deprecated": "optimal_fiber_length tendon_slack_length",
+    "Thelen2003Muscle": "tendon_slack_length",
 }
+
+_STUCK_AT_ZERO: Final = {"Millard2012EquilibriumMuscle": "tendon_slack_length"}
 
 _DOUBTS: Final = {
     ("CoordinateLimitForce", "damping"): "the limit adds energy",
@@ -62,12 +69,26 @@ _DOUBTS: Final = {
     ("Thelen2003Muscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
 }
 
-STRICTER: Final = {("Thelen2003Muscle", "minimum_activation"): "0.01 to 1"}
-"""Domains that one class narrows for a property it shares with others."""
+STRICTER: Final = {
+    **{
+        ("BushingForce", f"{kind}_{what}"): ">= 0"
+        for kind in ("rotational", "translational")
+        for what in ("stiffness", "damping")
+    },
+    ("DeGrooteFregly2016Muscle", "default_activation"): "> 0",
+    ("ForceVelocityCurve", "concentric_slope_near_vmax"): "> 1.49e-8",
+    ("ForceVelocityCurve", "eccentric_slope_near_vmax"): "> 1.49e-8",
+    ("Ligament", "resting_length"): "> 0",
+    ("Thelen2003Muscle", "minimum_activation"): "0.01 to 1",
+}
+"""Domains that are narrower for one class than for others that share the property, or than its declaration says."""
 
 
-def consequence(cls: type[Object], name: str, number: float) -> tuple[str, bool]:
-    """What happens with `number`, outside its domain, in a property; and whether that is a failure."""
+def consequence(cls: type[Object], name: str, number: float, *, rigid_tendon: bool = False) -> tuple[str, bool]:
+    """What happens with `number`, outside its domain, in a property; and whether that is a failure.
+
+    A rigid tendon may have no length, where an elastic one needs some.
+    """
     for base in cls.__mro__:
         known = base.__name__
         if name in _REFUSED_OUTSIDE.get(known, "").split() or (
@@ -76,8 +97,11 @@ def consequence(cls: type[Object], name: str, number: float) -> tuple[str, bool]
             return REFUSED, True
         if name in _NAN_OUTSIDE.get(known, "").split():
             return TOUCHING if known.endswith("ContactParameters") else NAN, True
-        if number == 0 and name in _NAN_AT_ZERO.get(known, "").split():
+        allowed = rigid_tendon and name == "tendon_slack_length"
+        if number == 0 and not allowed and name in _NAN_AT_ZERO.get(known, "").split():
             return NAN, True
+        if number == 0 and not allowed and name in _STUCK_AT_ZERO.get(known, "").split():
+            return STUCK, True
         if (known, name) in _DOUBTS:
             return _DOUBTS[known, name], False
     return "", False

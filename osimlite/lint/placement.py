@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 from osimlite.lint.axes import axes_of
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
-from osimlite.schema.base import Component
+from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction, PolynomialFunction
 from osimlite.schema.joints import (
@@ -126,7 +126,7 @@ def default_poses(subject: Subject) -> dict[int, Pose]:
 
 def _motion(joint: Joint) -> Pose | None:
     """The child frame of a joint in its parent frame, at the default values of the coordinates."""
-    if any(coordinate.prescribed for coordinate in joint.coordinates):
+    if any(isinstance(coordinate, Unknown) or coordinate.prescribed for coordinate in joint.coordinates):
         return None
     values = [coordinate.default_value for coordinate in joint.coordinates]
     if is_a(joint, "CustomJoint"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from osimlite.document.lexical import shortest
 from osimlite.schema.base import Object, Unknown
+from osimlite.text import nearest
 
 
 def called(item: Object) -> str:
@@ -40,3 +41,21 @@ def times(count: int, noun: str) -> str:
     if count == 1:
         return f"1 {noun}"
     return f"{count} {noun[:-1] + 'ies' if noun.endswith('y') else noun + 's'}"
+
+
+def nearest_name(text: str, right: list[str]) -> str | None:
+    """The nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
+    whole = nearest(text, right, cutoff=70)
+    last = text.rstrip("/").rpartition("/")[2]
+    by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
+    near = nearest(last, by_last, cutoff=70)
+    if near is None:
+        return whole
+    if whole is not None and whole.rpartition("/")[2] == near:
+        return whole
+    return by_last[near]
+
+
+def closest(text: str, right: list[str]) -> str:
+    """The one of some texts that is most like another."""
+    return right[0] if len(right) == 1 else nearest(text, right, cutoff=0) or right[0]

@@ -57,6 +57,17 @@ def test_the_walker_has_neither_errors_nor_warnings():
     assert "'RFootContact' starts 21.5694 mm deep" in report.infos[2].message
 
 
+def test_the_name_of_a_part_of_a_probe_may_not_be_blank():
+    text = """<OpenSimDocument Version="40600"><Model name="m"><ProbeSet name="probeset"><objects>
+        <Umberger2010MuscleMetabolicsProbe name="probe">
+        <Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet><objects>
+        <Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter name="  "/>
+        </objects></Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet>
+        </Umberger2010MuscleMetabolicsProbe></objects></ProbeSet></Model></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode()), select="OSIM303").findings
+    assert "is blank; it must be that of a Muscle; OpenSim switches the whole probe off" in finding.message
+
+
 def test_a_missing_file_is_no_finding():
     with pytest.raises(MissingFileError, match="no such file"):
         validate("does_not_exist.osim")

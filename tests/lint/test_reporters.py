@@ -64,7 +64,8 @@ def test_full(report):
           = did you mean 'true'?
           = in /markerset/asis
 
-        Found 2 errors, 1 warning in 1 model. 1 is mended by --fix, 1 more by --unsafe-fixes.
+        Found 2 errors, 1 warning in 1 model.
+        1 is mended by --fix, 1 more by --unsafe-fixes.
         """)
 
 
@@ -93,6 +94,13 @@ def test_json_has_what_is_promised(report):
         "suggestion": "/ground",
         "fixable": findings[1]["fixable"],
     }
+
+
+def test_a_long_place_has_a_line_of_its_own():
+    path = f"{'long_' * 12}name.osim"
+    report = Report([Finding("OSIM502", "impossible-inertia", Severity.WARNING, "too large", path, 44, 15)])
+    assert render(report).splitlines()[:3] == [f"{path}:44:15:", "  warning OSIM502 impossible-inertia", "  too large"]
+    assert max(map(len, render(report).splitlines())) <= 80
 
 
 def test_github_escapes_what_a_command_cannot_hold():

@@ -88,3 +88,24 @@ def test_a_spoilt_text_has_findings_in_places_that_exist(seed):
 )
 def test_odd_bytes_raise_nothing(data):
     assert render(validate(Source(data, "odd.osim")), "json")
+
+
+def renamed(source: Source, number: int, tag: str) -> str:
+    """The text with an element called otherwise."""
+    span, text = source.spans[number], source.text
+    if span.inner_end < span.end:
+        text = text[: span.inner_end + 2] + tag + text[span.inner_end + 2 + len(span.tag) :]
+    return text[: span.start + 1] + tag + text[span.start + 1 + len(span.tag) :]
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "fixtures/lint").glob("OSIM[1-7]*/fail-*example.osim")), ids=lambda p: p.parent.name
+)
+@pytest.mark.parametrize("tag", ["Plugin", "Marker"])
+def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
+    """A class of a plug-in, and one that belongs elsewhere, in the place of each element that a rule looks at."""
+    source = Source.of_file(path)
+    known = {span.tag for span in Source(TEXTS[0].encode()).spans}
+    for number, span in enumerate(source.spans):
+        if number > 1 and span.tag != tag and (span.tag not in known or span.tag in ("Coordinate", "PinJoint", "Body")):
+            assert validate(Source(renamed(source, number, tag).encode())).findings

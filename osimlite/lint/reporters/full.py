@@ -18,7 +18,9 @@ def render(report: Report, *, colour: bool = False, width: int = 80) -> str:
     for file, findings in groupby(report.findings, key=lambda finding: finding.file):
         lines = _lines(report, file)
         blocks += [_block(finding, lines, colour, width) for finding in findings]
-    return "\n\n".join([*blocks, summary(report, colour) + _fixes(report)]) + "\n"
+    mended = _fixes(report)
+    gap = "\n" if mended and len(summary(report)) + 1 + len(mended) > width else " " if mended else ""
+    return "\n\n".join([*blocks, summary(report, colour) + gap + mended]) + "\n"
 
 
 def _fixes(report: Report) -> str:
@@ -29,7 +31,7 @@ def _fixes(report: Report) -> str:
     if rest:
         some = f"{rest} more" if safe else "1 is mended" if rest == 1 else f"{rest} are mended"
         parts.append(f"{some} by --unsafe-fixes")
-    return f" {', '.join(parts)}." if parts else ""
+    return f"{', '.join(parts)}." if parts else ""
 
 
 def _lines(report: Report, file: str | None) -> list[str] | None:
@@ -43,6 +45,9 @@ def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) 
     head = f"{painted(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
     place = painted(finding.place, "strong", colour)
     rows = [f"{place}: {head}" if finding.place else head]
+    if len(f"{finding.place}: {finding.severity.value} {finding.code} {finding.name}") > width:
+        # Broken where it means something, not where the terminal ends.
+        rows = [f"{place}:", f"  {head}"]
     rows += [f"  {row}" for row in textwrap.wrap(finding.message, width - 4, break_on_hyphens=False)]
     if finding.line is not None and lines is not None and finding.line <= len(lines):
         rows += _snippet(finding, lines[finding.line - 1], colour, width)

@@ -11,6 +11,8 @@ from osimlite.lint.diagnostic import Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.inertia import possible_inertia
+from osimlite.lint.placement import on_base
+from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.frames import Body
@@ -128,8 +130,8 @@ def no_inertia(subject: Subject, found: Found) -> None:
     Reports bodies with a mass whose inertia is zero or not given.
 
     ## Why is this bad
-    All the mass is then in one point. A joint that turns about this point has no resistance at all, and the integrator
-    takes ever smaller steps.
+    All the mass is then in one point. A joint that turns about this point has no resistance at all: accelerations
+    become NaN if the body is the last of its chain (an error), and the integrator takes ever smaller steps otherwise.
 
     ## Example
     ```xml
@@ -145,11 +147,28 @@ def no_inertia(subject: Subject, found: Found) -> None:
     for body in subject.each(Body):
         if body.mass > 0 and not any(body.inertia) and not subject.noted(body, inertia):
             state = "is zero" if "inertia" in body.model_fields_set else "is not given"
+            spins = _spins_freely(subject, body)
             found(
-                f"the inertia of {called(body)} {state} though its mass is {quantity(body.mass, 'kg')}",
+                f"the inertia of {called(body)} {state} though its mass is {quantity(body.mass, 'kg')}"
+                + (": nothing resists its joint, and accelerations become NaN" if spins else ""),
                 body,
                 tag="inertia",
+                severity=ERROR if spins else None,
             )
+
+
+def _spins_freely(subject: Subject, body: Body) -> bool:
+    """Whether a body without inertia, the last of its chain, turns about its mass center: the mass matrix is singular.
+
+    A ball joint, or any that turns about three axes, always has an axis through the mass center.
+    """
+    links = skeleton(subject).of(body)
+    if len(links) != 1 or links[0].child_base is not body:
+        return False
+    joint, place = links[0].joint, on_base(subject, links[0].child)
+    turns = [motion for motion in joint.motion_types or () if motion == "rotational"]
+    at_center = place is not None and place[1].position == body.mass_center
+    return len(turns) == 3 or bool(turns and at_center)
 
 
 @rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))

@@ -185,7 +185,7 @@ def degrees_for_radians(subject: Subject, found: Found) -> None:
     turns, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
     for joint in subject.each(Joint):
         for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
-            if motion != "rotational":
+            if motion != "rotational" or not isinstance(coordinate, Coordinate):
                 continue
             largest = max((abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0)
             # 99999.9 and the like stand for "no bound".

@@ -278,7 +278,8 @@ def idle_coordinate(subject: Subject, found: Found) -> None:
     ```
     """
     for joint in subject.named("CustomJoint"):
-        if not joint.coordinates or axes_refused(joint):
+        known = all(isinstance(coordinate, Coordinate) for coordinate in joint.coordinates)
+        if not joint.coordinates or not known or axes_refused(joint):
             continue
         columns = {coordinate.name: _motion_by(joint, coordinate) for coordinate in joint.coordinates}
         idle = [coordinate for coordinate in joint.coordinates if not any(columns[coordinate.name])]

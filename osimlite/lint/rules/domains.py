@@ -188,7 +188,7 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                 wrong = [number for number in _numbers(value) if not inside(number) and math.isfinite(number)]
                 if not wrong or (subject.noted(item, spec) and wrong == list(_numbers(spec.default))):
                     continue
-                fate, fails = consequence(cls, spec.name, wrong[0])
+                fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=_is_rigid(item))
                 domain = STRICTER.get((cls.__name__, spec.name), spec.kind.domain)
                 yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
 
@@ -213,9 +213,14 @@ def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool
     found = []
     for spec in value_specs(cls):
         assert isinstance(spec.kind, Value)
-        if spec.kind.domain and spec.kind.scalar in ("double", "int"):
-            found.append((spec, _test(STRICTER.get((cls.__name__, spec.name), spec.kind.domain))))
+        domain = STRICTER.get((cls.__name__, spec.name), spec.kind.domain)
+        if domain and spec.kind.scalar in ("double", "int"):
+            found.append((spec, _test(domain)))
     return tuple(found)
+
+
+def _is_rigid(item: Object) -> bool:
+    return bool(getattr(item, "ignore_tendon_compliance", False))
 
 
 def _test(domain: str) -> Callable[[float], bool]:

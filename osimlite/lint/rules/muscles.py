@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 
@@ -82,3 +82,60 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
                     muscle,
                     tag="default_fiber_length",
                 )
+
+
+@rule("OSIM622", "control-below-activation", severity=ERROR)
+def control_below_activation(subject: Subject, found: Found) -> None:
+    """The least control of a muscle is below its least activation.
+
+    ## What it does
+    Reports Thelen and Millard muscles whose `min_control` is smaller than their `minimum_activation`.
+
+    ## Why is this bad
+    OpenSim refuses the model. Activation never falls below its minimum, since the equations of the muscle divide by
+    it; a control that asks for less is a contradiction.
+
+    ## Example
+    ```xml
+    <Millard2012EquilibriumMuscle name="soleus">
+        <min_control>0</min_control>
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+        <tendon_slack_length>0.3</tendon_slack_length>
+    </Millard2012EquilibriumMuscle>
+    ```
+
+    ## Use instead
+    ```xml
+    <Millard2012EquilibriumMuscle name="soleus">
+        <min_control>0.01</min_control>
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+        <tendon_slack_length>0.3</tendon_slack_length>
+    </Millard2012EquilibriumMuscle>
+    ```
+    """
+    for muscle in subject.named("Muscle"):
+        if "minimum_activation" not in type(muscle).model_fields or "min_control" not in muscle.model_fields_set:
+            continue
+        if muscle.min_control < muscle.minimum_activation:
+            found(
+                f"min_control of {called(muscle)} is {quantity(muscle.min_control)}, less than its minimum_activation, "
+                f"{quantity(muscle.minimum_activation)}: OpenSim refuses the model",
+                muscle,
+                tag="min_control",
+            )

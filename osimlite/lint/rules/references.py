@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite.lint.axes import axes_refused
+from osimlite.lint.axes import axes_refused, made_up_paths
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called
+from osimlite.lint.words import a, called, closest, nearest_name
 from osimlite.schema.base import Component, Object, Unknown, reference_specs
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.fields import Reference
@@ -127,6 +127,14 @@ def missing_reference(subject: Subject, found: Found) -> None:
     """
     for broken in _broken(subject, "empty"):
         use = broken.use
+        if use.spec.name == "name":
+            found(
+                f"the name of {a(type(use.holder).tag)} is blank; it must be that of {a(use.reference.target)}; "
+                "OpenSim switches the whole probe off",
+                use.holder,
+                attribute="name",
+            )
+            continue
         given = use.spec.name in use.holder.model_fields_set
         state = "is empty" if given else "is not given"
         found(
@@ -233,7 +241,7 @@ def _find(subject: Subject) -> Iterator[Broken]:
                 if use.value != written:
                     yield Broken(use, use.value, "form", None, written)
             continue
-        if resolution.failure != "illegal" and _overwritten(subject, use):
+        if resolution.failure != "illegal" and (_overwritten(subject, use) or _made_up(subject, use)):
             continue
         value = use.value
         text = value if isinstance(value, str) else value.name
@@ -277,7 +285,7 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     last = text.rstrip("/").rpartition("/")[2]
     same_name = [word for word in right if word.rpartition("/")[2] == last]
     if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
-        return Broken(use, text, "form", None, _closest(text, same_name), "" if len(same_name) == 1 else "several")
+        return Broken(use, text, "form", None, closest(text, same_name), "" if len(same_name) == 1 else "several")
     other = resolution.found or _elsewhere(subject, use, text)
     if other is not None and is_a(other, reference.target):
         # A coordinate, but of another joint.
@@ -286,13 +294,13 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
         return Broken(use, text, "wrong-type", other, nearest(text, right, cutoff=75))
     if same_name and resolution.failure == "wrong-type":
         if other is not None and text.startswith("/"):
-            return Broken(use, text, "wrong-type", other, _closest(text, same_name))
-        return Broken(use, text, "form", None, _closest(text, same_name), "" if len(same_name) == 1 else "several")
+            return Broken(use, text, "wrong-type", other, closest(text, same_name))
+        return Broken(use, text, "form", None, closest(text, same_name), "" if len(same_name) == 1 else "several")
     lowered = [word for word in right if word.lower() == text.lower()]
     if lowered:
         return Broken(use, text, "case", None, lowered[0])
     hint = "illegal" if resolution.failure == "illegal" else ""
-    return Broken(use, text, "missing", None, _nearest_name(text, right), hint)
+    return Broken(use, text, "missing", None, nearest_name(text, right), hint)
 
 
 def _right_words(subject: Subject, use: Use) -> list[str]:
@@ -314,23 +322,6 @@ def _same_place(text: str, candidates: list[str]) -> bool:
     return any(word.strip("/") == text.strip("/") for word in candidates)
 
 
-def _nearest_name(text: str, right: list[str]) -> str | None:
-    """The nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
-    whole = nearest(text, right, cutoff=70)
-    last = text.rstrip("/").rpartition("/")[2]
-    by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
-    near = nearest(last, by_last, cutoff=70)
-    if near is None:
-        return whole
-    if whole is not None and whole.rpartition("/")[2] == near:
-        return whole
-    return by_last[near]
-
-
-def _closest(text: str, right: list[str]) -> str:
-    return right[0] if len(right) == 1 else nearest(text, right, cutoff=0) or right[0]
-
-
 def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
     """A component of another class that goes by this name or path."""
     tree = subject.tree
@@ -348,6 +339,19 @@ def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
 def _wants_plain_path(use: Use) -> bool:
     """Whether OpenSim compares the text itself: a PrescribedController finds its functions by the path as it stands."""
     return type(use.owner).__name__ == "PrescribedController" and use.spec.tag == "socket_actuators"
+
+
+def _made_up(subject: Subject, use: Use) -> bool:
+    """Whether a reference leads to a coordinate that OpenSim makes up, of which another rule speaks."""
+    if use.reference.target != "Coordinate" or use.reference.rule == "own-joint-coordinate":
+        return False
+    paths = made_up_paths(subject)
+    if not paths or not isinstance(use.value, str):
+        return False
+    if use.reference.rule == "coordinate-name":
+        return any(path.rpartition("/")[2] == use.value for path in paths)
+    base = "" if use.value.startswith("/") else f"{subject.tree.path_of(use.owner)}/"
+    return normalised(base + use.value) in paths
 
 
 def _overwritten(subject: Subject, use: Use) -> bool:

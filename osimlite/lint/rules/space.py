@@ -18,6 +18,7 @@ from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSp
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.markers import Station
+from osimlite.schema.tree import is_a
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
@@ -221,6 +222,48 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
     )
 
 
+@rule("OSIM415", "no-direction", severity=WARNING)
+def no_direction(subject: Subject, found: Found) -> None:
+    """A direction has no length.
+
+    ## What it does
+    Reports lines, axes and directions of constraints and actuators that are 0 0 0. It is an error for the line of a
+    PointOnLineConstraint, which is 0 0 0 if nobody gives it.
+
+    ## Why is this bad
+    An actuator pulls in no direction, whatever its force. Of a line without a direction OpenSim makes NaN.
+
+    ## Example
+    ```xml
+    <PointActuator name="push">
+        <body>thigh</body> <direction>0 0 0</direction>
+    </PointActuator>
+    ```
+
+    ## Use instead
+    ```xml
+    <PointActuator name="push">
+        <body>thigh</body> <direction>1 0 0</direction>
+    </PointActuator>
+    ```
+    """
+    for cls, tag in (
+        ("PointOnLineConstraint", "line_direction_vec"),
+        ("PointActuator", "direction"),
+        ("TorqueActuator", "axis"),
+    ):
+        for item in subject.named(cls):
+            if not any(getattr(item, tag)):
+                line = cls == "PointOnLineConstraint"
+                fate = "accelerations become NaN, without a message" if line else "it never acts"
+                found(
+                    f"{subject.titled(item, type(item).field_specs()[tag])} is 0 0 0: {fate}",
+                    item,
+                    tag=tag,
+                    severity=ERROR if line else None,
+                )
+
+
 def _rests_on_itself(subject: Subject, frame: StationDefinedFrame) -> bool:
     """Whether one follows the points of a frame, and the frames these are on, back to it."""
     pending: list[Component] = [frame]
@@ -240,13 +283,16 @@ def _rests_on_itself(subject: Subject, frame: StationDefinedFrame) -> bool:
 
 
 def _on_body(subject: Subject, item: Object) -> bool:
-    """Whether an object is fixed to a body, so that nothing about it can be ten metres long."""
+    """Whether an object is fixed to bodies, so that nothing about it can be ten metres long."""
     owner: Component | None = subject.owner(item)
     if isinstance(owner, Body):
         return True
     for tag in ("socket_parent_frame", "socket_parent", "socket_frame"):
         if owner is not None and tag in type(owner).field_specs():
             return isinstance(base_of(subject, subject.target_of(owner, tag)), Body)
+    # No muscle, ligament or spring along a path is as long either.
+    if owner is not None and any(is_a(owner, cls) for cls in ("Muscle", "Ligament", "PathSpring")):
+        return True
     # What is wrapped around a body stands in a set of its own in it.
     above = owner
     while above is not None and not isinstance(above, Body):
