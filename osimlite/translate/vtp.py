@@ -88,7 +88,9 @@ class _File:
             parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
             self.root = etree.fromstring(content, parser)
         except etree.XMLSyntaxError as error:
-            raise _Unreadable(f"it is not a VTK file in XML ({error.msg})") from None
+            # The parser breaks some of its messages into lines.
+            why = " ".join(str(error.msg).split()).replace(" ,", ",")
+            raise _Unreadable(f"it is not a VTK file in XML ({why})") from None
         if self.root.tag != "VTKFile" or self.root.get("type") != "PolyData":
             raise _Unreadable("it is not a VTK file with a surface (type PolyData)")
         section = self.root.find("AppendedData")
