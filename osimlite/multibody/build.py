@@ -199,7 +199,7 @@ class _Builder:
         bodies = []
         for edge, outer, backward in branches:
             carrier, mobilizer = edge.child if backward else edge.parent, edge.mobilizer(reversed=backward)
-            properties = self._mass_properties(outer)
+            properties = mass_properties(self.bodies[outer], outer)
             bodies.append(MobileBody(_last(outer), outer, index[carrier], properties, mobilizer))
         for edge in loops:
             if not edge.coordinates:
@@ -227,7 +227,7 @@ class _Builder:
 
     def _split(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
         """Let the joint carry a part of its child, and weld that to the rest."""
-        place, whole = index[edge.child], self._mass_properties(edge.child)
+        place, whole = index[edge.child], mass_properties(self.bodies[edge.child], edge.child)
         parts = [place, *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part"))]
         path = f"{edge.child}_part{len(parts)}"
         bodies.append(MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False)))
@@ -252,17 +252,22 @@ class _Builder:
                 place = constraint.dependent
                 self.coordinates[place] = replace(self.coordinates[place], yielding=True)
 
-    def _mass_properties(self, path: str) -> MassProperties:
-        body = self.bodies[path]
-        mass = body.mass
-        if not 0.0 <= mass < np.inf:
-            raise ModelError(f"the body '{path}' has mass {mass:g}; give it a mass in kg that is not negative")
-        center, (xx, yy, zz, xy, xz, yz) = np.array(body.mass_center, dtype=float), body.inertia
-        inertia = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), dtype=float)
-        if not (np.isfinite(center).all() and np.isfinite(inertia).all()):
-            raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
-        # OpenSim lets a body without mass have no inertia either.
-        return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
+
+def mass_properties(body: Body, path: str) -> MassProperties:
+    """Mass properties of a body of a model.
+
+    Raises:
+        ModelError: they are none.
+    """
+    mass = body.mass
+    if not 0.0 <= mass < np.inf:
+        raise ModelError(f"the body '{path}' has mass {mass:g}; give it a mass in kg that is not negative")
+    center, (xx, yy, zz, xy, xz, yz) = np.array(body.mass_center, dtype=float), body.inertia
+    inertia = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), dtype=float)
+    if not (np.isfinite(center).all() and np.isfinite(inertia).all()):
+        raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
+    # OpenSim lets a body without mass have no inertia either.
+    return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
 
 
 def _base(loose: list[str], edges: list[_Edge]) -> str:
