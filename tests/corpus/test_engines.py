@@ -1,0 +1,83 @@
+"""Real models: both engines find the accelerations that the recursion of this package finds, under their forces."""
+
+from __future__ import annotations
+
+import gzip
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from osimlite.document.reader import read_text
+from osimlite.errors import SimulationError, UnsupportedError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.constraints import Lock
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.engines.bullet import make
+from osimlite.simulation.engines.protocol import Settings
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.simulation.engines.compiled import CompiledEngine
+
+
+def largest_difference(ours, expected):
+    return np.abs(np.subtract(ours, expected)).max(initial=0.0) / max(1.0, np.abs(expected).max(initial=0.0))
+
+
+def state_near(mechanism, seed):
+    """A little beside the default values, locked coordinates still."""
+    rng = np.random.default_rng(seed)
+    q = np.array([info.default_value for info in mechanism.coordinates])
+    free = np.array([not info.locked for info in mechanism.coordinates])
+    q = q + free * rng.uniform(-0.05, 0.05, len(q))
+    return q, free * rng.uniform(-0.5, 0.5, len(q))
+
+
+def test_same_accelerations(corpus_model):
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
+    mechanism = build_mechanism(model)
+    # Constraints are kept up outside of the engines.
+    locks = tuple(item for item in mechanism.constraints if isinstance(item, Lock))
+    mechanism = replace(mechanism, constraints=locks)
+    try:
+        bare = CompiledEngine(mechanism, Forces(()))
+    except UnsupportedError as error:
+        pytest.skip(str(error))
+    scale = conditioning(mechanism)
+    for seed in range(2):
+        q, u = state_near(mechanism, seed)
+        try:
+            found = bare.acceleration(0.0, q, u)
+        except SimulationError:
+            with pytest.raises(SimulationError, match="no mass"):
+                mechanism.acceleration(q, u)
+            return
+        assert largest_difference(found, mechanism.acceleration(q, u)) < 1e-9 * scale
+    forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
+    try:
+        ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
+    except UnsupportedError as error:
+        pytest.skip(str(error))
+    with theirs:
+        for seed in range(2):
+            q, u = (values.tolist() for values in state_near(mechanism, seed))
+            difference = largest_difference(ours.acceleration(0.1, q, u), theirs.acceleration(0.1, q, u))
+            assert difference < 1e-9 * scale
+            assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
+                theirs.force_records(0.1, theirs.state.pack(q, u)), rel=1e-7, abs=1e-7
+            )
+
+
+def conditioning(mechanism):
+    """How many times more than usual rounding counts: a thousandth of the condition of the mass matrix, or 1."""
+    q, _ = state_near(mechanism, 0)
+    matrix = mechanism.mass_matrix(q)
+    free = [place for place, info in enumerate(mechanism.coordinates) if not info.locked and matrix[place, place] > 0]
+    if not free:
+        return 1.0
+    own = matrix[np.ix_(free, free)]
+    size = 1.0 / np.sqrt(np.diag(own))
+    return max(1.0, np.linalg.cond(own * np.outer(size, size)) * 1e-3)
