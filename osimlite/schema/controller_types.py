@@ -13,14 +13,18 @@ class PrescribedController(Controller):
     """Controls as functions of time, one for each actuator in order, or as columns of a file."""
 
     ControlFunctions: Single[FunctionSet] = made(FunctionSet, name="ControlFunctions")
+    """Controls over time, one for each actuator in the order of `socket_actuators`."""
     controls_file: MaybeFileName = None
+    """File of a column for each actuator, labelled with its name or path."""
     interpolation_method: Annotated[int | None, Value("int", "optional")] = None
+    """What runs between the rows of the file: 0 steps, 1 lines (if left out), 3 cubic, 5 quintic splines."""
 
 
 class ControlSetController(Controller):
     """Controls read from a file of control curves."""
 
     controls_file: LegacyFileName = "Unassigned"
+    """File of control curves (.xml) or of columns (.sto)."""
 
 
 class TrackingController(Controller, abstract=True):
@@ -28,10 +32,12 @@ class TrackingController(Controller, abstract=True):
 
 
 class CorrectionController(TrackingController):
-    """Tracks with accelerations `kp` times the error plus `kv` times its rate."""
+    """Drives every coordinate to its desired value by a force in proportion to the errors of value and speed."""
 
     kp: Annotated[float, real(legacy=True)] = 100.0
+    """Force per deviation of a coordinate."""
     kv: Annotated[float, real(legacy=True)] = 20.0
+    """Force per deviation of the speed of a coordinate."""
 
 
 class CMC(TrackingController):
@@ -42,18 +48,21 @@ class InputController(Controller, abstract=True):
     """Computes controls from the outputs of other components."""
 
     input_controls: NumberInputs = ()
+    """The outputs that the controls are made of, each as `path|output`."""
 
 
 class SynergyVector(Object):
     """The weights with which one synergy drives the actuators, in their order."""
 
     synergy_weights: Vector = ()
+    """A weight for each actuator, in the order of `socket_actuators`."""
 
 
 class SynergyController(InputController):
     """Drives many actuators from few inputs, each spread by its synergy vector."""
 
     synergy_vectors: Many[SynergyVector] = none()
+    """A vector for each input, in order; the controls are the sum of inputs times vectors."""
 
 
 class ControlDistributor(ModelComponent):

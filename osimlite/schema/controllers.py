@@ -10,11 +10,15 @@ class Controller(ModelComponent, abstract=True):
     """Computes the controls of the actuators it names."""
 
     socket_actuators: ActuatorSockets = ()
+    """The actuators that are controlled; what several controllers want of one is added up."""
     enabled: Flag = True
+    """Whether the controller adds anything to the controls."""
 
 
 class ControllerSet(ModelComponentSet):
     """The controllers of a model."""
 
     objects: LegacyMany[Controller] = none()
+    """The controllers; what several want of one actuator is added up."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the controllers; the mechanics ignore them."""

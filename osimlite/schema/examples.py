@@ -10,17 +10,22 @@ class HopperDevice(ModelComponent):
     """A device with a cable, for a jumping leg."""
 
     actuator_name: PathActuatorPath = "cableAtoB"
+    """Path, from the device, of the actuator that its outputs speak of."""
 
 
 class ToyPropMyoController(Controller):
     """Drives an actuator in proportion to an activation."""
 
     socket_actuator: ScalarActuatorSocket = ""
+    """The actuator that is controlled."""
     input_activation: NumberInput = ""
+    """The output that the control follows, as `path|output`."""
     gain: Number = 1.0
+    """Control per activation; below an activation of 0.31 there is no control."""
 
 
 class ToyReflexController(Controller):
-    """Drives muscles in proportion to how far they are stretched."""
+    """Drives muscles in proportion to how fast they lengthen."""
 
     gain: Number = 1.0
+    """Control where a muscle lengthens at its greatest contraction velocity."""

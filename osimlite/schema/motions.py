@@ -9,7 +9,9 @@ class PositionMotion(ModelComponent):
     """Moves every coordinate by a function of time, one for each."""
 
     default_enabled: Flag = True
+    """Whether coordinates follow the motion from the start."""
     functions: Single[FunctionSet] = made(FunctionSet, name="functions")
+    """A function of time for every coordinate, with the path of the coordinate as its name."""
 
 
 class AccelerationMotion(ModelComponent):

@@ -11,15 +11,21 @@ class Probe(ModelComponent, abstract=True):
     """Something measured along a simulation, possibly integrated or differentiated, times `gain`."""
 
     enabled: Flag = True
+    """Whether the probe is computed and reported."""
     probe_operation: Annotated[
         str, word("value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs")
     ] = "value"
+    """What is reported of the quantity: itself, its integral, its rate, or its extreme so far."""
     initial_conditions_for_integration: Annotated[Reals, reals()] = ()
+    """Where the integrals start, one number for each quantity of the probe."""
     gain: Number = 1.0
+    """Factor of what is reported."""
 
 
 class ProbeSet(ModelComponentSet):
     """The probes of a model."""
 
     objects: LegacyMany[Probe] = none()
+    """The probes; tools write their values to a file."""
     groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the probes; the mechanics ignore them."""

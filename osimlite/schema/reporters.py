@@ -9,27 +9,31 @@ from osimlite.schema.references import ColumnName, FileName, NumberInputs, Vec3I
 
 
 class AbstractReporter(Component, abstract=True):
-    """Collects outputs every `report_time_interval`, or at every step if it is 0."""
+    """Collects something along a simulation."""
 
     report_time_interval: Annotated[float, real("s", ">= 0")] = 0.0
+    """Time between two rows; with 0, a row at every step of the integrator."""
 
 
 class NumberReporter(AbstractReporter, abstract=True):
     """Collects outputs that are numbers."""
 
     input_inputs: NumberInputs = ()
+    """The outputs to collect, each as `path|output`."""
 
 
 class Vec3Reporter(AbstractReporter, abstract=True):
     """Collects outputs that are points or directions."""
 
     input_inputs: Vec3Inputs = ()
+    """The outputs to collect, each as `path|output`."""
 
 
 class VectorReporter(AbstractReporter, abstract=True):
     """Collects outputs that are vectors of any length."""
 
     input_inputs: VectorInputs = ()
+    """The outputs to collect, each as `path|output`."""
 
 
 class ConsoleReporter__double_(NumberReporter):
@@ -57,10 +61,12 @@ class StatesTrajectoryReporter(AbstractReporter):
 
 
 class TableSource(Component, abstract=True):
-    """Gives the columns of a table file as outputs; `tablename` picks one table of several."""
+    """Gives the columns of a table file as outputs."""
 
     filename: FileName = ""
+    """File of the table, relative to the folder that OpenSim runs in, not to the model."""
     tablename: ColumnName = ""
+    """Which table it is, where a file has several, such as `markers` or `forces` of a C3D file."""
 
 
 class TableSource__double_(TableSource):
@@ -75,3 +81,4 @@ class SignalGenerator(Component):
     """Gives a function of time as an output."""
 
     function: Single[Function] = made(Constant, name="function")
+    """The output as a function of time."""

@@ -17,16 +17,20 @@ class Scholz2015GeometryPathPoint(Scholz2015GeometryPathElement):
     """A point that the path runs through."""
 
     path_point: Unnamed[PathPoint] = made(PathPoint)
+    """The point, in a frame of its own choice."""
 
 
 class Scholz2015GeometryPathObstacle(Scholz2015GeometryPathElement):
-    """A surface that the path may touch; `contact_hint` is a point on it where the search for contact starts."""
+    """A surface that the path may touch."""
 
     socket_contact_geometry: ContactGeometrySocket = ""
+    """The surface that the path may touch."""
     contact_hint: Annotated[Vec3, vec3()] = (math.nan, math.nan, math.nan)
+    """Point in the frame of the surface, near the contact, where the search for it starts."""
 
 
 class Scholz2015GeometryPath(AbstractGeometryPath):
     """A path through points and over obstacles, in order; it begins and ends with a point."""
 
     path_elements: Many[Scholz2015GeometryPathElement] = none()
+    """Points and obstacles in the order in which the path passes them; points at both ends."""
