@@ -1,59 +1,30 @@
 """The models of a sweep: those that a sample's properties and parameters make of the given one.
 
-A model is made afresh for each new set of numbers. If only forces have changed, and the compiled engine computes them,
-their elements alone are made, and their numbers put into the engine's vector. The numbers are those of a model that is
-built from a file either way, since the same functions make them.
+A model is made afresh for each new set of numbers. For the compiled engine, only that is made which the numbers have a
+part in, where they belong to forces, are masses, mass centres or inertias of bodies, or gravity. The numbers are those
+of a model that is built from a file either way, since the same functions make them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from osimlite.errors import OsimliteError
+from osimlite.schema.base import Component
 from osimlite.schema.forces import Force
+from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
-from osimlite.simulation.elements import ElementBuilder
-from osimlite.simulation.engines import engine_factory
-from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels.items import Item, Places, items_of
 from osimlite.simulation.run import Simulation
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.properties import Setter
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
 
 MOST_KEPT = 64
 """So many models are kept: a grid asks for the same ones again and again."""
-
-
-@dataclass
-class Variant:
-    """A model made ready.
-
-    Attributes:
-        start: its default state (2n,), in the engine's order.
-        structure: equal for variants that differ in numbers only.
-        numbers: all numbers of the compiled engine, empty for others.
-        maker: makes its engine.
-        simulation: that the engine is part of; None if only forces are new.
-    """
-
-    start: Floats
-    structure: bytes
-    numbers: Floats
-    maker: Callable[[], Any]
-    simulation: Simulation | None = None
-
-    @cached_property
-    def engine(self) -> Any:
-        """The engine of this very model."""
-        return self.maker()
 
 
 class Variants:
@@ -78,7 +49,7 @@ class Variants:
         self._adopt(plan.model())
         self.given = self._whole()
         self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
-        self._force_numbers: ForceNumbers | None = None
+        self._renewal: Renewal | None = None
 
     @property
     def is_fixed(self) -> bool:
@@ -159,23 +130,17 @@ class Variants:
         self.model = model
         self._gravity = math.hypot(*model.gravity[:2])
         self._slopes, self._setters = [], []
-        forces: list[Force] = []
-        only_forces = not self._parameters
+        owners: list[Component] = []
         for place in self._changes:
             target = self._plan.variables[place].target
             if isinstance(target, Property):
-                setters: list[Setter] = [item.setter(model) for item in target.places]
-                self._setters.append((place, setters))
-                for item in target.places:
-                    owner = model.tree().by_path[item.component]
-                    if isinstance(owner, Force):
-                        forces.append(owner)
-                    else:
-                        only_forces = False
+                self._setters.append((place, [item.setter(model) for item in target.places]))
+                owners += [model.tree().by_path[item.component] for item in target.places]
             elif isinstance(target, Slope):
                 self._slopes.append(place)
-                only_forces = False
-        self._forces = forces if only_forces and self._plan.engine == "compiled" else None
+                owners.append(model)
+        can_renew = self._plan.engine == "compiled" and not self._parameters
+        self._owners = owners if can_renew and all(isinstance(item, Force | Body | Model) for item in owners) else None
 
     def _whole(self) -> Variant:
         plan = self._plan
@@ -189,64 +154,8 @@ class Variants:
 
     def _make(self, values: Sequence[float]) -> Variant:
         self.put(values)
-        if self._forces is None or self.given.simulation is None:
+        if self._owners is None:
             return self._whole()
-        if self._force_numbers is None:
-            self._force_numbers = ForceNumbers(self.model, self.given, Path(self._plan.folder or "."))
-        return self._force_numbers.variant(self._forces) or self._whole()
-
-
-class ForceNumbers:
-    """The numbers of forces within those of the compiled engine.
-
-    Args:
-        model: whose forces change, and nothing else.
-        given: the same model before.
-        folder: of its file.
-    """
-
-    def __init__(self, model: Model, given: Variant, folder: Path) -> None:
-        engine = given.engine
-        self._given, self._forces = given, engine.forces
-        self._builder = ElementBuilder(model, engine.mechanism, False, folder)
-        freedoms = {place: number for number, place in enumerate(engine.order)}
-        self._places = Places(engine.mechanism, freedoms, engine.placements)
-        self._items = {element.path: items_of(element, self._places) for element in engine.forces.elements}
-        # The numbers of all items are the last ones, in their order.
-        self._first, place = {}, len(given.numbers) - sum(_length(items) for items in self._items.values())
-        for path, items in self._items.items():
-            self._first[path] = place
-            place += _length(items)
-
-    def variant(self, forces: Sequence[Force]) -> Variant | None:
-        """The model with what some forces are now; None if more has changed than numbers."""
-        numbers, made = self._given.numbers.copy(), {}
-        for force in forces:
-            element = self._builder.element(force)
-            old, items = self._items.get(element.path), items_of(element, self._places)
-            if old is None or [_kind(item) for item in items] != [_kind(item) for item in old]:
-                return None
-            place = self._first[element.path]
-            numbers[place : place + _length(items)] = [x for item in _computed(items) for x in item.numbers]
-            made[element.path] = element
-        elements = tuple(made.get(element.path, element) for element in self._forces.elements)
-        mechanism, changed = self._places.mechanism, replace(self._forces, elements=elements)
-        return Variant(
-            self._given.start,
-            self._given.structure,
-            numbers,
-            lambda: engine_factory("compiled")(mechanism, changed, Settings()),
-        )
-
-
-def _computed(items: Sequence[Item]) -> list[Item]:
-    return [item for item in items if item.law is not None]
-
-
-def _length(items: Sequence[Item]) -> int:
-    return sum(len(item.numbers) for item in _computed(items))
-
-
-def _kind(item: Item) -> tuple[object, ...]:
-    """What of an item is not its numbers."""
-    return item.law, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part
+        if self._renewal is None:
+            self._renewal = Renewal(self.model, self.given, Path(self._plan.folder or "."))
+        return self._renewal.variant(self._owners) or self._whole()

@@ -96,12 +96,13 @@ def changed(chosen, values):
 
 
 FORCES = sorted(name for name in NUMBERS if name.startswith("/forceset/"))
+BODIES = sorted(name for name in NUMBERS if name.startswith("/bodyset/"))
 
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_a_run_is_the_simulation_of_the_changed_model(data):
-    among = data.draw(st.sampled_from([sorted(NUMBERS), [*FORCES, "RHip_rz"]]))
+    among = data.draw(st.sampled_from([sorted(NUMBERS), [*FORCES, "RHip_rz"], [*BODIES, *FORCES[:1], "slope"]]))
     chosen = data.draw(st.lists(st.sampled_from(among), min_size=1, max_size=4, unique=True))
     if "platform_rz" in chosen and "slope" in chosen:
         chosen.remove("slope")
@@ -117,20 +118,22 @@ def test_a_run_is_the_simulation_of_the_changed_model(data):
         assert [block.measures[name][number] for name in STATES] == simulated(*changed(chosen, row))
 
 
-def test_of_forces_only_the_numbers_are_made_afresh():
-    made = plan(dynamic_walker(), {name: NUMBERS[name] for name in FORCES}, measures=("energy",), to=0.6)
+@pytest.mark.parametrize("chosen", [FORCES, BODIES, ["slope"], [*FORCES, *BODIES, "slope"]])
+def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
+    made = plan(dynamic_walker(), {name: NUMBERS[name] for name in chosen}, measures=("energy",), to=0.6)
     variants = Variants(made)
-    row = [NUMBERS[name][1] for name in FORCES]
-    variant = variants.variant(row)
-    assert variant.simulation is None and variant.structure == variants.given.structure
-    model, _, _ = changed(FORCES, row)
-    with Simulation(model, "compiled") as simulation:
-        engine = simulation.engine
-        assert np.array_equal(variant.numbers, engine.numbers)
-        assert np.array_equal(variant.engine.numbers, engine.numbers)
-        energies = simulation.run(0.6).summary["energy_J"]
-    energy = Runner(made).run(np.array([row])).measures["energy"][0]
-    assert energy == pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9)
+    for end in (1, 0):
+        row = [NUMBERS[name][end] for name in chosen]
+        variant = variants.variant(row)
+        assert variant.simulation is None and variant.structure == variants.given.structure
+        model, _, _ = changed(chosen, row)
+        with Simulation(model, "compiled") as simulation:
+            engine = simulation.engine
+            assert np.array_equal(variant.numbers, engine.numbers)
+            assert np.array_equal(variant.engine.numbers, engine.numbers)
+            energies = simulation.run(0.6).summary["energy_J"]
+        energy = Runner(made).run(np.array([row])).measures["energy"][0]
+        assert energy == pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9)
 
 
 def test_parameters_of_a_function():

@@ -1,0 +1,145 @@
+"""The parts of a model that some numbers have a part in, made anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.multibody.build import mass_properties
+from osimlite.multibody.constraints import Lock
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.schema.base import Component
+from osimlite.schema.forces import Force
+from osimlite.schema.frames import Body
+from osimlite.schema.model import Model
+from osimlite.simulation.elements import ElementBuilder, Forces
+from osimlite.simulation.engines import engine_factory
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.kernels.items import Item, Places, items_of
+from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.run import Simulation
+from osimlite.sweep.variables import Floats
+
+
+@dataclass
+class Variant:
+    """A model made ready.
+
+    Attributes:
+        start: its default state (2n,), in the engine's order.
+        structure: equal for variants that differ in numbers only.
+        numbers: all numbers of the compiled engine, empty for others.
+        maker: makes its engine.
+        simulation: that the engine is part of; None if only forces are new.
+    """
+
+    start: Floats
+    structure: bytes
+    numbers: Floats
+    maker: Callable[[], Any]
+    simulation: Simulation | None = None
+
+    @cached_property
+    def engine(self) -> Any:
+        """The engine of this very model."""
+        return self.maker()
+
+
+class Renewal:
+    """Makes those parts of a model anew that its forces, masses and gravity have a part in; for the compiled engine.
+
+    Args:
+        model: of which nothing else changes.
+        given: the same model before.
+        folder: of its file.
+    """
+
+    def __init__(self, model: Model, given: Variant, folder: Path) -> None:
+        engine = given.engine
+        self._model, self._given = model, given
+        self._mechanism: Mechanism = engine.mechanism
+        self._forces: Forces = engine.forces
+        self._components = model.tree().by_path
+        self._builder = ElementBuilder(model, engine.mechanism, False, folder)
+        freedoms = {place: number for number, place in enumerate(engine.order)}
+        self._places = Places(engine.mechanism, freedoms, engine.placements)
+        self._items = {element.path: items_of(element, self._places) for element in engine.forces.elements}
+        # The numbers of all items are the last ones, in their order.
+        self._first, place = {}, len(given.numbers) - sum(_length(items) for items in self._items.values())
+        for path, items in self._items.items():
+            self._first[path] = place
+            place += _length(items)
+
+    def variant(self, owners: Sequence[Component]) -> Variant | None:
+        """The model with what its forces and bodies are now; None if more has changed than numbers.
+
+        Args:
+            owners: forces, bodies and the model itself, if a property of theirs has changed.
+        """
+        made = {}
+        for force in owners:
+            if isinstance(force, Force):
+                element = self._builder.element(force)
+                made[element.path] = element
+        if not made.keys() <= self._items.keys():
+            return None
+        forces = replace(
+            self._forces, elements=tuple(made.get(element.path, element) for element in self._forces.elements)
+        )
+        if all(isinstance(owner, Force) for owner in owners):
+            mechanism, numbers = self._mechanism, self._with_forces(made)
+        else:
+            mechanism = self._with_masses()
+            numbers = None if mechanism is None else self._packed(mechanism, forces)
+        if mechanism is None or numbers is None:
+            return None
+        start, structure = self._given.start, self._given.structure
+        return Variant(start, structure, numbers, lambda: engine_factory("compiled")(mechanism, forces, Settings()))
+
+    def _with_forces(self, made: Mapping[str, Any]) -> Floats | None:
+        """The given numbers with those of some elements in their places."""
+        numbers = self._given.numbers.copy()
+        for path, element in made.items():
+            items = items_of(element, self._places)
+            if [_kind(item) for item in items] != [_kind(item) for item in self._items[path]]:
+                return None
+            place = self._first[path]
+            numbers[place : place + _length(items)] = [x for item in _computed(items) for x in item.numbers]
+        return numbers
+
+    def _with_masses(self) -> Mechanism | None:
+        """The mechanism with the masses and the gravity that the model has now."""
+        mechanism = self._mechanism
+        if not all(isinstance(item, Lock) for item in mechanism.constraints):
+            # Masses have a say in where loops are cut, and bodies are parted there.
+            return None
+        bodies = []
+        for body in mechanism.bodies:
+            component = self._components.get(body.path)
+            if not isinstance(component, Body):
+                return None
+            bodies.append(replace(body, mass_properties=mass_properties(component, body.path)))
+        return replace(mechanism, bodies=tuple(bodies), gravity=np.array(self._model.gravity, dtype=float))
+
+    def _packed(self, mechanism: Mechanism, forces: Forces) -> Floats | None:
+        packed = pack(mechanism, forces)
+        is_alike = np.array_equal(packed.structure, self._given.engine.structure)
+        return packed.numbers if is_alike and packed.order == self._given.engine.order else None
+
+
+def _computed(items: Sequence[Item]) -> list[Item]:
+    return [item for item in items if item.law is not None]
+
+
+def _length(items: Sequence[Item]) -> int:
+    return sum(len(item.numbers) for item in _computed(items))
+
+
+def _kind(item: Item) -> tuple[object, ...]:
+    """What of an item is not its numbers."""
+    return item.law, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part
