@@ -10,71 +10,107 @@ from osimlite.schema.functions import Function
 
 
 class ActiveForceLengthCurve(Function):
-    """Active force of a fibre over its length; `minimum_value` keeps it above zero everywhere."""
+    """Active force of a fibre over its length."""
 
     min_norm_active_fiber_length: Annotated[float, real(domain="> 0")] = 0.4441
+    """Length below which the force keeps to `minimum_value`."""
     transition_norm_fiber_length: Annotated[float, real(domain="> 0")] = 0.73
+    """Length at which the steep part of the rise goes over to the shallow one."""
     max_norm_active_fiber_length: Annotated[float, real(domain="> 0")] = 1.8123
+    """Length above which the force keeps to `minimum_value`."""
     shallow_ascending_slope: Annotated[float, real(domain=">= 0")] = 0.8616
+    """Slope of the shallow part of the rise, just before optimal length."""
     minimum_value: Annotated[float, real(domain=">= 0")] = 0.1
+    """Least force at any length; a muscle without fibre damping needs more than 0."""
 
 
 class FiberForceLengthCurve(Function):
     """Passive force of a fibre over its length."""
 
     strain_at_zero_force: Number = 0.0
+    """Strain up to which the fibre is slack."""
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.7
+    """Strain at which the passive fibre bears `max_isometric_force`."""
     stiffness_at_low_force: Annotated[float | None, maybe(domain="> 0")] = None
+    """Slope where the toe ends; to be given with the two below, or none of them."""
     stiffness_at_one_norm_force: Annotated[float | None, maybe(domain="> 0")] = None
+    """Slope at a force of 1; to be given with the stiffness at low force, or not at all."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
+    """How round the bend is; to be given with the two stiffnesses, or not at all."""
 
 
 class ForceVelocityCurve(Function):
     """Force multiplier of a fibre over its velocity, both normalised."""
 
     concentric_slope_at_vmax: Annotated[float, real(domain=">= 0")] = 0.0
+    """Slope at the greatest shortening velocity, -1, where the force is 0."""
     concentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.25
+    """Slope just before the greatest shortening velocity."""
     isometric_slope: Annotated[float, real(domain="> 0")] = 5.0
+    """Slope at velocity 0, where the force is 1."""
     eccentric_slope_at_vmax: Annotated[float, real(domain=">= 0")] = 0.0
+    """Slope at the greatest lengthening velocity, 1."""
     eccentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.15
+    """Slope just before the greatest lengthening velocity."""
     max_eccentric_velocity_force_multiplier: Annotated[float, real(domain="> 1")] = 1.4
+    """Force at the greatest lengthening velocity, 1."""
     concentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.6
+    """How round the bend of the shortening side is."""
     eccentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.9
+    """How round the bend of the lengthening side is."""
 
 
 class ForceVelocityInverseCurve(Function):
     """Fibre velocity over force multiplier: the inverse of a ForceVelocityCurve with the same numbers."""
 
     concentric_slope_at_vmax: Annotated[float, real(domain="> 0")] = 0.1
+    """Slope of the force at the greatest shortening velocity, -1; not 0, or there is no inverse."""
     concentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.25
+    """Slope of the force just before the greatest shortening velocity."""
     isometric_slope: Annotated[float, real(domain="> 0")] = 5.0
+    """Slope of the force at velocity 0, where it is 1."""
     eccentric_slope_at_vmax: Annotated[float, real(domain="> 0")] = 0.1
+    """Slope of the force at the greatest lengthening velocity, 1; not 0, or there is no inverse."""
     eccentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.15
+    """Slope of the force just before the greatest lengthening velocity."""
     max_eccentric_velocity_force_multiplier: Annotated[float, real(domain="> 1")] = 1.4
+    """Force at the greatest lengthening velocity, 1."""
     concentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.6
+    """How round the bend of the shortening side is."""
     eccentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.9
+    """How round the bend of the lengthening side is."""
 
 
 class TendonForceLengthCurve(Function):
     """Force of a tendon over its length, both normalised."""
 
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
+    """Strain at which the tendon bears `max_isometric_force`."""
     stiffness_at_one_norm_force: Annotated[float | None, maybe(domain="> 0")] = None
+    """Slope at a force of 1; to be given with the two below, or none of them."""
     norm_force_at_toe_end: Annotated[float | None, maybe(domain="> 0")] = None
+    """Force where the toe ends and the straight part begins, of `max_isometric_force`."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
+    """How round the toe is; to be given with the two above, or not at all."""
 
 
 class FiberCompressiveForceLengthCurve(Function):
     """A force that keeps a fibre from becoming too short."""
 
     norm_length_at_zero_force: Annotated[float, real(domain="> 0")] = 0.5
+    """Length above which there is no such force."""
     stiffness_at_zero_length: Annotated[float | None, maybe()] = None
+    """Slope at length 0, negative; to be given with the curviness, or not at all."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
+    """How round the bend is; to be given with the stiffness, or not at all."""
 
 
 class FiberCompressiveForceCosPennationCurve(Function):
     """A force that keeps a fibre from standing across the tendon."""
 
     engagement_angle_in_degrees: Annotated[float, real("deg", "> 0")] = 85.0
+    """Pennation angle below which there is no such force."""
     stiffness_at_perpendicular: Annotated[float | None, maybe()] = None
+    """Slope over the cosine at 90 deg, negative; to be given with the curviness, or not at all."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
+    """How round the bend is; to be given with the stiffness, or not at all."""

@@ -13,13 +13,19 @@ class MuscleFirstOrderActivationDynamicModel(ModelComponent):
     """Activation that follows excitation with one time constant up and one down."""
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
+    """Time constant of rising activation; a muscle that owns the part puts in its own."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
+    """Time constant of falling activation; a muscle that owns the part puts in its own."""
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
+    """Activation below which the muscle does not go, whatever its control."""
 
 
 class MuscleFixedWidthPennationModel(ModelComponent):
     """Fibres that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
 
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 1.0
+    """Fibre length at which `pennation_angle_at_optimal` is measured."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
+    """Angle between fibres and tendon at optimal fibre length; 0 is parallel."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
+    """Angle that the fibres do not go beyond; it bounds their length from below."""

@@ -40,19 +40,28 @@ class Muscle(PathActuator, abstract=True):
         GeometryPath, name="path", appearance=lambda: Appearance.build({"color": (0.8, 0.1, 0.1)}, set())
     )
     max_isometric_force: Annotated[float, real("N", "> 0")] = 1000.0
+    """Force of fully active fibres at optimal length and rest; all forces are measured by it."""
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
+    """Fibre length at which the active force is greatest; all fibre lengths are measured by it."""
     tendon_slack_length: Annotated[float, real("m", "> 0")] = 0.2
+    """Length up to which the tendon is slack; all tendon lengths are measured by it."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
+    """Angle between fibres and tendon at optimal fibre length; 0 is parallel."""
     max_contraction_velocity: Annotated[float, real("optimal_fiber_length/s", "> 0")] = 10.0
+    """Shortening velocity at which fully active fibres bear no force."""
     ignore_tendon_compliance: Flag = False
+    """Whether the tendon is rigid, always at its slack length, so that fibre length is no state."""
     ignore_activation_dynamics: Flag = False
+    """Whether activation is the control at every moment, and no state."""
 
 
 class ActivationFiberLengthMuscle(Muscle, abstract=True):
     """A muscle with two states: activation and fibre length."""
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
+    """Activation at the start of a simulation."""
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
+    """Fibre length at the start, unless a tool brings fibre and tendon into equilibrium."""
 
 
 class Thelen2003Muscle(ActivationFiberLengthMuscle):
@@ -65,16 +74,27 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
 
     min_control: Number = 0.01
     FmaxTendonStrain: Annotated[float, real(domain="> 0")] = 0.04
+    """Strain at which the tendon bears `max_isometric_force`."""
     FmaxMuscleStrain: Annotated[float, real(domain="> 0")] = 0.6
+    """Strain at which the passive fibre bears `max_isometric_force`."""
     KshapeActive: Annotated[float, real(domain="> 0")] = 0.45
+    """Width of the active force over fibre length l, exp(-(l - 1)^2 / KshapeActive)."""
     KshapePassive: Annotated[float, real(domain="> 0")] = 5.0
+    """Exponent of the passive force at full strain; more makes a softer toe."""
     Af: Annotated[float, real(domain="> 0")] = 0.25
+    """Shape of force over velocity (Hill's a / F0); less is more curved."""
     Flen: Annotated[float, real(domain="> 1")] = 1.4
+    """Force that lengthening fibres approach, of the isometric one."""
     fv_linear_extrap_threshold: Annotated[float, real(domain="> 0")] = 0.95
+    """Part of `Flen` from which force over velocity goes on as a line; more than 1 / `Flen`."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
+    """Angle that the fibres do not go beyond; it bounds their length from below."""
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
+    """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.05
+    """Time constant of falling activation; high activation speeds it up."""
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
+    """Activation below which the muscle does not go; `min_control` must not be less."""
 
 
 class Millard2012EquilibriumMuscle(Muscle):
@@ -87,79 +107,124 @@ class Millard2012EquilibriumMuscle(Muscle):
 
     min_control: Number = 0.01
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.1
+    """Damping force of the fibre over `max_isometric_force`, per normalised velocity; none below 0.001."""
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
+    """Activation at the start of a simulation."""
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
+    """Fibre length at the start, unless a tool brings fibre and tendon into equilibrium."""
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
+    """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
+    """Time constant of falling activation; high activation speeds it up."""
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
+    """Activation below which the muscle does not go; below 0.01 only with fibre damping or a rigid tendon."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
+    """Angle that the fibres do not go beyond; it bounds their length from below."""
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve"
     )
+    """Active force over fibre length."""
     force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
+    """Factor of the active force over fibre velocity."""
     fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
+    """Passive force of the fibre over its length."""
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
+    """Force of the tendon over its length."""
 
 
 class Millard2012AccelerationMuscle(Muscle):
     """The muscle of Millard et al. (2013) with a mass between fibre and tendon, whose place and speed are states."""
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.0
+    """Activation at the start of a simulation."""
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
+    """Fibre length at the start, unless a tool brings fibre and tendon into equilibrium."""
     default_fiber_velocity: Number = 0.0
+    """Fibre velocity at the start of a simulation; lengthening is positive."""
     muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = made(
         MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
     )
+    """How activation follows the control."""
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
     )
+    """Active force over fibre length."""
     force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
+    """Factor of the active force over fibre velocity."""
     fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
+    """Passive force of the fibre over its length."""
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
+    """Force of the tendon over its length."""
     fiber_compressive_force_length_curve: Unnamed[FiberCompressiveForceLengthCurve] = made(
         FiberCompressiveForceLengthCurve, name="default_FiberCompressiveForceLengthCurve"
     )
+    """Force along the fibre that keeps it from becoming too short."""
     fiber_compressive_force_cos_pennation_curve: Unnamed[FiberCompressiveForceCosPennationCurve] = made(
         FiberCompressiveForceCosPennationCurve, name="default_FiberCompressiveForceCosPennationCurve"
     )
+    """Force along the tendon that keeps fibres from standing across it."""
     tendon_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.1
+    """The c of 1 + c v, by which the normalised velocity v raises the tendon's force."""
     fiber_compressive_force_length_damping: Annotated[float, real(domain=">= 0")] = 1.0
+    """The c of 1 - c v, by which shortening raises the force against short fibres."""
     fiber_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.01
+    """The c of 1 + c v, by which the normalised velocity v raises the passive force."""
     fiber_compressive_force_cos_pennation_damping: Annotated[float, real(domain=">= 0")] = 1.0
+    """The c of 1 - c v, by which shortening raises the force against steep fibres."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.01
+    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
     mass: Annotated[float, real(domain="> 0")] = 0.1
+    """Mass that moves between fibre and tendon."""
 
 
 class DeGrooteFregly2016Muscle(Muscle):
     """The muscle of De Groote et al. (2016), smooth everywhere, made for direct collocation."""
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
+    """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.06
+    """Time constant of falling activation; high activation speeds it up."""
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.5
+    """Activation at the start of a simulation."""
     default_normalized_tendon_force: Annotated[float, real(domain=">= 0")] = 0.5
+    """Tendon force over `max_isometric_force` at the start, at most 5; it is the state."""
     active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
+    """Factor of the width of the active force over fibre length."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
+    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
     passive_fiber_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.6
+    """Strain at which the passive fibre bears `max_isometric_force`."""
     tendon_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
+    """Strain at which the tendon bears `max_isometric_force`."""
     ignore_passive_fiber_force: Flag = False
+    """Whether passive fibres bear no force."""
     tendon_compliance_dynamics_mode: Annotated[str, word("explicit", "implicit")] = "explicit"
+    """Form of the equilibrium of fibre and tendon; implicit is for direct collocation only."""
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
+    """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
 
 class MeyerFregly2016Muscle(Muscle):
     """A rigid-tendon muscle with the curves of Meyer et al. (2016)."""
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
+    """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.06
+    """Time constant of falling activation; high activation speeds it up."""
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.5
+    """Activation at the start of a simulation."""
     active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
+    """Factor of the width of the active force over fibre length."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
+    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
     ignore_passive_fiber_force: Flag = False
+    """Whether passive fibres bear no force."""
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
+    """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
 
 class RigidTendonMuscle(Muscle):
@@ -168,7 +233,10 @@ class RigidTendonMuscle(Muscle):
     active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")
     )
+    """Active force over fibre length, both normalised."""
     passive_force_length_curve: Single[Function] = Field(
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
+    """Passive force over fibre length, both normalised; kept between 0 and 10."""
     force_velocity_curve: Single[Function] = Field(default_factory=partial(force_velocity, "force_velocity_curve"))
+    """Factor of the active force over fibre velocity, normalised."""
