@@ -21,6 +21,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.run import Simulation
 from osimlite.sweep.plan import Plan
+from osimlite.sweep.renewal import Renewal, Variant
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
 
 MOST_KEPT = 64
