@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,11 @@ def test_threads_do_not_matter(engine, starts):
     assert one.events == two.events
     alone = [run_many(engine, start[None], 1.0).states[0] for start in starts]
     assert np.array_equal(one.states, alone)
+
+
+def test_an_engine_goes_to_another_process(engine, starts):
+    other = pickle.loads(pickle.dumps(engine))
+    assert np.array_equal(run_many(other, starts[:2], 1.0).states, run_many(engine, starts[:2], 1.0).states)
 
 
 def test_other_numbers_need_no_other_code(engine, starts, walker, fixtures):

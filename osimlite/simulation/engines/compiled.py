@@ -85,6 +85,10 @@ class CompiledEngine:
         self._addresses = tuple(part.ctypes.data for part in (self._w, self._y, self._f))
         self.program_address: int = self.program.ctypes.data
 
+    def __reduce__(self) -> Any:
+        # Addresses mean nothing in another process.
+        return CompiledEngine, (self.mechanism, self.forces)
+
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
         """(qdot, udot) at a state."""

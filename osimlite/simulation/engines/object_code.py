@@ -101,8 +101,13 @@ def _processor() -> tuple[str, str]:
 
 def _file(name: str, digest: str) -> str:
     """What a file is called."""
-    told = digest, version("numba"), version("llvmlite"), sys.platform, *_processor()
-    return f"{name}-{hashlib.sha256(repr(told).encode()).hexdigest()[:16]}.code"
+    return f"{name}-{hashlib.sha256(f'{digest} {_makers()}'.encode()).hexdigest()[:16]}.code"
+
+
+@cache
+def _makers() -> str:
+    """What made the code, and for what."""
+    return repr((version("numba"), version("llvmlite"), sys.platform, *_processor()))
 
 
 def _folders() -> Iterator[Path]:

@@ -379,6 +379,8 @@ def note_events(
         low, high = t0, t1
         while high - low > TIME_OF_EVENT:
             middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
             cubic(size, t0, y0, f0, t1, y1, f1, middle, ya)
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
             evaluated(m, middle, ya, fa, TOUCHED if touch else PLACED)
