@@ -85,6 +85,9 @@ def _nearest(mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int
     search = _Search(mechanism, wanted, time, held)
     q = search.restored(search.start)
     for _ in range(_STEPS):
+        if search.cost(q) < _TOLERANCE**2:
+            # Nothing that counts has moved.
+            return q
         step = search.step(q)
         if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
             return q

@@ -156,6 +156,7 @@ class Simulation:
         self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
         self.state = FreeState(self.mechanism, self.engine.order)
         self._constraints = Constrained(self.mechanism, self.engine.order).names
+        self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._settings = {
             "skip_unsupported": skip_unsupported,
             "simbody_early_return": simbody_early_return,
@@ -244,8 +245,12 @@ class Simulation:
                 row[place] = float(value)
                 places[-1].append(place)
         if self._constraints:
-            values, rates = kept_state(self.mechanism, q, u, *places)
-            return self.state.pack(values.tolist(), rates.tolist())
+            # To find the nearest pose can take as long as the motion: the same start is not looked for again.
+            start = (q, u, places)
+            if self._start is None or self._start[0] != start:
+                values, rates = kept_state(self.mechanism, q, u, *places)
+                self._start = start, (values.tolist(), rates.tolist())
+            return self.state.pack(*self._start[1])
         return self.state.pack(q, u)
 
     def _trajectory(
