@@ -17,7 +17,7 @@ from osimlite.gait.footing import Footing, find_footing
 from osimlite.simulation.engines.batch import NO_LIMIT
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
-from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import ENDINGS, Runs, Watch, contact_places, contact_radii, run_many
 
 SHORTEST = 0.05
@@ -163,9 +163,7 @@ def walks_of(
     moments = np.concatenate([starts, *runs.event_states])
     rows = np.concatenate([row_of, np.repeat(row_of, counts)]).astype(np.int64)
     reached, depths = along_slope(engine, moments, vectors, rows)
-    places = {name: k for k, name in enumerate(engine.contacts)}
-    feet = [np.array([places[contact] for contact in foot]) for foot in footing.feet]
-    fatal = np.array([places[contact] for contact in footing.falls], dtype=np.int64)
+    fatal = np.array([engine.contacts.index(contact) for contact in footing.falls], dtype=np.int64)
     ends = np.cumsum([len(starts), *counts])
     found = []
     for k, events in enumerate(runs.events):
@@ -174,7 +172,7 @@ def walks_of(
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
             found.append(Walk(0.0, "fell", contact))
             continue
-        walk = _follow(footing, feet, places, events, runs.event_states[k], reached[part], depths[k] > 0.0)
+        walk = follow(footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0)
         if walk.walks:
             ending = ENDINGS[int(runs.endings[k])]
             walk.end = float(runs.times[k])
@@ -185,16 +183,26 @@ def walks_of(
     return found
 
 
-def _follow(
+def follow(
     footing: Footing,
-    feet: Sequence[Ints],
-    places: dict[str, int],
+    contacts: Sequence[str],
     events: Sequence[tuple[float, str, bool]],
     states: Floats,
     reached: Floats,
     touching: NDArray[np.bool_],
 ) -> Walk:
-    """Go through the events of one run."""
+    """Go through the events of one run, which may come from any simulation.
+
+    Args:
+        footing: the feet.
+        contacts: names of the columns (P).
+        events: in the order of time: time (s), contact, whether it begins.
+        states: at the events (as many, any number of columns).
+        reached: how far down the slope each contact is at the events (as many, P), m.
+        touching: which contacts push at the start (P,).
+    """
+    places = {name: place for place, name in enumerate(contacts)}
+    feet = [np.array([places[contact] for contact in foot]) for foot in footing.feet]
     walk, foot_of = Walk(), footing.foot_of
     down = [{name for name in foot if touching[places[name]]} for foot in footing.feet]
     lifted = [0.0] * len(feet)

@@ -13,8 +13,9 @@ from osimlite.simulation import Simulation
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
+from osimlite.gait import steps
 from osimlite.gait.footing import Footing, find_footing
-from osimlite.gait.steps import Walk, _follow, along_slope, walk_many
+from osimlite.gait.steps import Walk, along_slope, walk_many
 from osimlite.simulation.run import simulate
 
 FEET = (("RFootForce",), ("LFootForce",))
@@ -86,11 +87,10 @@ def test_places_along_the_slope(engine):
 
 
 def follow(events, along, touching=(False, False)) -> Walk:
-    places = {"RFootForce": 0, "LFootForce": 1, "RHipForce": 2}
-    feet = [np.array([0]), np.array([1])]
+    contacts = ["RFootForce", "LFootForce", "RHipForce"]
     states = np.arange(len(events), dtype=float)[:, None]
-    return _follow(
-        Footing(FEET, ("RHipForce",)), feet, places, events, states, np.array(along), np.array((*touching, False))
+    return steps.follow(
+        Footing(FEET, ("RHipForce",)), contacts, events, states, np.array(along), np.array((*touching, False))
     )
 
 
@@ -127,10 +127,9 @@ def test_what_is_a_step():
 def test_a_heel_and_a_toe_are_one_foot():
     events = [(0.1, "heel", True), (0.2, "toe", True), (0.5, "heel", False), (0.6, "toe", False), (0.9, "heel", True)]
     footing = Footing((("heel", "toe"), ("other",)), ())
-    walk = _follow(
+    walk = steps.follow(
         footing,
-        [np.array([0, 1]), np.array([2])],
-        {"heel": 0, "toe": 1, "other": 2},
+        ["heel", "toe", "other"],
         events,
         np.zeros((5, 1)),
         np.array([[0.3, 0.5, 0.0]] * 4 + [[0.8, 0.9, 0.0]]),

@@ -1,0 +1,183 @@
+"""The walking models of the library, confirmed by OpenSim itself, and how much they put up with.
+
+OpenSim reads the file that `osimlite build` writes and walks for 60 s; what touches the slope is read off the contact
+forces that it reports at every step of its integrator. Then osimlite: Floquet multipliers, random starts near the
+cycle, and how far each property that was changed may move, alone, while the walk goes on for 60 s.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import opensim
+from rich.console import Console
+from rich.table import Table
+
+import osimlite
+from osimlite.gait.basin import perturbed, walks_from
+from osimlite.gait.cycle import find_cycle
+from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.stepmap import StepMap
+from osimlite.gait.steps import Walk, follow, walk_many
+from osimlite.models.source import make_model
+from osimlite.simulation import Simulation
+
+TO = 60.0
+CONFIRMED = {"steady-walker": 1e-8, "human-walker": 1e-6}
+"""Accuracy at which OpenSim walks."""
+
+CHANGED: dict[str, dict[str, float]] = {"steady-walker": {"shank_inertia": 0.091, "foot_ahead": 0.072}}
+FINEST = 1e-3
+"""A margin is found to this part of the property's value."""
+
+
+def main() -> None:
+    console = Console()
+    names = sys.argv[1:] or list(CONFIRMED)
+    console.print(confirmation(names))
+    console.print(near(names))
+    console.print(margins(names))
+
+
+def confirmation(names: list[str]) -> Table:
+    table = Table(title=f"Walking for {TO:g} s")
+    for heading in ("model", "accuracy", "program", "steps", "scuffs", "way (m)", "ends", "time taken (s)"):
+        table.add_column(heading, justify="left" if heading in ("model", "program", "ends") else "right")
+    for name in names:
+        accuracy = CONFIRMED[name]
+        for program, run in (("OpenSim", opensim_walk), ("osimlite", our_walk)):
+            began = time.process_time()
+            walk = run(make_model(name), TO, accuracy)
+            taken = time.process_time() - began
+            ends = walk.ending if walk.walks else f"fell on {walk.fell_on} at {walk.end:.2f} s"
+            numbers = f"{len(walk.steps)}", f"{len(walk.scuffs)}", f"{walk.distance:.4f}"
+            table.add_row(name, f"{accuracy:g}", program, *numbers, ends, f"{taken:.2f}")
+    return table
+
+
+def our_walk(model: osimlite.Model, to: float, accuracy: float) -> Walk:
+    with Simulation(model, "compiled") as simulation:
+        engine: Any = simulation.engine
+        (walk,) = walk_many(engine, [simulation.initial_state({}, {})], to, accuracy=accuracy)
+        return walk
+
+
+def opensim_walk(model: osimlite.Model, to: float, accuracy: float) -> Walk:
+    """What OpenSim makes of the model's file; steps and scuffs by the rules of osimlite, from OpenSim's forces."""
+    opensim.Logger.setLevelString("off")
+    with Simulation(model, "compiled") as simulation:
+        engine: Any = simulation.engine
+        footing = find_footing(engine)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "walker.osim"
+        osimlite.write(model, path)
+        theirs = opensim.Model(str(path))
+    reporter = opensim.ForceReporter(theirs)
+    theirs.addAnalysis(reporter)
+    state = theirs.initSystem()
+    manager = opensim.Manager(theirs)
+    manager.setIntegratorAccuracy(accuracy)
+    manager.initialize(state)
+    manager.integrate(to)
+    return _read_off(theirs, reporter.getForcesTable(), manager.getStatesTable(), footing)
+
+
+def _read_off(model: Any, forces: Any, states: Any, footing: Footing) -> Walk:
+    times = np.array(forces.getIndependentColumn())
+    labels = list(forces.getColumnLabels())
+    matrix = forces.getMatrix().to_numpy()
+    contacts = [contact for foot in footing.feet for contact in foot] + list(footing.falls)
+    touching = {}
+    for contact in contacts:
+        own = [k for k, label in enumerate(labels) if label.startswith(f"{contact}.") and ".force." in label]
+        touching[contact] = np.abs(matrix[:, own]).max(axis=1) > 0.0
+    trajectory = opensim.StatesTrajectory.createFromStatesTable(model, states)
+    moments = np.array(states.getIndependentColumn())
+    events, along = [], []
+    for k in range(1, len(times)):
+        for contact in contacts:
+            if touching[contact][k] != touching[contact][k - 1]:
+                events.append((float(times[k]), contact, bool(touching[contact][k])))
+                state = trajectory.get(int(np.argmin(np.abs(moments - times[k]))))
+                along.append([_along(model, state, contact) for contact in contacts])
+    first = np.array([touching[contact][0] for contact in contacts])
+    walk = follow(footing, contacts, events, np.zeros((len(events), 0)), np.array(along), first)
+    if walk.walks:
+        walk.end = float(times[-1])
+    return walk
+
+
+def _along(model: Any, state: Any, contact: str) -> float:
+    """How far down the slope OpenSim has the sphere of a contact, m."""
+    model.realizePosition(state)
+    force = opensim.HuntCrossleyForce.safeDownCast(model.getForceSet().get(contact))
+    geometry = force.get_contact_parameters().get(0).get_geometry
+    sphere, plane = (model.getContactGeometrySet().get(geometry(k)) for k in (0, 1))
+    center = sphere.getFrame().findStationLocationInGround(state, sphere.get_location())
+    axes = plane.getFrame().getTransformInGround(state).R()
+    # The half space lies along +x of its own frame, which the file turns about z.
+    turn = float(plane.get_orientation().get(2)) + np.arctan2(axes.get(1, 0), axes.get(0, 0))
+    normal = -np.array((np.cos(turn), np.sin(turn)))
+    down = np.array((0.0, -1.0)) + normal * normal[1]
+    return float((center.get(0) * down[0] + center.get(1) * down[1]) / np.hypot(*down))
+
+
+def near(names: list[str]) -> Table:
+    table = Table(title="The cycle, and 60 random starts near it")
+    headings = ("model", "step (m)", "period (s)", "speed (m/s)", "fixed to", "largest multipliers", "5 %", "10 %")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "model" else "right")
+    for name in names:
+        with Simulation(make_model(name), "compiled") as simulation:
+            engine: Any = simulation.engine
+            step_map = StepMap(engine, simulation.initial_state({}, {}), accuracy=1e-12)
+            cycle = find_cycle(step_map)
+            walks = [walks_from(step_map, cycle, perturbed(step_map, cycle, part, 60, 0), 20) for part in (0.05, 0.1)]
+            table.add_row(
+                name,
+                f"{cycle.length:.6f}",
+                f"{cycle.period:.6f}",
+                f"{cycle.speed:.6f}",
+                f"{cycle.residual:.1g}",
+                ", ".join(f"{size:.4f}" for size in np.abs(cycle.multipliers[:3])),
+                *(f"{sum(len(walk.steps) >= 20 for walk in some)}" for some in walks),
+            )
+    return table
+
+
+def margins(names: list[str]) -> Table:
+    table = Table(title=f"How far each changed property may move alone, from the same start, for {TO:g} s")
+    for heading in ("model", "property", "least", "value", "most"):
+        table.add_column(heading, justify="left" if heading in ("model", "property") else "right")
+    for name in names:
+        for parameter, value in CHANGED.get(name, {}).items():
+
+            def walks(number: float, name: str = name, parameter: str = parameter) -> bool:
+                return our_walk(make_model(name, {parameter: repr(number)}), TO, 1e-6).walks
+
+            least, most = (_edge(walks, value, side) for side in (-1.0, 1.0))
+            table.add_row(name, parameter, f"{least:.4g}", f"{value:g}", f"{most:.4g}")
+    return table
+
+
+def _edge(walks: Callable[[float], bool], value: float, side: float) -> float:
+    """The last value that walks, going away from one that does until one does not, then halving."""
+    good, step = value, 0.01 * abs(value)
+    while walks(good + side * step) and step < abs(value):
+        good += side * step
+        step *= 1.5
+    bad = good + side * step
+    while abs(bad - good) > FINEST * abs(value):
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if walks(middle) else (good, middle)
+    return good
+
+
+if __name__ == "__main__":
+    main()

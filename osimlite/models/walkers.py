@@ -1,0 +1,64 @@
+"""Walkers that walk, and the exercise's own from the start from which it gets furthest.
+
+Each is the model of the exercise (:func:`osimlite.models.dynamic_walker.dynamic_walker`) with few other numbers, and
+starts at its default values and speeds in the middle of a step. ``docs/gaits.md`` tells how they were found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.contact import ContactSphere
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import Body
+from osimlite.schema.geometry import Brick
+from osimlite.schema.model import Model
+
+STEADY_START = {
+    "Pelvis_ty": (0.8870024144342886, 0.06277540570143135),
+    "Pelvis_tx": (0.0, 0.3280729681277193),
+    "RHip_rz": (0.07395818266607702, -0.37911635605573263),
+    "LHip_rz": (0.5735902364983329, 3.2771753211504695),
+    "RKnee_rz": (0.08031330630713877, 0.06578201741772846),
+    "LKnee_rz": (-1.3764721715934252, -1.229888719685166),
+}
+"""Value and speed of each coordinate on the cycle of the steady walker, 0.4 of a step after a heel strike."""
+
+
+def steady_walker(shank_inertia: float = 0.091, foot_ahead: float = 0.072) -> Model:
+    """Build the walker that differs from the exercise in two properties and never stops.
+
+    Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and its feet stand out
+    to the front (not at all in the exercise). It walks down the exercise's slope of 10 degrees.
+
+    Args:
+        shank_inertia: of each shank about its mass centre and the axis of the knee (kg·m²).
+        foot_ahead: how far the sphere of each foot is in front of the shank's axis (m).
+    """
+    model = dynamic_walker()
+    model.name = "SteadyWalker"
+    for body in model.components(Body):
+        if body.name.endswith("Shank"):
+            body.inertia = (1.0, 1.0, shank_inertia, 0.0, 0.0, 0.0)
+    for sphere in model.components(ContactSphere):
+        if sphere.name.endswith("FootContact"):
+            _, y, z = sphere.location
+            sphere.location = (foot_ahead, y, z)
+    return _ready(model, STEADY_START, 100.0)
+
+
+def _ready(model: Model, start: Mapping[str, tuple[float, float]], way: float) -> Model:
+    """Put the start in, and make room for so long a way (m)."""
+    for coordinate in model.components(Coordinate):
+        if coordinate.name in start:
+            coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]
+        if coordinate.name == "Pelvis_tx":
+            coordinate.range = (-1.0, way)
+        elif coordinate.name.endswith("Knee_rz"):
+            # The knees give way a little beyond straight.
+            coordinate.range = (coordinate.range[0], 0.5)
+    for platform in model.components(Brick):
+        _, thickness, width = platform.half_lengths
+        platform.half_lengths = (way, thickness, width)
+    return model
