@@ -10,7 +10,8 @@ from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.schema.base import Object, field_specs
+from osimlite.schema.base import Component, Object, field_specs
+from osimlite.schema.forces import Force
 from osimlite.text import nearest
 
 
@@ -115,6 +116,67 @@ def defaults_block(subject: Subject, found: Found) -> None:
     elif number is not None:
         fix = without_element(source, number)
         found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
+
+
+@rule("OSIM111", "force-outside-set", severity=INFO)
+def force_outside_set(subject: Subject, found: Found) -> None:
+    """Forces stand elsewhere than in the ForceSet.
+
+    ## What it does
+    Reports forces, actuators and muscles among the `<components>` of the model or of another part of it, or in its
+    ComponentSet: once for each such place.
+
+    ## Why is this bad
+    They act. But OpenSim's lists of forces, actuators and muscles go through the ForceSet alone, so that controllers,
+    probes, static optimization and CMC do not see a muscle that stands elsewhere.
+
+    ## Example
+    ```xml
+    <components>
+        <PathSpring name="band">
+            <GeometryPath name="path">
+                <PathPointSet>
+                    <objects>
+                        <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                        <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                    </objects>
+                </PathPointSet>
+            </GeometryPath>
+            <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+        </PathSpring>
+    </components>
+    ```
+
+    ## Use instead
+    ```xml
+    <PathSpring name="band">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+    """
+    places: dict[int, list[Component]] = {}
+    for force in subject.each(Force):
+        above = subject.tree.parent_of(force)
+        if above is not None and subject.model is not None and above is not subject.model.force_set:
+            places.setdefault(id(above), []).append(force)
+    for forces in places.values():
+        first, others = forces[0], len(forces) - 1
+        more = f" and {others} more" if others else ""
+        found(
+            f"{called(first)}{more} {'stand' if others else 'stands'} outside the ForceSet: "
+            f"{'they act' if others else 'it acts'}, and what asks the model for its forces or muscles does not find "
+            + ("them" if others else "it"),
+            first,
+            attribute="name",
+        )
 
 
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")

@@ -146,10 +146,13 @@ def missing_name(subject: Subject, found: Found) -> None:
     ```
     """
     tree = subject.tree
+    # What the file does not name has got a name while it was upgraded, as OpenSim does. It is looked at if others name
+    # what is not there.
+    renamed = subject.upgraded and any(broken.why in ("missing", "form") for broken in broken_references(subject))
     for component in tree.components:
-        # What the file does not name has got a name while it was upgraded, as OpenSim does.
-        named = component.name and (not subject.upgraded or subject.names_itself(component))
-        if named or isinstance(component, (Model, ModelComponentSet)):
+        if component.name and not (renamed and not subject.names_itself(component)):
+            continue
+        if isinstance(component, (Model, ModelComponentSet)):
             continue
         frame = isinstance(component, PhysicalOffsetFrame) and isinstance(tree.parent_of(component), Joint)
         if not frame and not _should_have_name(subject, component):

@@ -54,6 +54,8 @@ def unknown_tag(subject: Subject, found: Found) -> None:
             message += f" and keeps the default of {suggestion}{kept}" if suggestion not in _present(owner) else ""
         elif note.value is not None:
             message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
+            home = _set_for(note.value)
+            message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
         else:
             homes = _homes(note.word)
             message += f": it is a property of {listed(homes, most=3)}" if homes else ""
