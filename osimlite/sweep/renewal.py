@@ -91,12 +91,12 @@ class Renewal:
         forces = replace(
             self._forces, elements=tuple(made.get(element.path, element) for element in self._forces.elements)
         )
-        if all(isinstance(owner, Force) for owner in owners):
-            mechanism, numbers = self._mechanism, self._with_forces(made)
-        else:
-            mechanism = self._with_masses()
-            numbers = None if mechanism is None else self._packed(mechanism, forces)
-        if mechanism is None or numbers is None:
+        only_forces = all(isinstance(owner, Force) for owner in owners)
+        mechanism = self._mechanism if only_forces else self._with_masses()
+        if mechanism is None:
+            return None
+        numbers = self._with_forces(made) if only_forces else self._packed(mechanism, forces)
+        if numbers is None:
             return None
         start, structure = self._given.start, self._given.structure
         return Variant(start, structure, numbers, lambda: engine_factory("compiled")(mechanism, forces, Settings()))
