@@ -18,6 +18,7 @@ Kind = Literal["tag", "closing tag", "attribute", "text", "comment"]
 _TAG_NAME = re.compile(r"[^\s/<>!?\"'&=]*")
 _NAME_GIVEN = re.compile(r"\sname\s*=\s*([\"'])(.*?)\1", re.DOTALL)
 _ATTRIBUTE_VALUE = re.compile(r"([^\s=\"'<>/]+)\s*=\s*([\"'])([^\"'<]*)$")
+_SPECIAL = re.compile(r"<[!?]")
 _WORD = re.compile(r"[^\s<>]*")
 
 
@@ -84,12 +85,14 @@ def cursor_at(text: str, offset: int) -> Cursor:
         elif piece.kind == "close":
             _close(stack, piece)
         count += piece.kind in ("open", "empty")
-    start = text.rfind("<", behind, offset)
     around = tuple(stack)
+    special = _SPECIAL.search(text, behind, offset)
+    if special is not None:
+        # What begins so and has ended is behind already.
+        return Cursor("comment", around, special.start(), offset, "")
+    start = text.rfind("<", behind, offset)
     if start < 0:
         return _in_text(text, offset, behind, around)
-    if text.startswith(("<!", "<?"), start):
-        return Cursor("comment", around, start, offset, "")
     if text.startswith("</", start):
         name = _TAG_NAME.match(text, start + 2)
         assert name is not None

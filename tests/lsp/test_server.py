@@ -122,7 +122,9 @@ async def test_what_a_word_means(client, walker: File) -> None:
 
     assert "/forceset/RFootForce" in await hover('<HuntCrossleyForce name="RFootForce"', 3)
     assert "Hertz" in await hover('<HuntCrossleyForce name="RFootForce"', 3)
-    assert "one number in m/s, > 0; by default `0.01`" in await hover("<transition_velocity>", 4)
+    velocity = await hover("<transition_velocity>", 4)
+    assert "one number in m/s, > 0; by default `0.01`" in velocity
+    assert "Slip at which friction is static" in velocity
     assert "ContactSphere `/contactgeometryset/RFootContact`" in await hover("RFootContact Platform", 4)
     assert await hover("<?xml", 2) == ""
 
