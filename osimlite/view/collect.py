@@ -195,10 +195,10 @@ class _Collector:
                 own, size = surfaces.ball(), _stretched(surface.dimensions)
             case wrapping.WrapCylinder():
                 own, size = surfaces.tube(), _stretched((surface.radius, surface.radius, surface.length))
-            case wrapping.WrapTorus() if surface.outer_radius + surface.inner_radius > 0.0:
-                middle = 0.5 * (surface.outer_radius + surface.inner_radius)
-                own = surfaces.ring(0.5 * (surface.outer_radius - surface.inner_radius) / middle)
-                size = _stretched((middle,) * 3)
+            case wrapping.WrapTorus() if surface.outer_radius > 0.0:
+                # In spite of their names: the radius of the tube, and that of the circle in its middle.
+                own = surfaces.ring(surface.inner_radius / surface.outer_radius)
+                size = _stretched((surface.outer_radius,) * 3)
             case _:
                 raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")
         look = surface.appearance

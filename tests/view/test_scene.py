@@ -9,6 +9,7 @@ from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus
+from osimlite.schema.wrapping import WrapTorus
 from osimlite.view import surfaces
 from osimlite.view.collect import build_scene
 
@@ -125,6 +126,20 @@ def test_contact_surfaces_are_where_the_forces_find_them():
     assert mechanism.bodies[ground.body].name == "Platform"
     normal = -ground.matrix[:3, 0] / np.linalg.norm(ground.matrix[:3, 0])
     assert np.abs(normal - (0.0, 1.0, 0.0)).max() < 1e-3
+
+
+def test_a_torus_to_wrap_around_is_where_paths_touch_it():
+    """OpenSim 4.6 bends a path around a tube of the inner radius, about a circle of the outer one."""
+    model = dynamic_walker()
+    model.body_set.objects[1].wrap_object_set.objects.append(
+        WrapTorus(name="ring", inner_radius=0.01, outer_radius=0.05)
+    )
+    scene, _ = scene_of(model)
+    (item,) = (item for item in scene.items if item.path.endswith("/ring"))
+    x, y, z = (scene.surfaces[item.surface].points @ item.matrix[:3, :3].T).T
+    assert np.hypot(x, y).max() == pytest.approx(0.06)
+    assert np.hypot(x, y).min() == pytest.approx(0.04)
+    assert np.abs(z).max() == pytest.approx(0.01)
 
 
 def test_scenery_does_not_count_for_the_size_of_a_model():
