@@ -89,7 +89,7 @@ def _component(cls: type[Object]) -> str:
     lines = [f"### {cls.tag}", "", _text(described(cls))]
     specs = [spec for spec in cls.field_specs().values() if spec.tag != "components"]
     if specs:
-        lines += ["", "| property | holds | default | |", "|---|---|---|---|"]
+        lines += ["", "| property | holds | default | meaning |", "|---|---|---|---|"]
         for spec in specs:
             meaning = _cell(meaning_of(spec))
             lines.append(f"| `{spec.tag}` | {_cell(value_of(spec))} | {_default(spec)} | {meaning} |")
