@@ -188,6 +188,8 @@ class ObjectReader:
                 values[field_name] = self._owned(child, spec.accepts)
             else:
                 members = self._members(child, spec, late)
+                for left_out in members[1:]:
+                    late.append(("duplicate-tag", left_out._index, left_out.tag, spec, None))
                 optional = isinstance(spec.kind, Held) and spec.kind.form == "optional"
                 if members and not optional:
                     # The object of a property is called as the property is, also in the long form.

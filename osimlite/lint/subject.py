@@ -123,8 +123,12 @@ class Subject:
         return Unknown in self.by_class
 
     def owner(self, item: Object) -> Component:
-        """The component an object belongs to."""
-        return self.tree.owner_of(item)
+        """The component an object belongs to; the model, of one that OpenSim leaves out."""
+        try:
+            return self.tree.owner_of(item)
+        except KeyError:
+            assert self.model is not None
+            return self.model
 
     def path(self, item: Object | None) -> str:
         """The absolute path of the component an object belongs to."""

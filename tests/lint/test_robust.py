@@ -109,3 +109,19 @@ def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
     for number, span in enumerate(source.spans):
         if number > 1 and span.tag != tag and (span.tag not in known or span.tag in ("Coordinate", "PinJoint", "Body")):
             assert validate(Source(renamed(source, number, tag).encode())).findings
+
+
+@pytest.mark.parametrize(
+    "scrap",
+    [
+        # Values with faults in objects that stand nowhere in the model that OpenSim makes of the text.
+        "<prescribed_function><Constant/><Constant><value>1,5</value></Constant></prescribed_function>",
+        "<prescribed_function><Constant/><SimmSpline><x>0 a</x></SimmSpline></prescribed_function>",
+        "<prescribed_function><Plugin/><Constant><value>x</value></Constant></prescribed_function>",
+    ],
+)
+def test_what_opensim_leaves_out_has_findings_too(scrap):
+    text = TEXTS[0].replace("<range>-2.1 0</range>", f"<range>-2.1 0</range>{scrap}")
+    assert validate(Source(text.encode())).errors
+    text = TEXTS[0].replace("</Model>", f'<defaults><Coordinate name="default">{scrap}</Coordinate></defaults></Model>')
+    assert validate(Source(text.encode())).findings

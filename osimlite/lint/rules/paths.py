@@ -128,7 +128,7 @@ def inverted_point_range(subject: Subject, found: Found) -> None:
     """A conditional path point is never in the path.
 
     ## What it does
-    Reports conditional points whose range ends before it begins.
+    Reports conditional points whose range ends before it begins, and those without any.
 
     ## Why is this bad
     The coordinate is never inside, so that the path always leaves the point out.
@@ -179,6 +179,8 @@ def inverted_point_range(subject: Subject, found: Found) -> None:
                 point,
                 tag="range",
             )
+        elif "range" not in point.model_fields_set:
+            found(f"{called(point)} has no range: it counts only where the coordinate is exactly 0", point, tag="range")
 
 
 @rule("OSIM614", "unused-wrap-object", severity=INFO)

@@ -178,6 +178,15 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
         taken = "" if isinstance(note.spec.kind, Held) else f", {shown(value)},"
+        if note.word != note.spec.tag:
+            found(
+                f"<{note.spec.tag}> of {called(owner)} holds one object; OpenSim takes the first and ignores this "
+                f"{note.word}",
+                owner,
+                number=note.number,
+                fix=without_element(subject.source, note.number),
+            )
+            continue
         found(
             f"{called(owner)} has <{note.word}> more than once; OpenSim takes the first{taken} and ignores this one",
             owner,
