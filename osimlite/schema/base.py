@@ -6,7 +6,7 @@ import copy
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast, dataclass_transform, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -79,7 +79,9 @@ def made(cls: type[Object], **values: Any) -> Any:
     )
 
 
-# A docstring of its own would stand in the place of the property.
+# A docstring of its own would stand in the place of the property. Type checkers see the arguments of constructors only
+# if the very metaclass is decorated, not one that it derives from.
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
 class ObjectType(ModelMetaclass):  # noqa: D101
     @property
     def __doc__(cls) -> str | None:  # type: ignore[override]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -151,7 +152,7 @@ SHAPES = {
     ),
 }
 DAMPED = {"rotational_damping": (0.1, 0.2, 0.3), "translational_damping": (0.4, 0.5, 0.6)}
-SPRING = {"resting_length": 0.4, "stiffness": 50.0, "dissipation": 0.2}
+SPRING: dict[str, Any] = {"resting_length": 0.4, "stiffness": 50.0, "dissipation": 0.2}
 FORMULA = "3*q^2 - w*exp(-q/2) + max(qdot, -1)*step(q); w = sin(v)*abs(qdot); v = 1 + q*q"
 ALL = "sqrt(abs(d)) + log(1+d*d) - sin(d)*cos(d)/sec(d) + csc(1+d*d) + tan(d/3) - cot(1+d*d) + asin(d/9) + acos(d/9)"
 MORE = "atan(d) + sinh(d/4) + cosh(d/4) - tanh(d) + erf(d) + erfc(d) + delta(d) + square(d) - cube(d) + recip(2+d*d)"
