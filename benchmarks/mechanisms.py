@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -122,12 +123,12 @@ def timed(model: Model, mechanism: Mechanism) -> dict[str, float | None]:
             if engine not in KEEP_CONSTRAINTS and not all(isinstance(item, Lock) for item in mechanism.constraints):
                 continue
             try:
-                made = engine_factory(engine)(mechanism, Forces(()), Settings(route=route))
+                made: Any = engine_factory(engine)(mechanism, Forces(()), Settings(route=route))
             except OsimliteError:
                 continue
             stack.callback(made.close)
             state = made.state.pack(q.tolist(), u.tolist())
-            calls[way] = lambda made=made, state=state: made.derivative(0.0, state)
+            calls[way] = partial(made.derivative, 0.0, state)
         calls["OpenSim"] = theirs(model, q, u)
         return medians(calls)
 

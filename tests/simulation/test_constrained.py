@@ -132,7 +132,8 @@ def add(model: Model, name: str, joint: Any, carrier: Any, at=(0, 0, 0), **more:
 
 def pins(count: int, length: float = 0.4) -> tuple[Model, list[Body]]:
     """A chain of pendulums."""
-    model, bodies = Model(name="pins"), []
+    model = Model(name="pins")
+    bodies: list[Body] = []
     for number in range(count):
         carrier = bodies[-1] if bodies else model.ground
         at = (0.0, -length, 0.0) if bodies else (0.0, 0.0, 0.0)
