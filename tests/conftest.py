@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,12 @@ NO_SHARED = "needs the shared reference folder, which is not beside this reposit
 # A busy machine must not fail a property, and CI must fail the same way twice.
 settings.register_profile("osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True)
 settings.load_profile("osimlite")
+
+
+def pytest_configure() -> None:
+    """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class CorpusModel(NamedTuple):
