@@ -5,5 +5,6 @@ from __future__ import annotations
 BUILT_IN = {
     "dynamic-walker": "osimlite.models.dynamic_walker:dynamic_walker",
     "steady-walker": "osimlite.models.walkers:steady_walker",
+    "human-walker": "osimlite.models.walkers:human_walker",
 }
 """Name on the command line, and where the function is that makes the model."""

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.contact import ContactSphere
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
 from osimlite.schema.frames import Body
 from osimlite.schema.geometry import Brick
 from osimlite.schema.model import Model
@@ -24,6 +25,17 @@ STEADY_START = {
     "LKnee_rz": (-1.3764721715934252, -1.229888719685166),
 }
 """Value and speed of each coordinate on the cycle of the steady walker, 0.4 of a step after a heel strike."""
+
+
+HUMAN_START = {
+    "Pelvis_tx": (0.0, 0.68),
+    "Pelvis_ty": (0.89, 0.12),
+    "RHip_rz": (0.15, -0.69),
+    "LHip_rz": (-0.11, 2.9),
+    "RKnee_rz": (0.037, -0.12),
+    "LKnee_rz": (-0.73, -4.0),
+}
+"""Value and speed of each coordinate of the human walker in the middle of a step, rounded to two digits."""
 
 
 def steady_walker(shank_inertia: float = 0.091, foot_ahead: float = 0.072) -> Model:
@@ -46,6 +58,44 @@ def steady_walker(shank_inertia: float = 0.091, foot_ahead: float = 0.072) -> Mo
             _, y, z = sphere.location
             sphere.location = (foot_ahead, y, z)
     return _ready(model, STEADY_START, 100.0)
+
+
+def human_walker(
+    slope: float = 4.15, foot_radius: float = 0.17, foot_ahead: float = 0.048, knee_stiffness: float = 15.8
+) -> Model:
+    """Build the walker whose mass is distributed as in a human, on a gentle slope.
+
+    71.3 kg: head, arms and trunk weigh 47.5 kg and stand on the hips, a thigh weighs 7.9 kg and a shank with its foot
+    4 kg. The mass centres and the radii of gyration are near those that D. A. Winter gives for humans (Biomechanics and
+    Motor Control of Human Movement). The feet are round, as McGeer's were.
+
+    Args:
+        slope: how far the platform falls towards +x (deg).
+        foot_radius: of the sphere of each foot (m); its lowest point stays where it is in the exercise.
+        foot_ahead: how far the sphere is in front of the shank's axis (m).
+        knee_stiffness: of what stops the knees (N·m/deg).
+    """
+    model = dynamic_walker(slope=slope)
+    model.name = "HumanWalker"
+    for body in model.components(Body):
+        if body.name == "Pelvis":
+            body.mass = 47.5
+        elif body.name.endswith("Thigh"):
+            body.mass, body.mass_center, body.inertia = 7.9, (0.0, 0.027, 0.0), (2.0, 2.0, 0.11, 0.0, 0.0, 0.0)
+        elif body.name.endswith("Shank"):
+            body.mass, body.mass_center, body.inertia = 4.0, (0.0, -0.046, 0.0), (1.0, 1.0, 0.133, 0.0, 0.0, 0.0)
+    for sphere in model.components(ContactSphere):
+        if sphere.name.endswith("FootContact"):
+            _, y, z = sphere.location
+            sphere.location = (foot_ahead, y - sphere.radius + foot_radius, z)
+            sphere.radius = foot_radius
+    for contact in model.components(HuntCrossleyForce):
+        for parameters in contact.contact_parameters.objects:
+            parameters.stiffness, parameters.dissipation = 1.55e7, 5.2
+    for limit in model.components(CoordinateLimitForce):
+        if limit.name.endswith("KneeLimitTorque"):
+            limit.upper_stiffness, limit.lower_stiffness, limit.damping = knee_stiffness, 20.0, 0.265
+    return _ready(model, HUMAN_START, 100.0)
 
 
 def _ready(model: Model, start: Mapping[str, tuple[float, float]], way: float) -> Model:
