@@ -50,7 +50,7 @@ def ground(model: Model, slope: float) -> ContactHalfSpace:
 
 
 def touch(
-    model: Model, plane: ContactHalfSpace, body: Body, at: tuple[float, float, float], name: str, K: float
+    model: Model, plane: ContactHalfSpace, body: Body, at: tuple[float, float, float], name: str, K: float, vt: float
 ) -> None:
     sphere = model.add(ContactSphere(name=f"{name}_sphere", socket_frame=body, location=at, radius=FOOT))
     material = HuntCrossleyForce.ContactParameters(
@@ -130,10 +130,11 @@ class Legs:
     """Two straight legs walking, with the ground under the foot that swings taken away until it has passed."""
 
     def __init__(self, K: float, vt: float, slope: float, hip: float, leg: float, above: float) -> None:
-        self.simulation: Any = Simulation(two_legs(K, vt, slope, hip, leg, above), "compiled")
+        self.simulation = Simulation(two_legs(K, vt, slope, hip, leg, above), "compiled")
         self.engine: Any = self.simulation.engine
         self.slope = slope
-        self.names = [self.engine.mechanism.coordinates[place].name for place in self.engine.order]
+        infos = self.simulation.mechanism.coordinates
+        self.names = [infos[place].name for place in self.engine.order]
         self.without = [self._without(foot, K, vt, slope, hip, leg, above) for foot in ("right_foot", "left_foot")]
         self.normal = (sin(slope), cos(slope), 0.0)
 
@@ -144,8 +145,8 @@ class Legs:
             if force.name == foot:
                 force.contact_parameters.objects[0].stiffness = 0.0
         with Simulation(model, "compiled") as simulation:
-            numbers: Any = simulation.engine
-            return numbers.numbers.copy()
+            engine: Any = simulation.engine
+            return engine.numbers.copy()
 
     def place(self, name: str) -> int:
         """Place of a coordinate in the state."""
