@@ -49,7 +49,8 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
     )
     for name in names:
         function = name.replace("-", "_")
-        application.command(name)(getattr(import_module(f"osimlite.cli.{function}"), function))
+        command = getattr(import_module(f"osimlite.cli.{function}"), function)
+        application.command(name, help=_flowing(command.__doc__))(command)
 
     @application.callback(invoke_without_command=True)
     def osimlite(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
@@ -60,6 +61,11 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
             raise typer.Exit
 
     return application
+
+
+def _flowing(text: str) -> str:
+    """The text with each paragraph in one line: terminals are not as wide as the source."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
 def _plainly(words: list[str]) -> dict[str, Any] | None:

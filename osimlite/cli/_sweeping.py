@@ -8,46 +8,43 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from osimlite.cli._options import named_words
+
 if TYPE_CHECKING:
     from osimlite.sweep.plan import Plan
 
-Source = Annotated[
-    str, typer.Argument(help="A model file, or anything that 'osimlite build' makes one of.", show_default=False)
-]
 Vary = Annotated[
     list[str] | None,
     typer.Option(
         "--vary",
-        metavar="NAME=LOW:HIGH[:COUNT]",
-        help="A coordinate, COORDINATE/speed, /path/of/a/property, or a parameter of the model function.",
+        metavar="NAME=RANGE",
+        help="LOW:HIGH or LOW:HIGH:COUNT of a coordinate, COORDINATE/speed, path of a property, or parameter of the "
+        "model function.",
         show_default=False,
     ),
 ]
-Parameters = Annotated[
-    list[str] | None,
-    typer.Option(
-        "-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter of the model function.", show_default=False
-    ),
-]
-To = Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")]
-Engine = Annotated[str, typer.Option(help="What computes the accelerations: 'compiled' or 'bullet'.")]
-Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
 Below = Annotated[
     list[str] | None,
-    typer.Option("--stop-below", metavar="COORDINATE=VALUE", help="End a run when it falls below.", show_default=False),
+    typer.Option(
+        "--stop-below", metavar="NAME=VALUE", help="End a run when a coordinate falls below.", show_default=False
+    ),
 ]
 Above = Annotated[
     list[str] | None,
-    typer.Option("--stop-above", metavar="COORDINATE=VALUE", help="End a run when it rises above.", show_default=False),
+    typer.Option(
+        "--stop-above", metavar="NAME=VALUE", help="End a run when a coordinate rises above.", show_default=False
+    ),
 ]
 Workers = Annotated[
-    int | None, typer.Option(min=1, help="How many work here.", show_default="one for each core of this machine")
+    int | None,
+    typer.Option(
+        min=1, metavar="N", help="How many processes work here.", show_default="one for each core of this machine"
+    ),
 ]
 Cluster = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.", show_default=False),
 ]
-SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
 
 
 def make_plan(
@@ -79,7 +76,7 @@ def make_plan(
         if parameter:
             raise SettingError(f"'{source}' is a file and takes no parameters; vary its properties by their paths")
         return plan(read(source), ranges, folder=str(Path(source).resolve().parent), **choices)
-    given = _words(parameter or [], "-p")
+    given = named_words(parameter, "-p")
     both = [name for name in ranges if name in given]
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
@@ -91,18 +88,6 @@ def _make(make_model: Any, source: str, given: dict[str, str], parameters: dict[
     return make_model(source, {**given, **{name: repr(value) for name, value in parameters.items()}})
 
 
-def _words(words: Sequence[str], option: str) -> dict[str, str]:
-    from osimlite.errors import SettingError
-
-    found = {}
-    for word in words:
-        name, equals, value = (part.strip() for part in word.partition("="))
-        if not equals:
-            raise SettingError(f"{option} takes NAME=VALUE, got '{word}'")
-        found[name] = value
-    return found
-
-
 def _stops(words: Sequence[str] | None, is_below: bool) -> list[Any]:
     from osimlite.errors import SettingError
     from osimlite.quantity import quantity
@@ -110,9 +95,10 @@ def _stops(words: Sequence[str] | None, is_below: bool) -> list[Any]:
 
     found = []
     option = "--stop-below" if is_below else "--stop-above"
-    for name, text in _words(words or [], option).items():
+    form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
+    for name, text in named_words(words, option, form).items():
         given = quantity(text)
         if given is None:
-            raise SettingError(f"{option} takes COORDINATE=VALUE with a number such as 0.5 or 30deg, got '{text}'")
+            raise SettingError(f"{option} takes {form}, got '{text}'")
         found.append(Stop(name, given.value, is_below))
     return found

@@ -16,7 +16,7 @@ from osimlite.lint.reporters import FORMATS, render
 from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from osimlite.document.source import Source
 
@@ -33,7 +33,7 @@ def run(
     diff: bool = False,
     baseline: str | None = None,
     write_baseline: str | None = None,
-    mesh_path: list[str] | None = None,
+    geometry: Sequence[Path] = (),
     statistics: bool = False,
     cached: bool = True,
 ) -> int:
@@ -42,7 +42,9 @@ def run(
         raise OsimliteError(f"--fail-on is one of {listed(Severity)}, not '{fail_on}'")
     if format not in FORMATS:
         raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{format}'")
-    given = Config(checked_words(select), checked_words(ignore), mesh_paths=_absolute(mesh_path or []))
+    given = Config(
+        checked_words(select), checked_words(ignore), mesh_paths=tuple(str(path.resolve()) for path in geometry)
+    )
     files = list(_files(paths))
     if len(files) > 1:
         gc.enable()
@@ -199,10 +201,6 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
     new = Source(data).text.splitlines(keepends=True)
     sys.stdout.writelines(difflib.unified_diff(source.text.splitlines(keepends=True), new, path, path))
     return bool(count)
-
-
-def _absolute(paths: list[str]) -> tuple[str, ...]:
-    return tuple(str(Path(path).resolve()) for path in paths)
 
 
 def _width() -> int:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from osimlite.cli import _options as options
+
 
 def build(
     source: Annotated[
@@ -22,19 +24,13 @@ def build(
         typer.Option(
             "-o",
             "--output",
-            help="File to write, - for standard output; default is <model name>.osim here.",
-            show_default=False,
+            metavar="FILE",
+            help="File to write, - for standard output.",
+            show_default="<model name>.osim here",
         ),
     ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(
-            "-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter of the model function.", show_default=False
-        ),
-    ] = None,
-    numbers: Annotated[
-        str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")
-    ] = "shortest",
+    parameter: options.Parameters = None,
+    numbers: options.Numbers = "shortest",
     list_models: Annotated[bool, typer.Option("--list", help="Name the built-in models and stop.")] = False,
 ) -> None:
     """Make a model in Python and write its .osim file.
@@ -43,7 +39,7 @@ def build(
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
-    from osimlite.document.printer import Numbers, to_text, write
+    from osimlite.document.printer import to_text, write
     from osimlite.errors import OsimliteError
     from osimlite.lint import validate
     from osimlite.models import BUILT_IN
@@ -57,15 +53,8 @@ def build(
         return
     if source is None:
         raise OsimliteError("name a model to build, or use --list")
-    if numbers not in ("shortest", "opensim"):
-        raise OsimliteError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
-    parameters = {}
-    for word in parameter or []:
-        name, equals, value = word.partition("=")
-        if not equals:
-            raise OsimliteError(f"-p takes NAME=VALUE, got '{word}'")
-        parameters[name.strip()] = value.strip()
-    model = make_model(source, parameters)
+    style = options.checked_numbers(numbers)
+    model = make_model(source, options.named_words(parameter, "-p"))
     report = validate(model)
     if not report.ok:
         from osimlite.lint.reporters import render
@@ -73,7 +62,6 @@ def build(
         typer.echo(render(report, "full"), err=True)
         typer.echo(f"osimlite: '{source}' has errors; nothing was written", err=True)
         raise typer.Exit(1)
-    style: Numbers = "opensim" if numbers == "opensim" else "shortest"
     if str(output) == "-":
         typer.echo(to_text(model, numbers=style), nl=False)
         return

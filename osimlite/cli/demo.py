@@ -22,9 +22,9 @@ MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
 
 
 def demo(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for everything the tour makes.")] = Path(
-        "osimlite-demo"
-    ),
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes.")
+    ] = Path("osimlite-demo"),
     pictures: Annotated[bool, typer.Option(help="Draw the plots and the animation.")] = True,
 ) -> None:
     """Build, check, translate and simulate the dynamic walker, and leave the results in a folder.

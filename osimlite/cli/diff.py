@@ -24,6 +24,8 @@ def diff(
 
     As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in .gitattributes the
     line: *.osim diff=osim
+
+    Example: osimlite diff gait2392.osim gait2392_scaled.osim
     """
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError

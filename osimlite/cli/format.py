@@ -18,6 +18,8 @@ def format(
 
     Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format is
     left alone: upgrade it first.
+
+    Example: osimlite format models --check
     """
     from osimlite.document.printer import to_text
     from osimlite.document.reader import read_document

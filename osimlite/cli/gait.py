@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from osimlite.cli import _options as options
+
 if TYPE_CHECKING:
     from osimlite.gait.basin import Basin
     from osimlite.gait.cycle import Cycle
@@ -15,34 +17,27 @@ if TYPE_CHECKING:
 
 
 def gait(
-    source: Annotated[
-        str, typer.Argument(help="A model file, or anything that 'osimlite build' makes one of.", show_default=False)
-    ],
-    start: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="COORDINATE=VALUE", help="Start there, e.g. RHip_rz=20deg.", show_default=False),
-    ] = None,
-    start_speed: Annotated[
-        list[str] | None,
-        typer.Option("--set-speed", metavar="COORDINATE=VALUE", help="Start so fast.", show_default=False),
-    ] = None,
+    source: options.Source,
+    start: options.Start = None,
+    start_speed: options.StartSpeed = None,
     foot: Annotated[
         list[str] | None,
         typer.Option(
+            metavar="CONTACT",
             help="Contact of a foot, with + between several of one foot; once for each foot.",
             show_default="the ends of the legs",
         ),
     ] = None,
     to: Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to walk at most.")] = 60.0,
-    settle: Annotated[int, typer.Option(min=0, help="Steps to make before the cycle is looked for.")] = 0,
+    settle: Annotated[int, typer.Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")] = 0,
     accuracy: Annotated[float, typer.Option(help="Of the integrator in the step map.")] = 1e-10,
     perturb: Annotated[
         list[float] | None,
         typer.Option(metavar="PART", help="Start at random so near the cycle: 0.05 is 5 %.", show_default=False),
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, help="How many such starts.")] = 60,
-    seed: Annotated[int, typer.Option(help="Of such starts: the same seed, the same starts.")] = 0,
-    steps: Annotated[int, typer.Option(min=1, help="Steps after which a walker counts as walking.")] = 20,
+    starts: Annotated[int, typer.Option(min=1, metavar="N", help="How many such starts.")] = 60,
+    seed: Annotated[int, typer.Option(help="The same seed, the same such starts.")] = 0,
+    steps: Annotated[int, typer.Option(min=1, metavar="N", help="Steps after which a walker counts as walking.")] = 20,
     basin: Annotated[
         bool, typer.Option("--basin", help="Look from where on a grid around the cycle it walks.")
     ] = False,
@@ -51,7 +46,7 @@ def gait(
     ] = "",
     basin_y: Annotated[str, typer.Option(metavar="NAME", help="What the rows change.")] = "",
     reach: Annotated[float, typer.Option(help="How far from the cycle, rad, m or per second.")] = 0.5,
-    grid: Annotated[int, typer.Option(min=2, help="Rows and columns.")] = 21,
+    grid: Annotated[int, typer.Option(min=2, metavar="N", help="Rows and columns.")] = 21,
     pictures: Annotated[bool, typer.Option(help="Draw the basin.")] = True,
     output: Annotated[
         Path | None,
@@ -72,7 +67,6 @@ def gait(
 
     from osimlite._require import require
     from osimlite.cli._progress import progress_bar
-    from osimlite.cli.simulate import quantities
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError
     from osimlite.gait.basin import find_basin, perturbed, walks_from
@@ -90,8 +84,8 @@ def gait(
     with Simulation(model, "compiled") as simulation:
         engine: Any = simulation.engine
         state = simulation.initial_state(
-            quantities(start or [], simulation.mechanism, "--set"),
-            quantities(start_speed or [], simulation.mechanism, "--set-speed"),
+            options.quantities(start, simulation.mechanism, "--set"),
+            options.quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
         footing = find_footing(engine, foot)
         (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=1e-6)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import textwrap
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
+
+from osimlite.cli import _options as options
 
 if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint
@@ -17,10 +18,13 @@ if TYPE_CHECKING:
 
 
 def info(
-    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    file: options.File,
     every_class: Annotated[bool, typer.Option("--all", help="List every component class, however rare.")] = False,
 ) -> None:
-    """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class."""
+    """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
+
+    Example: osimlite info gait2392.osim
+    """
     from rich.console import Console
     from rich.table import Table
 

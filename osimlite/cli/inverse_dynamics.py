@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
+from osimlite.cli import _options as options
 
 if TYPE_CHECKING:
     from osimlite.simulation.external_loads import ExternalLoad
 
 
 def inverse_dynamics(
-    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
-    motion: Annotated[Path, typer.Argument(help="Coordinates over time, .mot or .sto.", show_default=False)],
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
-    ] = Path("."),
-    external_loads: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Measured forces: a file of ExternalLoads.", show_default=False),
-    ] = None,
+    file: options.File,
+    motion: options.Motion,
+    output: options.Folder = Path("."),
+    external_loads: options.ExternalLoads = None,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
 

@@ -7,14 +7,13 @@ from typing import Annotated
 
 import typer
 
+from osimlite.cli import _options as options
+
 
 def kinematics(
-    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
-    motion: Annotated[Path, typer.Argument(help="Coordinates over time, .mot or .sto.", show_default=False)],
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
-    ] = Path("."),
+    file: options.File,
+    motion: options.Motion,
+    output: options.Folder = Path("."),
     assemble: Annotated[
         bool, typer.Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
     ] = False,

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from osimlite.cli import _sweeping as options
+from osimlite.cli import _options as options
+from osimlite.cli import _sweeping as sweeping
 
 if TYPE_CHECKING:
     from osimlite.sweep.optimize import Optimum
@@ -18,17 +19,17 @@ def optimize(
     objective: Annotated[
         str,
         typer.Option(
-            metavar="NAME|module:function",
+            metavar="NAME",
             help="What is wanted: distance, steps, time_to_fall (the more, the better), largest_force, scuffs, energy "
-            "or a function (the less, the better).",
+            "or module:function (the less, the better).",
             show_default=False,
         ),
     ],
-    vary: options.Vary = None,
-    budget: Annotated[int, typer.Option(help="How many runs are allowed.")] = 1000,
-    method: Annotated[str, typer.Option(help="'cma', 'differential-evolution' or 'nelder-mead'.")] = "cma",
+    vary: sweeping.Vary = None,
+    budget: Annotated[int, typer.Option(metavar="N", help="How many runs are allowed.")] = 1000,
+    method: Annotated[str, typer.Option(help="cma, differential-evolution or nelder-mead.")] = "cma",
     popsize: Annotated[
-        int | None, typer.Option(help="Runs between two decisions.", show_default="what suits the method")
+        int | None, typer.Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
     ] = None,
     sigma: Annotated[
         float, typer.Option(help="How far from the start to look at first, as a fraction of the ranges.")
@@ -50,11 +51,11 @@ def optimize(
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
     accuracy: options.Accuracy = None,
-    stop_below: options.Below = None,
-    stop_above: options.Above = None,
+    stop_below: sweeping.Below = None,
+    stop_above: sweeping.Above = None,
     parameter: options.Parameters = None,
-    workers: options.Workers = None,
-    cluster: options.Cluster = None,
+    workers: sweeping.Workers = None,
+    cluster: sweeping.Cluster = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json.")
     ] = Path("optimum"),
@@ -71,7 +72,7 @@ def optimize(
     from osimlite.sweep.optimize import Objective
     from osimlite.sweep.optimize import optimize as search
 
-    plan = options.make_plan(
+    plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
         accuracy=accuracy, skip_unsupported=skip_unsupported,
     )  # fmt: skip

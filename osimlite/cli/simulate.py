@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from osimlite.cli import _options as options
 from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from osimlite.multibody.mechanism import Mechanism
     from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
@@ -22,37 +22,24 @@ LIVE_STEP = 1e-3
 
 
 def simulate(
-    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
-    to: Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")] = 2.0,
-    engine: Annotated[str, typer.Option(help="What computes the accelerations: 'bullet' or 'compiled'.")] = "bullet",
-    accuracy: Annotated[
-        float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")
-    ] = None,
+    file: options.File,
+    to: options.To = 2.0,
+    engine: options.Engine = "bullet",
+    accuracy: options.Accuracy = None,
     fixed_step: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Take PyBullet's own steps instead of controlling the error."),
     ] = None,
-    start: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="COORDINATE=VALUE", help="Where a coordinate starts (rad, m, or 30deg)."),
-    ] = None,
-    start_speed: Annotated[
-        list[str] | None,
-        typer.Option("--set-speed", metavar="COORDINATE=VALUE", help="At what speed it starts (per second)."),
-    ] = None,
+    start: options.Start = None,
+    start_speed: options.StartSpeed = None,
     report_interval: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
-    ] = Path("."),
+    output: options.Folder = Path("."),
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, forces and energy as PNG.")] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[bool, typer.Option("--gui", help="Show it live in PyBullet's window; takes fixed steps.")] = False,
-    skip_unsupported: Annotated[
-        bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")
-    ] = False,
+    skip_unsupported: options.SkipUnsupported = False,
     opensim_derivatives: Annotated[
         bool,
         typer.Option("--opensim-derivatives", help="Repeat OpenSim's mistakes in joints with several turns."),
@@ -60,10 +47,7 @@ def simulate(
     rolling: Annotated[
         bool, typer.Option("--rolling", help="Let rolling constraints act, which OpenSim leaves off.")
     ] = False,
-    external_loads: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
-    ] = None,
+    external_loads: options.ExternalLoads = None,
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
@@ -100,8 +84,8 @@ def simulate(
         folder=file.parent,
         show=gui,
     ) as simulation:
-        initial = quantities(start or [], simulation.mechanism, "--set")
-        speeds = quantities(start_speed or [], simulation.mechanism, "--set-speed")
+        initial = options.quantities(start, simulation.mechanism, "--set")
+        speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
         with progress_bar(console, "simulating", to) as progress:
             trajectory = simulation.run(
                 to,
@@ -114,29 +98,6 @@ def simulate(
             )
     files = _write(console, file, model, trajectory, output, plot=plot, animate=animate)
     console.print(_table(trajectory, files))
-
-
-def quantities(words: Sequence[str], mechanism: Mechanism, option: str) -> dict[str, float]:
-    """Numbers (rad, m, per second) by coordinate from ``NAME=VALUE`` words; a value may carry a unit.
-
-    Raises:
-        OsimliteError: a word is not of that form, there is no such coordinate, or the unit does not fit it.
-    """
-    from osimlite.errors import ModelError, OsimliteError
-    from osimlite.quantity import quantity
-    from osimlite.simulation.start import in_units_of
-
-    found = {}
-    for word in words:
-        name, equals, text = (part.strip() for part in word.partition("="))
-        if not equals or quantity(text) is None:
-            raise OsimliteError(f"{option} takes COORDINATE=VALUE with a number such as 0.5 or 30deg, got '{word}'")
-        try:
-            found[name] = in_units_of(mechanism, name, text)
-        except ModelError as error:
-            # The model is as it should be; it is the command that asks for what is not there.
-            raise OsimliteError(f"{option}: {error.message}") from None
-    return found
 
 
 PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}

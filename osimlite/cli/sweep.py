@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from osimlite.cli import _sweeping as options
+from osimlite.cli import _options as options
+from osimlite.cli import _sweeping as sweeping
 
 if TYPE_CHECKING:
     from osimlite.sweep.plan import Plan
@@ -16,15 +17,16 @@ if TYPE_CHECKING:
 
 def sweep(
     source: options.Source,
-    vary: options.Vary = None,
+    vary: sweeping.Vary = None,
     samples: Annotated[
-        int | None, typer.Option("--samples", help="How many runs; a grid has as many as it has.", show_default=False)
+        int | None,
+        typer.Option("--samples", metavar="N", help="How many runs; a grid has as many as it has.", show_default=False),
     ] = None,
     sampler: Annotated[
         str | None,
         typer.Option(help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of random samples: the same seed, the same samples.")] = 0,
+    seed: Annotated[int, typer.Option(help="The same seed, the same random samples.")] = 0,
     measure: Annotated[
         list[str] | None,
         typer.Option(
@@ -38,8 +40,8 @@ def sweep(
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
     accuracy: options.Accuracy = None,
-    stop_below: options.Below = None,
-    stop_above: options.Above = None,
+    stop_below: sweeping.Below = None,
+    stop_above: sweeping.Above = None,
     report_interval: Annotated[
         float | None,
         typer.Option(
@@ -47,8 +49,8 @@ def sweep(
         ),
     ] = None,
     parameter: options.Parameters = None,
-    workers: options.Workers = None,
-    cluster: options.Cluster = None,
+    workers: sweeping.Workers = None,
+    cluster: sweeping.Cluster = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run.")
     ] = Path("results.parquet"),
@@ -67,7 +69,7 @@ def sweep(
     from osimlite.sweep.run import sweep as run
     from osimlite.sweep.sampling import samples as choose
 
-    plan = options.make_plan(
+    plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure) if measure else None, to=to,
         engine=engine, accuracy=accuracy, report_interval=report_interval, skip_unsupported=skip_unsupported,
     )  # fmt: skip

@@ -7,16 +7,13 @@ from typing import Annotated
 
 import typer
 
-from osimlite.cli._geometry import Geometry, named_folders
+from osimlite.cli import _options as options
 
 
 def translate(
-    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    file: options.File,
     to: Annotated[str, typer.Option("--to", help="The format: 'urdf'.")] = "urdf",
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder"),
-    ] = Path("."),
+    output: options.Folder = Path("."),
     limits: Annotated[
         str, typer.Option(help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.")
     ] = "none",
@@ -37,7 +34,7 @@ def translate(
     velocity: Annotated[
         float | None, typer.Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit")
     ] = None,
-    geometry: Geometry = None,
+    geometry: options.Geometry = None,
 ) -> None:
     """Translate a model: writes <model>.urdf, its meshes, <model>.coordinates.json and fidelity.json.
 
@@ -69,7 +66,7 @@ def translate(
         effort=effort,
         velocity=velocity,
         folder=file.parent,
-        geometry=named_folders(geometry),
+        geometry=options.named_folders(geometry),
     )
     written = urdf.write(output)
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from osimlite.cli import _options as options
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -21,13 +23,12 @@ def upgrade(
         typer.Option(
             "-o",
             "--output",
-            help="File to write, which may be FILE itself; default is <name>_<version>.osim beside it.",
-            show_default=False,
+            metavar="FILE",
+            help="File to write, which may be the model file itself.",
+            show_default="<name>_<version>.osim beside it",
         ),
     ] = None,
-    numbers: Annotated[
-        str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")
-    ] = "shortest",
+    numbers: options.Numbers = "shortest",
 ) -> None:
     """Write a model file of an older version in the current format, and list what changed and what was lost.
 
@@ -43,8 +44,7 @@ def upgrade(
     from osimlite.errors import OsimliteError
     from osimlite.schema.model import CURRENT_VERSION
 
-    if numbers not in ("shortest", "opensim"):
-        raise OsimliteError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
+    style = options.checked_numbers(numbers)
     document = read_document(Source.of_file(file))
     mended = document.fault is not None
     if document.version >= CURRENT_VERSION and output is None and not mended:
@@ -53,7 +53,7 @@ def upgrade(
     target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}.osim")
     if output is None and target.exists():
         raise OsimliteError(f"'{target}' is there already; name the file to write with -o", file=str(file))
-    write(document.model, target, numbers="opensim" if numbers == "opensim" else "shortest")
+    write(document.model, target, numbers=style)
     _report(Console(), document)
     typer.echo(f"{target}: version {document.version} to {CURRENT_VERSION}, {_count(len(document.changes), 'change')}")
 

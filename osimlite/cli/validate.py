@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from osimlite.cli import _options as options
+
 
 def validate(
     paths: Annotated[
@@ -15,18 +17,23 @@ def validate(
         ),
     ],
     format: Annotated[
-        str, typer.Option("--format", help="full, concise, json, github, sarif or junit.", metavar="FORMAT")
+        str, typer.Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
     ] = "full",
     select: Annotated[
         list[str] | None,
-        typer.Option(help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False),
+        typer.Option(
+            metavar="RULE", help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False
+        ),
     ] = None,
     ignore: Annotated[
-        list[str] | None, typer.Option(help="Leave these rules out; as for --select.", show_default=False)
+        list[str] | None,
+        typer.Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
     ] = None,
     fail_on: Annotated[
         str | None,
-        typer.Option(help="What makes the exit code 1: error, warning or info.", show_default=False),
+        typer.Option(
+            metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False
+        ),
     ] = None,
     fix: Annotated[bool, typer.Option("--fix", help="Mend what can be mended with certainty.")] = False,
     unsafe_fixes: Annotated[
@@ -39,9 +46,7 @@ def validate(
     write_baseline: Annotated[
         str | None, typer.Option(help="Write all findings to this file and stop.", metavar="FILE", show_default=False)
     ] = None,
-    mesh_path: Annotated[
-        list[str] | None, typer.Option(help="Folder to look for meshes in; may be repeated.", show_default=False)
-    ] = None,
+    geometry: options.Geometry = None,
     statistics: Annotated[bool, typer.Option("--statistics", help="Count findings by rule instead.")] = False,
     no_cache: Annotated[
         bool, typer.Option("--no-cache", help="Check every file, also those that have not changed since.")
@@ -67,7 +72,7 @@ def validate(
             diff=diff,
             baseline=baseline,
             write_baseline=write_baseline,
-            mesh_path=mesh_path,
+            geometry=options.named_folders(geometry),
             statistics=statistics,
             cached=not no_cache,
         )

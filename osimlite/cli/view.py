@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from osimlite.cli._geometry import Geometry, named_folders
+from osimlite.cli import _options as options
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,13 +20,13 @@ SIZE = (1200, 900)
 
 
 def view(
-    file: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    file: options.File,
     motion: Annotated[
         Path | None, typer.Argument(help="Coordinates over time, .sto or .mot.", show_default=False)
     ] = None,
     values: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="COORDINATE=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
     ] = None,
     forces: Annotated[
         Path | None,
@@ -36,7 +36,7 @@ def view(
             show_default="computed, if the motion has speeds",
         ),
     ] = None,
-    geometry: Geometry = None,
+    geometry: options.Geometry = None,
     page: Annotated[
         Path | None,
         typer.Option(
@@ -63,7 +63,6 @@ def view(
     """
     from rich.console import Console
 
-    from osimlite.cli.simulate import quantities
     from osimlite.document.reader import read
     from osimlite.lint.settings import settings_for
     from osimlite.multibody import build_mechanism
@@ -72,9 +71,9 @@ def view(
 
     model = read(file)
     mechanism = build_mechanism(model)
-    given: Mapping[str, float] = quantities(values or [], mechanism, "--set")
+    given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
     settings = [Path(path) for path in settings_for(file.resolve().parent).mesh_paths]
-    folders = geometry_folders(file.parent, [*named_folders(geometry), *settings])
+    folders = geometry_folders(file.parent, [*options.named_folders(geometry), *settings])
     shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
     console = Console(highlight=False, soft_wrap=True)
     for remark in shown.remarks:

@@ -1,0 +1,118 @@
+"""The arguments and options that several commands have: each has one name, one unit and one help everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from osimlite.document.printer import Numbers as NumberStyle
+    from osimlite.multibody.mechanism import Mechanism
+
+File = Annotated[Path, typer.Argument(help="A model file.", show_default=False)]
+Source = Annotated[
+    str, typer.Argument(help="A model file, or anything that 'osimlite build' makes one of.", show_default=False)
+]
+Motion = Annotated[Path, typer.Argument(help="Coordinates over time, .sto or .mot.", show_default=False)]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter of the model function.", show_default=False
+    ),
+]
+Start = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Where a coordinate starts (rad, m, or 30deg)."),
+]
+StartSpeed = Annotated[
+    list[str] | None,
+    typer.Option("--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."),
+]
+To = Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")]
+Engine = Annotated[str, typer.Option(help="What computes the accelerations: 'bullet' or 'compiled'.")]
+Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
+SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
+ExternalLoads = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
+]
+Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
+Folder = Annotated[
+    Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder")
+]
+Geometry = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--geometry",
+        metavar="FOLDER",
+        help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
+        "Folders in the environment variable OSIMLITE_GEOMETRY, separated by colons, come last.",
+    ),
+]
+
+
+def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALUE") -> dict[str, str]:
+    """Text by name from the ``NAME=VALUE`` words of an option; `form` is what the user is told to write.
+
+    Raises:
+        SettingError: a word is not of that form.
+    """
+    from osimlite.errors import SettingError
+
+    found = {}
+    for word in words or ():
+        name, equals, value = (part.strip() for part in word.partition("="))
+        if not equals:
+            raise SettingError(f"{option} takes {form}, got '{word}'")
+        found[name] = value
+    return found
+
+
+def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -> dict[str, float]:
+    """Numbers (rad, m, per second) by coordinate from the ``COORDINATE=VALUE`` words of an option.
+
+    Raises:
+        OsimliteError: a word is not of that form, there is no such coordinate, or the unit does not fit it.
+    """
+    from osimlite.errors import ModelError, OsimliteError
+    from osimlite.simulation.start import in_units_of
+
+    found = {}
+    form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
+    for name, text in named_words(words, option, form).items():
+        try:
+            found[name] = in_units_of(mechanism, name, text)
+        except ModelError as error:
+            # The model is as it should be; it is the command that asks for what is not there.
+            raise OsimliteError(f"{option}: {error.message}") from None
+    return found
+
+
+def named_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
+    """The folders of ``--geometry``.
+
+    Raises:
+        MissingFileError: one is not there.
+    """
+    from osimlite.errors import MissingFileError
+
+    for place in geometry or ():
+        if not place.is_dir():
+            raise MissingFileError("--geometry names a folder that is not there", file=str(place))
+    return geometry or ()
+
+
+def checked_numbers(numbers: str) -> NumberStyle:
+    """The choice of ``--numbers``.
+
+    Raises:
+        SettingError: there is no such style.
+    """
+    from osimlite.errors import SettingError
+
+    if numbers not in ("shortest", "opensim"):
+        raise SettingError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
+    return "opensim" if numbers == "opensim" else "shortest"
