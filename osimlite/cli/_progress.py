@@ -2,40 +2,54 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.progress import Progress
 
 
 @contextmanager
-def progress_bar(console: Console, title: str, total: float | None) -> Iterator[Callable[..., None]]:
-    """A progress bar that shows up on a terminal once the work has taken a second."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None]]:
+    """A progress bar on standard error, if that is a terminal, once the work has taken a second.
 
-    started = time.perf_counter()
-    bar = Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn(),
-        console=console, transient=True,
-    )  # fmt: skip
-    task = bar.add_task(title, total=total)
-    is_shown = False
+    What is yielded takes how much is done, and of how much if that has become known. The library that draws the bar
+    is loaded when it first shows. It has no thread of its own: processes may be started beside it.
+    """
+    is_terminal = sys.stderr.isatty()
+    due = time.monotonic() + 1.0
+    bar: Progress | None = None
 
     def advance(done: float, of: float | None = None) -> None:
-        nonlocal is_shown
-        if not console.is_terminal:
+        nonlocal bar, due
+        if not is_terminal or (now := time.monotonic()) < due:
             return
-        if not is_shown and time.perf_counter() - started > 1.0:
-            bar.start()
-            is_shown = True
-        if is_shown:
-            bar.update(task, completed=done, total=total if of is None else of)
+        due = now + 0.1
+        if bar is None:
+            bar = _started(title)
+        bar.update(bar.task_ids[0], completed=done, total=total if of is None else of, refresh=True)
 
     try:
         yield advance
     finally:
-        if is_shown:
+        if bar is not None:
             bar.stop()
+
+
+def _started(title: str) -> Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
+    bar.add_task(title, total=None)
+    bar.start()
+    return bar

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from osimlite.cli._progress import progress_bar
 from osimlite.errors import OsimliteError
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
@@ -16,7 +17,7 @@ from osimlite.lint.reporters import FORMATS, render
 from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from osimlite.document.source import Source
 
@@ -56,8 +57,8 @@ def run(
         count, left = sum(count for count, _ in mended), sum(left for _, left in mended)
         more = f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
         print(f"Mended {_places(count)}{more}.", file=sys.stderr)
-    with Bar(len(files)) as bar:
-        report = check_files(files, given, cached=cached, progress=bar.show)
+    with progress_bar("checking", len(files)) as progress:
+        report = check_files(files, given, cached=cached, progress=progress)
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write
 
@@ -75,48 +76,6 @@ def run(
         sys.stdout.write(render(report, format, colour=colour, width=min(max(_width(), 40), 120)))
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
     return int(bool(report.at_least(worst)))
-
-
-class Bar:
-    """A progress bar on a terminal, for work that takes longer than a second."""
-
-    def __init__(self, total: int) -> None:
-        self.total = total
-        self._show: Callable[[int, int], None] | None = None
-        self._stop: Callable[[], None] | None = None
-
-    def __enter__(self) -> Bar:
-        import time
-
-        self._begin = time.monotonic()
-        return self
-
-    def show(self, done: int, total: int) -> None:
-        """Say that `done` of `total` files are checked."""
-        import time
-
-        if self.total < 2 or not sys.stderr.isatty() or time.monotonic() - self._begin < 1:
-            return
-        if self._show is None:
-            self._start(total)
-        assert self._show is not None
-        self._show(done, total)
-
-    def _start(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        columns = TextColumn("Checking models"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        # Without a thread of its own: processes may be started beside it.
-        bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
-        task = bar.add_task("", total=total)
-        bar.start()
-        self._show = lambda done, total: bar.update(task, completed=done, refresh=True)
-        self._stop = bar.stop
-
-    def __exit__(self, *_: object) -> None:
-        if self._stop is not None:
-            self._stop()
 
 
 def _files(paths: list[str]) -> Iterator[str]:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from osimlite.cli._progress import progress_bar
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -71,19 +73,6 @@ class _Tour:
         self.rows.append((title, said[0], said[1], time.perf_counter() - start))
         self.console.print(f"   {said[0]}\n", highlight=False)
 
-    @contextmanager
-    def progress(self, title: str, total: float) -> Iterator[Callable[[float], None]]:
-        """A progress bar; the caller says how far it is."""
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-        bar = Progress(
-            TextColumn("   {task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
-            TimeRemainingColumn(), console=self.console, transient=True,
-        )  # fmt: skip
-        with bar:
-            task = bar.add_task(title, total=total)
-            yield lambda done: bar.update(task, completed=done)
-
     def table(self) -> None:
         """Print everything that was done."""
         from rich.table import Table
@@ -132,7 +121,7 @@ def _work(tour: _Tour) -> tuple[Model, Trajectory]:
         urdf.write(folder / "urdf")
         say(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
 
-    with tour.step("Simulate in PyBullet") as say, tour.progress("simulating", 2.0) as progress:
+    with tour.step("Simulate in PyBullet") as say, progress_bar("   simulating", 2.0) as progress:
         trajectory = simulate(model, to=2.0, report_interval=0.01, progress=progress)
         trajectory.write(folder)
         difference = distance_to_opensim(trajectory)
@@ -150,9 +139,9 @@ def _pictures(tour: _Tour, model: Model, trajectory: Trajectory) -> None:
     with tour.step("Plot motion, forces, energy") as say:
         files = plot_simulation(trajectory, tour.folder)
         say(", ".join(file.stem for file in files), "*.png")
-    with tour.step("Animate the walker") as say, tour.progress("drawing", 1.0) as progress:
+    with tour.step("Animate the walker") as say, progress_bar("   drawing", None) as progress:
         target = tour.folder / "animation.gif"
-        animate(model, trajectory, target, progress=lambda done, total: progress(done / total))
+        animate(model, trajectory, target, progress=progress)
         say(f"{target.stat().st_size / 1e6:.1f} MB", target.name)
 
 

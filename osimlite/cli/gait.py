@@ -33,7 +33,7 @@ def gait(
     accuracy: Annotated[float, typer.Option(help="Of the integrator in the step map.")] = 1e-10,
     perturb: Annotated[
         list[float] | None,
-        typer.Option(metavar="PART", help="Start at random so near the cycle: 0.05 is 5 %.", show_default=False),
+        typer.Option(metavar="PART", help="Start at random so near the start: 0.05 is 5 %.", show_default=False),
     ] = None,
     starts: Annotated[int, typer.Option(min=1, metavar="N", help="How many such starts.")] = 60,
     seed: Annotated[int, typer.Option(help="The same seed, the same such starts.")] = 0,
@@ -99,12 +99,12 @@ def gait(
         found = None
         if step_map is not None and cycle is not None:
             for part in perturb or []:
-                with progress_bar(console, f"starting within {part:.0%}", starts) as progress:
-                    states = perturbed(step_map, cycle, part, starts, seed)
+                with progress_bar(f"starting within {part:.0%}", starts) as progress:
+                    states = perturbed(step_map, state, part, starts, seed)
                     walks = walks_from(step_map, cycle, states, steps, progress=progress)
                 nearby.append((part, sum(len(each.steps) >= steps for each in walks)))
             if basin:
-                with progress_bar(console, "basin", grid * grid) as progress:
+                with progress_bar("basin", grid * grid) as progress:
                     found = find_basin(
                         step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
                     )

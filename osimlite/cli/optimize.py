@@ -76,14 +76,13 @@ def optimize(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
         accuracy=accuracy, skip_unsupported=skip_unsupported,
     )  # fmt: skip
-    console = Console()
-    with progress_bar(console, "searching", budget) as progress:
+    with progress_bar("searching", budget) as progress:
         found = search(
             plan, Objective(objective, maximize), output, method=method, budget=budget, popsize=popsize, seed=seed,
             sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, workers=workers,
             cluster=cluster, progress=progress,
         )  # fmt: skip
-    console.print(_table(objective, found))
+    Console().print(_table(objective, found))
 
 
 def _table(objective: str, found: Optimum) -> Any:

@@ -12,8 +12,6 @@ from osimlite.cli import _options as options
 from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
@@ -73,7 +71,6 @@ def simulate(
     from osimlite.simulation.run import Simulation
 
     engine_factory(engine)
-    console = Console()
     with Simulation(
         model,
         engine,
@@ -86,7 +83,7 @@ def simulate(
     ) as simulation:
         initial = options.quantities(start, simulation.mechanism, "--set")
         speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
-        with progress_bar(console, "simulating", to) as progress:
+        with progress_bar("simulating", to) as progress:
             trajectory = simulation.run(
                 to,
                 accuracy=DEFAULT_ACCURACY if accuracy is None else accuracy,
@@ -96,17 +93,15 @@ def simulate(
                 initial_speeds=speeds,
                 progress=progress,
             )
-    files = _write(console, file, model, trajectory, output, plot=plot, animate=animate)
-    console.print(_table(trajectory, files))
+    files = _write(model, trajectory, output, plot=plot, animate=animate)
+    Console().print(_table(trajectory, files))
 
 
 PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}
 """What --plot and --animate draw."""
 
 
-def _write(
-    console: Console, file: Path, model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool
-) -> list[Path]:
+def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool) -> list[Path]:
     """Write everything beside its place first, so that a failure leaves nothing behind."""
     import shutil
     import tempfile
@@ -129,7 +124,7 @@ def _write(
         if animate:
             from osimlite.view.animation import animate as draw
 
-            with progress_bar(console, "drawing", None) as progress:
+            with progress_bar("drawing", None) as progress:
                 written.append(draw(model, trajectory, beside / "animation.gif", progress=progress))
         for path in written:
             path.replace(folder / path.name)

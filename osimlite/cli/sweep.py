@@ -74,10 +74,9 @@ def sweep(
         engine=engine, accuracy=accuracy, report_interval=report_interval, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)
-    console = Console()
-    with progress_bar(console, "sweeping", chosen.count) as progress:
+    with progress_bar("sweeping", chosen.count) as progress:
         outcome = run(plan, chosen, output, resume=resume, workers=workers, cluster=cluster, progress=progress)
-    console.print(_table(plan, outcome))
+    Console().print(_table(plan, outcome))
 
 
 def _table(plan: Plan, outcome: Outcome) -> Any:

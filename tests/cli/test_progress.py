@@ -1,0 +1,36 @@
+"""The bar shows on a terminal, once the work has taken a second, and nowhere else."""
+
+from __future__ import annotations
+
+import io
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from osimlite.cli import _progress
+from osimlite.cli._progress import progress_bar
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "second", "shows"), [(Terminal, 1.5, True), (Terminal, 0.5, False), (io.StringIO, 1.5, False)]
+)
+def test_bar(monkeypatch, stream, second, shows):
+    clock = iter((0.0, second, second + 0.05, second + 0.2))
+    monkeypatch.setattr(_progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", stream())
+    with progress_bar("walking", 4.0) as progress:
+        progress(1.0)
+        if shows:
+            progress(3.0)
+    text = sys.stderr.getvalue()
+    assert ("walking" in text and "25 %" in text) is shows
+    # Two calls within a tenth of a second draw once.
+    assert "75 %" not in text
+    assert shows or not text
