@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from osimlite.cli import _options as options
+from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from osimlite.gait.basin import Basin
     from osimlite.gait.cycle import Cycle
     from osimlite.gait.stepmap import StepMap
-    from osimlite.gait.steps import Walk
+    from osimlite.gait.steps import Scuff, Step, Walk
+    from osimlite.simulation.engines.compiled import CompiledEngine
+
+
+WALK_ACCURACY = 1e-6
+"""Of the integrator in the walk from the start; the step map takes its own."""
 
 
 def gait(
@@ -66,120 +75,163 @@ def gait(
     from rich.console import Console
 
     from osimlite._require import require
-    from osimlite.cli._progress import progress_bar
     from osimlite.document.reader import read
-    from osimlite.errors import OsimliteError
     from osimlite.gait.basin import find_basin, perturbed, walks_from
-    from osimlite.gait.cycle import find_cycle
-    from osimlite.gait.footing import find_footing
-    from osimlite.gait.stepmap import StepMap
-    from osimlite.gait.steps import walk_many
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation
 
     if basin and pictures and output:
         require("matplotlib", extra="plot", purpose="a picture of a basin")
-    console = Console()
     model = read(source) if Path(source).suffix.lower() == ".osim" else make_model(source)
     with Simulation(model, "compiled") as simulation:
-        engine: Any = simulation.engine
         state = simulation.initial_state(
             options.quantities(start, simulation.mechanism, "--set"),
             options.quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
-        footing = find_footing(engine, foot)
-        (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=1e-6)
-        step_map, cycle, why = None, None, ""
-        try:
-            step_map = StepMap(engine, state, footing=footing, accuracy=accuracy)
-            cycle = find_cycle(step_map, settle=settle)
-        except OsimliteError as error:
-            why = error.message
-        nearby: list[tuple[float, int]] = []
-        found = None
+        engine: Any = simulation.engine
+        found, step_map = _walk(engine, state, foot, to, settle, accuracy)
+        cycle = found.cycle
         if step_map is not None and cycle is not None:
-            for part in perturb or []:
+            for part in perturb or ():
                 with progress_bar(f"starting within {part:.0%}", starts) as progress:
                     states = perturbed(step_map, state, part, starts, seed)
                     walks = walks_from(step_map, cycle, states, steps, progress=progress)
-                nearby.append((part, sum(len(each.steps) >= steps for each in walks)))
+                found.nearby.append(Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps))
             if basin:
                 with progress_bar("basin", grid * grid) as progress:
-                    found = find_basin(
+                    found.basin = find_basin(
                         step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
                     )
-        files = _write(output, engine, walk, cycle, nearby, starts, found, pictures) if output else []
-        console.print(_table(engine, walk, step_map, cycle, why, nearby, starts, steps, found, files))
+    files = _write(output, found, pictures) if output else []
+    Console().print(_table(found, files))
 
 
-def _table(
-    engine: Any,
-    walk: Walk,
-    step_map: StepMap | None,
-    cycle: Cycle | None,
-    why: str,
-    nearby: list[tuple[float, int]],
-    starts: int,
-    steps: int,
-    found: Basin | None,
-    files: list[Path],
-) -> Any:
+@dataclass
+class Nearby:
+    """Of random starts that differ from the given one by a part at most: how many made so many steps."""
+
+    part: float
+    walked: int
+    starts: int
+    steps: int
+
+
+@dataclass
+class Found:
+    """What was found out about a walker.
+
+    Attributes:
+        model: its name.
+        coordinates: in the order of the state.
+        walk: from the start that was given.
+        cycle: that it settles into, if there is one.
+        why_not: why no cycle was found, else "".
+    """
+
+    model: str
+    coordinates: list[str]
+    walk: Walk
+    cycle: Cycle | None = None
+    why_not: str = ""
+    nearby: list[Nearby] = field(default_factory=list)
+    basin: Basin | None = None
+
+
+def _walk(
+    engine: CompiledEngine, state: Sequence[float], feet: Sequence[str] | None, to: float, settle: int, accuracy: float
+) -> tuple[Found, StepMap | None]:
+    """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
+    from osimlite.errors import OsimliteError
+    from osimlite.gait.cycle import find_cycle
+    from osimlite.gait.footing import find_footing
+    from osimlite.gait.stepmap import StepMap
+    from osimlite.gait.steps import walk_many
+
+    footing = find_footing(engine, feet)
+    (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=WALK_ACCURACY)
+    names = [engine.mechanism.coordinate_names[place] for place in engine.order]
+    found = Found(engine.mechanism.name, names, walk)
+    step_map = None
+    try:
+        step_map = StepMap(engine, state, footing=footing, accuracy=accuracy)
+        found.cycle = find_cycle(step_map, settle=settle)
+    except OsimliteError as error:
+        found.why_not = error.message
+    return found, step_map
+
+
+def _table(found: Found, files: Sequence[Path]) -> Any:
     from rich.table import Table
 
-    table = Table(title=engine.mechanism.name, title_justify="left", show_header=False)
+    walk, cycle = found.walk, found.cycle
+    table = Table(title=found.model, title_justify="left", show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     end = f"fell on {walk.fell_on} after {walk.end:.4g} s" if walk.fell_on else f"{walk.ending} after {walk.end:.4g} s"
     table.add_row("walk", f"{len(walk.steps)} steps, {len(walk.scuffs)} scuffs, {walk.distance:.4g} m; {end}")
-    if step_map is None or cycle is None:
-        table.add_row("cycle", why)
-        return table
-    table.add_row("step length", f"{cycle.length:.6g} m")
-    table.add_row("period", f"{cycle.period:.6g} s" + (" (mean of the two steps)" if cycle.per_stride else ""))
-    table.add_row("speed", f"{cycle.speed:.6g} m/s")
-    if cycle.scuffs:
-        table.add_row("scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}")
-    stable = "stable" if cycle.largest < 1.0 else "not stable"
-    table.add_row("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
-    sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
-    table.add_row("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
-    table.add_row("fixed point", f"to {cycle.residual:.2g} after {cycle.iterations} steps of Newton")
-    for part, count in nearby:
-        table.add_row(f"within {part:.0%}", f"{count} of {starts} starts make {steps} steps")
-    if found is not None:
-        table.add_row("basin", f"{found.part:.0%} of {found.steps.size} starts make {found.wanted} steps")
+    if cycle is None:
+        table.add_row("cycle", found.why_not)
+    else:
+        table.add_row("step length", f"{cycle.length:.6g} m")
+        table.add_row("period", f"{cycle.period:.6g} s" + (" (mean of the two steps)" if cycle.per_stride else ""))
+        table.add_row("speed", f"{cycle.speed:.6g} m/s")
+        if cycle.scuffs:
+            table.add_row("scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}")
+        stable = "stable" if cycle.largest < 1.0 else "not stable"
+        table.add_row("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
+        sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
+        table.add_row("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
+        table.add_row("fixed point", f"to {cycle.residual:.2g} after {cycle.iterations} steps of Newton")
+    for near in found.nearby:
+        table.add_row(f"within {near.part:.0%}", f"{near.walked} of {near.starts} starts make {near.steps} steps")
+    if found.basin is not None:
+        basin = found.basin
+        table.add_row("basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps")
     if files:
         table.add_row("files", ", ".join(str(path) for path in files))
     return table
 
 
-def _write(
-    folder: Path,
-    engine: Any,
-    walk: Walk,
-    cycle: Cycle | None,
-    nearby: list[tuple[float, int]],
-    starts: int,
-    found: Basin | None,
-    pictures: bool,
-) -> list[Path]:
+def _write(folder: Path, found: Found, pictures: bool) -> list[Path]:
     import json
 
     from osimlite.files import make_folder, write_atomically
 
     make_folder(folder)
+    written = [folder / "gait.json"]
+    write_atomically(written[0], (json.dumps(_facts(found), indent=1) + "\n").encode())
+    basin = found.basin
+    if basin is not None:
+        rows = [f"{basin.x.label},{basin.y.label},steps"]
+        for y, line in zip(basin.y.values.tolist(), basin.steps.tolist(), strict=True):
+            rows += [f"{x!r},{y!r},{count}" for x, count in zip(basin.x.values.tolist(), line, strict=True)]
+        written.append(folder / "basin.csv")
+        write_atomically(written[-1], ("\n".join(rows) + "\n").encode())
+        if pictures:
+            from osimlite.view.basin import draw_basin
+
+            written.append(draw_basin(basin, folder / "basin.png", title=found.model))
+    return written
+
+
+def _facts(found: Found) -> dict[str, Any]:
+    """What gait.json says."""
+
+    def touches(events: Sequence[Step | Scuff]) -> list[dict[str, Any]]:
+        return [{"time_s": each.time, "foot": each.foot, "length_m": each.length, "air_s": each.air} for each in events]
+
+    walk, cycle, names = found.walk, found.cycle, found.coordinates
     facts: dict[str, Any] = {
-        "model": engine.mechanism.name,
+        "model": found.model,
         "walk": {
-            "steps": [{"time_s": s.time, "foot": s.foot, "length_m": s.length, "air_s": s.air} for s in walk.steps],
-            "scuffs": [{"time_s": s.time, "foot": s.foot, "length_m": s.length, "air_s": s.air} for s in walk.scuffs],
+            "steps": touches(walk.steps),
+            "scuffs": touches(walk.scuffs),
             "end_s": walk.end,
             "ending": walk.ending,
             "fell_on": walk.fell_on,
         },
     }
     if cycle is not None:
-        names = [engine.mechanism.coordinate_names[place] for place in engine.order]
         n = len(names)
         facts["cycle"] = {
             "values": dict(zip(names, cycle.state[:n].tolist(), strict=True)),
@@ -193,17 +245,5 @@ def _write(
             "scuffs": cycle.scuffs,
             "per_stride": cycle.per_stride,
         }
-        facts["random_starts"] = [{"part": part, "walk": count, "of": starts} for part, count in nearby]
-    written = [folder / "gait.json"]
-    write_atomically(written[0], (json.dumps(facts, indent=1) + "\n").encode())
-    if found is not None:
-        rows = [f"{found.x.label},{found.y.label},steps"]
-        for y, line in zip(found.y.values.tolist(), found.steps.tolist(), strict=True):
-            rows += [f"{x!r},{y!r},{count}" for x, count in zip(found.x.values.tolist(), line, strict=True)]
-        written.append(folder / "basin.csv")
-        write_atomically(written[-1], ("\n".join(rows) + "\n").encode())
-        if pictures:
-            from osimlite.view.basin import draw_basin
-
-            written.append(draw_basin(found, folder / "basin.png", title=engine.mechanism.name))
-    return written
+        facts["random_starts"] = [{"part": each.part, "walk": each.walked, "of": each.starts} for each in found.nearby]
+    return facts
