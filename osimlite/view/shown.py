@@ -120,7 +120,9 @@ class Shown:
         scene, up = self.scene, self.scene.up
         q, arrows, loaded = self._moment(time)
         bodies = scene.at(q)
-        points = np.concatenate([*(p for _, p in scene.extent(bodies, q) if len(p)), *(a.point[None] for a in arrows)])
+        seen = [*(p for _, p in scene.extent(bodies, q) if len(p)), *(a.point[None] for a in arrows)]
+        # Of a model without bodies there is ground to see.
+        points = np.concatenate(seen or [np.array(scene.box(q))])
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
         camera = Camera.around(points, up, direction, size[0] / size[1])

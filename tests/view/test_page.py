@@ -151,3 +151,10 @@ def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):
     with pytest.raises(OsimliteError, match="belongs to a motion"):
         walker().write_picture(tmp_path / "b.png", size, 0.1)
     assert not (tmp_path / "b.png").exists()
+
+
+def test_a_model_without_bodies_is_shown_too(tmp_path: Path):
+    pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
+    blank = Shown.of(osimlite.Model(name="blank"))
+    assert "blank" in blank.write_page(tmp_path / "blank.html").read_text()
+    assert blank.write_picture(tmp_path / "blank.png", size=(40, 30)).stat().st_size > 0
