@@ -25,7 +25,7 @@ def joint_motions(
     """The factors of X_FM of a joint, and its coordinates in the order that the factors count them in.
 
     Raises:
-        ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii that are not positive.
+        ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii that are no numbers.
         UnsupportedError: a joint or a function of another class.
     """
     kind, coordinates = type(joint).__name__, list(joint.coordinates)
@@ -100,7 +100,8 @@ def _custom(
 
 
 def _radii(radii: Sequence[float], path: str) -> Sequence[float]:
-    if not all(0.0 < radius < np.inf for radius in radii):
+    # Models mirror an ellipsoid by negative radii: the point is then on the other side.
+    if not np.isfinite(radii).all():
         words = " ".join(f"{radius:g}" for radius in radii)
-        raise ModelError(f"the radii of the ellipsoid of '{path}' are {words}; give three positive lengths in m")
+        raise ModelError(f"the radii of the ellipsoid of '{path}' are {words}; give three lengths in m")
     return radii

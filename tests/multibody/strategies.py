@@ -46,14 +46,19 @@ class Case(NamedTuple):
     udot: Array
 
 
+def _radii(rng: np.random.Generator) -> Array:
+    """Radii of an ellipsoid (3,), m; of a mirrored one they are negative."""
+    return rng.uniform(0.1, 0.4, 3) * rng.choice((-1.0, 1.0))
+
+
 def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
     """The motions of a joint type with random properties."""
     if joint_type == "EllipsoidJoint":
-        return ellipsoid(rng.uniform(0.1, 0.4, 3))
+        return ellipsoid(_radii(rng))
     if joint_type == "ConstantCurvatureJoint":
         return constant_curvature(rng.uniform(0.2, 0.5), rng.uniform(-0.2, 0.2, 3).tolist())
     if joint_type == "ScapulothoracicJoint":
-        return scapulothoracic(rng.uniform(0.1, 0.4, 3), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0))
+        return scapulothoracic(_radii(rng), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0))
     if joint_type == "CustomJoint":
         spline = f.SimmSpline((-1.5, -0.4, 0.3, 1.6), rng.uniform(-0.5, 0.5, 4))
         axes = [

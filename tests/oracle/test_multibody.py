@@ -72,6 +72,33 @@ def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:
         assert transforms[body.name][:3, 3] == pytest.approx(position, abs=1e-13)
 
 
+@pytest.mark.parametrize("kind", ["EllipsoidJoint", "ScapulothoracicJoint"])
+@pytest.mark.parametrize("radii", [(0.07, 0.15, 0.09), (-0.07, -0.15, -0.09), (0.0, 0.1, -0.2)])
+def test_an_ellipsoid_may_be_mirrored(kind: str, radii: tuple[float, float, float], tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    model = _model()
+    body = _body(model, "scapula", rng)
+    joint = getattr(opensim, kind)()
+    joint.setName("mirrored")
+    joint.connectSocket_parent_frame(model.getGround())
+    joint.connectSocket_child_frame(body)
+    if kind == "EllipsoidJoint":
+        joint.set_radii_x_y_z(opensim.Vec3(*radii))
+    else:
+        joint.set_thoracic_ellipsoid_radii_x_y_z(opensim.Vec3(*radii))
+        for index, value in enumerate((0.01, 0.03)):
+            joint.set_scapula_winging_axis_origin(index, value)
+        joint.set_scapula_winging_axis_direction(0.4)
+    model.addJoint(joint)
+    mechanism = _built(model, tmp_path)
+    state = model.initSystem()
+    for index in range(len(mechanism.coordinates)):
+        coordinate = model.getCoordinateSet().get(index)
+        coordinate.setValue(state, rng.uniform(-0.6, 0.6))
+        coordinate.setSpeedValue(state, rng.uniform(-1.0, 1.0))
+    _same_motion(model, state, mechanism)
+
+
 @pytest.mark.parametrize("turned_round", [False, True], ids=["forward", "reversed"])
 @pytest.mark.parametrize("kind", JOINT_TYPES)
 def test_a_chain_of_two_bodies(kind: str, turned_round: bool, tmp_path: Path) -> None:
