@@ -74,6 +74,10 @@ class RecordedMotion:
                 found.add(place)
                 turned = table.in_degrees and mechanism.coordinates[place].motion_type == "rotational"
                 values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
+        if not mechanism.coordinates:
+            raise ModelError(
+                f"'{mechanism.name}' has no coordinates, so that it cannot follow a motion", file=str(path)
+            )
         if not found:
             raise ModelError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "

@@ -91,6 +91,8 @@ def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     write_sto(path, "motion", [0.0, 0.1], ("knee",), [[1.0], [2.0]])
     with pytest.raises(ModelError, match="no column is a coordinate of 'arm'; its coordinates are shoulder_0"):
         RecordedMotion.read(arm, path)
+    with pytest.raises(ModelError, match="'stone' has no coordinates"):
+        RecordedMotion.read(build_mechanism(Model(name="stone")), path)
     write_sto(path, "motion", [0.0, 0.2, 0.1], ("elbow_0",), [[1.0], [2.0], [3.0]])
     with pytest.raises(DocumentError, match=r"the time 0\.1 does not come after 0\.2"):
         RecordedMotion.read(arm, path)
