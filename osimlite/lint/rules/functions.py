@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import cast
+from typing import Final, cast
 
 from osimlite.lint.axes import axes_of
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
@@ -249,16 +249,28 @@ def coefficient_count(subject: Subject, found: Found) -> None:
             )
 
 
+_NEEDED: Final = {
+    "CoordinateCouplerConstraint": ("coupled_coordinates_function",),
+    "FunctionBasedBushingForce": tuple(
+        f"{letter}_{axis}_{kind}_{axis}_function" for letter, kind in (("m", "theta"), ("f", "delta")) for axis in "xyz"
+    ),
+    "FunctionBasedPath": ("length_function",),
+    "MovingPathPoint": ("x_location", "y_location", "z_location"),
+}
+"""Properties that may be empty by OpenSim's declarations, and without which it cannot compute."""
+
+
 @rule("OSIM605", "missing-function", severity=ERROR)
 def missing_function(subject: Subject, found: Found) -> None:
-    """A multiplier has no function to multiply.
+    """A function is not there that OpenSim cannot do without.
 
     ## What it does
-    Reports MultiplierFunctions without a function inside.
+    Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and empty
+    functions of MovingPathPoints and FunctionBasedBushingForces.
 
     ## Why is this bad
-    OpenSim refuses the model when it needs the value. Scaling a model wraps functions like this; one that was taken out
-    later leaves an empty multiplier.
+    OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in multipliers; one that
+    was taken out later leaves an empty multiplier.
 
     ## Example
     ```xml
@@ -292,8 +304,16 @@ def missing_function(subject: Subject, found: Found) -> None:
     </PinJoint>
     ```
     """
+    if subject.has_unknown:
+        return
+    for kind, properties in _NEEDED.items():
+        refused = "OpenSim refuses the model" if len(properties) == 1 else "OpenSim fails when it needs a value"
+        for item in subject.named(kind):
+            for name in properties:
+                if getattr(item, name) is None:
+                    found(f"{called(item)} has no {name}: {refused}", item, tag=name)
     for function in subject.each(MultiplierFunction):
-        if function.function is None and not subject.has_unknown:
+        if function.function is None:
             found(
                 f"{subject.called_with(function)} has no function to multiply: OpenSim fails when it needs a value",
                 function,
