@@ -76,7 +76,7 @@ class RecordedMotion:
                 values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
         if not mechanism.coordinates:
             raise ModelError(
-                f"'{mechanism.name}' has no coordinates, so that it cannot follow a motion", file=str(path)
+                f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=str(path)
             )
         if not found:
             raise ModelError(

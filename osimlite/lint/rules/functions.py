@@ -265,12 +265,12 @@ def missing_function(subject: Subject, found: Found) -> None:
     """A function is not there that OpenSim cannot do without.
 
     ## What it does
-    Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and empty
-    functions of MovingPathPoints and FunctionBasedBushingForces.
+    Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and
+    empty functions of MovingPathPoints and FunctionBasedBushingForces.
 
     ## Why is this bad
-    OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in multipliers; one that
-    was taken out later leaves an empty multiplier.
+    OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in multipliers; one
+    that was taken out later leaves an empty multiplier.
 
     ## Example
     ```xml
