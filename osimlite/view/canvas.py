@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,8 @@ from numpy.typing import NDArray
 from osimlite.multibody.spatial import Array
 from osimlite.translate.surface import Indices
 
-_AT_ONCE = 2_000_000
-"""How many pixels are worked on in one step; more would take much memory."""
-
-Fragments = tuple[Indices, Indices, Array]
-"""Pixels (k,), triangles (k,) and the weights (k, 3) of the triangles' corners at the pixels' centres."""
+_AT_ONCE = 300_000
+"""How many pixels are worked on in one step; more would take more memory and leave the processor's caches."""
 
 
 class Canvas:
@@ -37,12 +35,12 @@ class Canvas:
             places: position and depth of their corners (t, 3, 3).
             colors: of their corners (t, 3, 3), 0 to 1.
         """
-        for pixels, triangles, weights in self._fragments(places):
-            depths = np.einsum("kc,kc->k", weights, places[triangles, :, 2])
+        for spans in self._spans(places):
+            pixels, which, steps = spans.pixels()
+            depths = spans.values(places[:, :, 2], which, steps)
             np.maximum.at(self._depths, pixels, depths)
-            seen = depths == self._depths[pixels]
-            pixels, triangles, weights = pixels[seen], triangles[seen], weights[seen]
-            self._colors[pixels] = np.einsum("kc,kcd->kd", weights, colors[triangles])
+            seen = np.flatnonzero(depths == self._depths[pixels])
+            self._colors[pixels[seen]] = spans.values(colors, which[seen], steps[seen, None])
 
     def glassy(self, places: Array, colors: Array, opacities: Array) -> None:
         """Draw triangles that let shine through what is behind them; to be called once, after all solid ones.
@@ -53,12 +51,12 @@ class Canvas:
             opacities: of the triangles (t,), 0 to 1.
         """
         parts: list[tuple[Indices, Array, Array, Array]] = []
-        for pixels, triangles, weights in self._fragments(places):
-            depths = np.einsum("kc,kc->k", weights, places[triangles, :, 2])
-            seen = depths > self._depths[pixels]
-            pixels, triangles, weights = pixels[seen], triangles[seen], weights[seen]
-            shades = np.einsum("kc,kcd->kd", weights, colors[triangles])
-            parts.append((pixels, depths[seen], shades, opacities[triangles]))
+        for spans in self._spans(places):
+            pixels, which, steps = spans.pixels()
+            depths = spans.values(places[:, :, 2], which, steps)
+            seen = np.flatnonzero(depths > self._depths[pixels])
+            shades = spans.values(colors, which[seen], steps[seen, None])
+            parts.append((pixels[seen], depths[seen], shades, opacities[spans.triangles[which[seen]]]))
         if not parts:
             return
         pixels, depths, shades, alphas = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -73,12 +71,15 @@ class Canvas:
 
     def pixels(self, fine: int = 1) -> NDArray[np.uint8]:
         """The picture (height, width, 3), every `fine` times `fine` pixels made one."""
-        shape = self.height // fine, fine, self.width // fine, fine, 3
-        colors = self._colors.reshape(shape).mean(axis=(1, 3))
-        found: NDArray[np.uint8] = np.rint(255.0 * np.clip(colors, 0.0, 1.0)).astype(np.uint8)
+        fields = self._colors.reshape(self.height // fine, fine, self.width // fine, fine, 3)
+        # One after the other: numpy takes several times as long for the mean over axes that short.
+        colors = np.zeros_like(fields[:, 0, :, 0])
+        for row, column in np.ndindex(fine, fine):
+            colors += fields[:, row, :, column]
+        found: NDArray[np.uint8] = np.rint(255.0 / fine**2 * colors).clip(0.0, 255.0).astype(np.uint8)
         return found
 
-    def _fragments(self, places: Array) -> Iterator[Fragments]:
+    def _spans(self, places: Array) -> Iterator[_Spans]:
         """The pixels whose centres triangles cover, in portions: row by row, from edge to edge."""
         flat = places[:, :, :2]
         with np.errstate(all="ignore"):
@@ -89,26 +90,59 @@ class Canvas:
         bottom = np.floor(high[chosen, 1] - 0.5).clip(-1, self.height - 1).astype(np.int64)
         which, rows = _counted(top, bottom - top + 1)
         triangles = chosen[which]
-        starts, ends = self._spans(flat[triangles], _middle(rows))
-        lengths = (ends - starts + 1).clip(0)
+        starts, ends = self._ends(flat[triangles], _middle(rows))
+        some = np.flatnonzero(starts <= ends)
+        triangles, rows, starts, lengths = triangles[some], rows[some], starts[some], (ends - starts + 1)[some]
         total = np.cumsum(lengths)
         cuts = np.searchsorted(total, np.arange(_AT_ONCE, total[-1] if len(total) else 0, _AT_ONCE))
         for part in np.split(np.arange(len(rows)), cuts):
-            span, columns = _counted(starts[part], lengths[part])
-            row, triangle = rows[part][span], triangles[part][span]
-            yield row * self.width + columns, triangle, _weights(flat[triangle], _middle(columns), _middle(row))
+            triangle, row, start = triangles[part], rows[part], starts[part]
+            weights = _weights(flat[triangle], _middle(start), _middle(row))
+            yield _Spans(triangle, row * self.width + start, lengths[part], *weights)
 
-    def _spans(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
+    def _ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
         """The first and the last pixel of a row that triangles cover, given corners (r, 3, 2) and heights (r,)."""
-        others = corners[:, (1, 2, 0)]
-        with np.errstate(all="ignore"):
-            along = (y[:, None] - corners[:, :, 1]) / (others[:, :, 1] - corners[:, :, 1])
-            x = corners[:, :, 0] + along * (others[:, :, 0] - corners[:, :, 0])
-            met = (along >= 0.0) & (along <= 1.0)
-        left = np.where(met, x, np.inf).min(axis=1)
-        right = np.where(met, x, -np.inf).max(axis=1)
+        left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+        for one, other in ((0, 1), (1, 2), (2, 0)):
+            (ax, ay), (bx, by) = corners[:, one].T, corners[:, other].T
+            with np.errstate(all="ignore"):
+                along = (y - ay) / (by - ay)
+                x = ax + along * (bx - ax)
+                met = (along >= 0.0) & (along <= 1.0)
+            np.minimum(left, x, out=left, where=met)
+            np.maximum(right, x, out=right, where=met)
         start = np.ceil(left - 0.5).clip(0, self.width).astype(np.int64)
         return start, np.floor(right - 0.5).clip(-1, self.width - 1).astype(np.int64)
+
+
+class _Spans(NamedTuple):
+    """Pixels side by side that a triangle covers.
+
+    Attributes:
+        triangles: to which they belong (s,).
+        starts: number of the first pixel (s,).
+        lengths: how many pixels (s,).
+        weights: of the triangle's corners at the first pixel's centre (s, 3).
+        changes: of the weights from one pixel to the next (s, 3).
+    """
+
+    triangles: Indices
+    starts: Indices
+    lengths: Indices
+    weights: Array
+    changes: Array
+
+    def pixels(self) -> tuple[Indices, Indices, Indices]:
+        """All pixels (k,), the span of each, and its place in the span."""
+        which, steps = _counted(np.zeros_like(self.lengths), self.lengths)
+        return self.starts[which] + steps, which, steps
+
+    def values(self, corners: Array, which: Indices, steps: Indices) -> Array:
+        """What has these values (t, 3, ...) at the corners, at pixels."""
+        own = corners[self.triangles]
+        first, change = (np.einsum("sc,sc...->s...", part, own) for part in (self.weights, self.changes))
+        found: Array = first[which] + change[which] * steps
+        return found
 
 
 def _middle(numbers: Indices) -> Array:
@@ -121,16 +155,18 @@ def _counted(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
     counts = counts.clip(0)
     which = np.repeat(np.arange(len(counts)), counts)
     before = np.cumsum(counts) - counts
-    return which, np.arange(len(which)) - before[which] + starts[which]
+    return which, np.arange(len(which)) + (starts - before)[which]
 
 
-def _weights(corners: Array, x: Array, y: Array) -> Array:
-    """The weights (k, 3) of the corners (k, 3, 2) of triangles at points in them."""
+def _weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
+    """The weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
     (ax, ay), (bx, by), (cx, cy) = (corners[:, place].T for place in range(3))
-    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     with np.errstate(all="ignore"):
-        first = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
-        second = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
-    found = np.stack((first, second, 1.0 - first - second), axis=1)
+        size = 1.0 / ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+        first = ((bx - x) * (cy - y) - (by - y) * (cx - x)) * size
+        second = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) * size
+        found = np.stack((first, second, 1.0 - first - second), axis=1)
+        change = np.stack(((by - cy) * size, (cy - ay) * size, (ay - by) * size), axis=1)
     # A triangle seen from its edge covers pixels without a middle.
-    return np.where(np.isfinite(found), found, 1.0 / 3.0)
+    clear = np.isfinite(found).all(axis=1, keepdims=True) & np.isfinite(change).all(axis=1, keepdims=True)
+    return np.where(clear, found, 1.0 / 3.0), np.where(clear, change, 0.0)
