@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 PURPOSES = {
     "": "read, write, check: build, validate, format, upgrade, diff, info",
     "sim": "translate, simulate, kinematics, inverse-dynamics",
-    "fast": "simulate --engine compiled",
-    "plot": "simulate --plot",
+    "fast": "gait, sweep, optimize, simulate --engine compiled",
+    "plot": "simulate --plot, gait --basin",
     "view": "view, simulate --animate",
     "yaml": "models as YAML",
     "frame": "trajectory.to_frame()",
@@ -113,8 +114,7 @@ def examine(name: str) -> Package:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         return Package(name, "", "")
-    owned = metadata.packages_distributions().items()
-    modules = sorted(module for module, owners in owned if name.lower() in (owner.lower() for owner in owners))
+    modules = _modules(tuple(sys.path)).get(name.lower(), [])
     # Some bring more than the module that bears their name; a few have none of it (PIL of pillow, yaml of pyyaml).
     named = name.lower().replace("-", "_")
     main = named if named in modules else next(module for module in modules if not module.startswith("_"))
@@ -123,6 +123,16 @@ def examine(name: str) -> Package:
         return Package(name, version, "")
     words = done.stderr.strip().splitlines() or [f"its process ended with {done.returncode}"]
     return Package(name, version, words[-1])
+
+
+@cache
+def _modules(path: tuple[str, ...]) -> dict[str, list[str]]:
+    """What can be imported of each package on a path, by the package's name in small letters."""
+    found: dict[str, list[str]] = {}
+    for module, owners in sorted(metadata.packages_distributions().items()):
+        for owner in owners:
+            found.setdefault(owner.lower(), []).append(module)
+    return found
 
 
 def _show_places(console: Console, model: Path | None) -> None:
