@@ -49,7 +49,8 @@ Geometry = Annotated[
         "--geometry",
         metavar="FOLDER",
         help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
-        "Folders in the environment variable OSIMLITE_GEOMETRY, separated by colons, come last.",
+        "The mesh-paths of the settings and the folders in the environment variable OSIMLITE_GEOMETRY, separated by "
+        "colons, come last.",
     ),
 ]
 
@@ -103,6 +104,18 @@ def named_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
         if not place.is_dir():
             raise MissingFileError("--geometry names a folder that is not there", file=str(place))
     return geometry or ()
+
+
+def mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
+    """Where mesh files of a model are looked for after its own folder: those of ``--geometry``, then of the settings.
+
+    Raises:
+        MissingFileError: a folder that is named on the command line is not there.
+        OsimliteError: the settings cannot be read.
+    """
+    from osimlite.lint.settings import settings_for
+
+    return [*named_folders(geometry), *map(Path, settings_for(file.resolve().parent).mesh_paths)]
 
 
 def checked_numbers(numbers: str) -> NumberStyle:

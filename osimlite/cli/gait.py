@@ -42,7 +42,9 @@ def gait(
     accuracy: Annotated[float, typer.Option(help="Of the integrator in the step map.")] = 1e-10,
     perturb: Annotated[
         list[float] | None,
-        typer.Option(metavar="PART", help="Start at random so near the start: 0.05 is 5 %.", show_default=False),
+        typer.Option(
+            metavar="PART", help="Change the start at random by this part at most: 0.05 is 5 %.", show_default=False
+        ),
     ] = None,
     starts: Annotated[int, typer.Option(min=1, metavar="N", help="How many such starts.")] = 60,
     seed: Annotated[int, typer.Option(help="The same seed, the same such starts.")] = 0,

@@ -66,7 +66,7 @@ def translate(
         effort=effort,
         velocity=velocity,
         folder=file.parent,
-        geometry=options.named_folders(geometry),
+        geometry=options.mesh_folders(file, geometry),
     )
     written = urdf.write(output)
 

@@ -64,7 +64,6 @@ def view(
     from rich.console import Console
 
     from osimlite.document.reader import read
-    from osimlite.lint.settings import settings_for
     from osimlite.multibody import build_mechanism
     from osimlite.translate.mesh_files import geometry_folders
     from osimlite.view.shown import Shown
@@ -72,8 +71,7 @@ def view(
     model = read(file)
     mechanism = build_mechanism(model)
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
-    settings = [Path(path) for path in settings_for(file.resolve().parent).mesh_paths]
-    folders = geometry_folders(file.parent, [*options.named_folders(geometry), *settings])
+    folders = geometry_folders(file.parent, options.mesh_folders(file, geometry))
     shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
     console = Console(highlight=False, soft_wrap=True)
     for remark in shown.remarks:

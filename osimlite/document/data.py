@@ -27,6 +27,7 @@ from osimlite.schema.registry import class_for, tags
 from osimlite.text import did_you_mean
 
 SUFFIXES = (".json", ".yaml", ".yml")
+"""How the names of data files end."""
 
 _MOST_NUMBERS = 2_000_000
 """More than any real model has, an object counted as ten; the aliases of a short YAML text can make it endless."""

@@ -10,14 +10,11 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from osimlite._load import errors_placed, module_named, module_of_file
-from osimlite.document.data import read_data
+from osimlite.document.data import SUFFIXES, read_data
 from osimlite.errors import OsimliteError
 from osimlite.models import BUILT_IN
 from osimlite.schema.model import Model
 from osimlite.text import did_you_mean, listed
-
-DATA = (".yaml", ".yml", ".json")
-"""How the names of data files end."""
 
 _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
@@ -33,7 +30,7 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     Raises:
         OsimliteError: there is no such source, it has no such parameter, or it does not return a Model.
     """
-    if source.endswith(DATA):
+    if source.endswith(SUFFIXES):
         if parameters:
             raise OsimliteError(f"'{source}' is data and takes no parameters; edit the file, or build from Python")
         return read_data(source)
@@ -53,7 +50,7 @@ def parameters_of(source: str) -> dict[str, Any]:
     Raises:
         OsimliteError: there is no such source.
     """
-    if source.endswith(DATA):
+    if source.endswith(SUFFIXES):
         return {}
     return {name: parameter.default for name, parameter in inspect.signature(_function(source)).parameters.items()}
 

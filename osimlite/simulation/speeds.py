@@ -47,11 +47,6 @@ class Speeds:
             if free:
                 self._turning.append((mobilizer, free))
 
-    @property
-    def are_rates(self) -> bool:
-        """Whether nothing has to be converted."""
-        return not self._turning
-
     def rates(self, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Qdot = N u; SimulationError where N is singular."""
         result = list(u)

@@ -72,7 +72,7 @@ def test_translate_writes_collision_shapes_and_limits(walker: Path) -> None:
     assert "<collision " in text and 'effort="50" velocity="7"' in text
 
 
-def test_folders_of_meshes_are_named_by_options_and_the_environment(
+def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
     tmp_path: Path, fixtures: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = osimlite.Model(name="bones")
@@ -84,7 +84,8 @@ def test_folders_of_meshes_are_named_by_options_and_the_environment(
         shutil.copy(fixtures / "meshes" / f"{name}.vtp", tmp_path / name)
     osimlite.write(model, tmp_path / "bones.osim")
     monkeypatch.setenv("OSIMLITE_GEOMETRY", "nowhere:strips")
-    code, out, _ = run("bones.osim", "--geometry", "ascii", "--geometry", "binary", "-o", "robot", folder=tmp_path)
+    (tmp_path / "osimlite.toml").write_text('mesh-paths = ["binary"]\n')
+    code, out, _ = run("bones.osim", "--geometry", "ascii", "-o", "robot", folder=tmp_path)
     assert code == 0 and "VTK's format" in out
     assert sorted(path.name for path in (tmp_path / "robot/meshes").iterdir()) == [
         "ascii.obj",
