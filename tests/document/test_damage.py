@@ -55,7 +55,7 @@ def test_a_damaged_file_is_read_or_refused(seed: int) -> None:
     fates: dict[str, int] = {"read": 0, "refused": 0}
     for _ in range(30):
         path = random.choice(paths)
-        start = time.perf_counter()
+        start = time.process_time()
         fates[fate(damaged(path.read_bytes(), random))] += 1
-        assert time.perf_counter() - start < 5, path
+        assert time.process_time() - start < 5, path
     assert min(fates.values()) > 0

@@ -193,8 +193,8 @@ def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
 )
 def test_time_is_linear_in_the_length(piece: str) -> None:
     text = "<OpenSimDocument Version='40600'><Model>" + piece * (400_000 // len(piece))
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(DocumentError) as caught:
         read_text(text)
     assert caught.value.line == 1
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5

@@ -53,7 +53,7 @@ class Cluster:
             process.wait()
 
 
-def wait_for(what, words, seconds=60):
+def wait_for(what, words, seconds=120):
     deadline = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < deadline, f"waited for {words}"
