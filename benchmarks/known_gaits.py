@@ -172,10 +172,12 @@ class Legs:
         swing = 1 - standing
         passed = 0.0
         # Both feet push until the one behind leaves the ground.
-        runs = self._run(y, None, 0.5, [Watch("lift", contact=feet[swing], stops=-1)])
-        if runs.endings[0] == STOPPED:
+        if self.engine.touching(0.0, y.tolist()) >> swing & 1:
+            runs = self._run(y, None, 0.5, [Watch("lift", contact=feet[swing], stops=-1)])
             y, passed = runs.states[0], float(runs.times[0])
-        self.rate = float(y[len(self.names) + self.place(f"{legs[standing]}_rz")])
+        # The rate of the leg, as far as it moves the hip: its foot may slip a little.
+        angle, n = float(y[self.place(f"{legs[standing]}_rz")]), len(self.names)
+        self.rate = -float(y[n + self.place("tx")] * cos(angle) + y[n + self.place("ty")] * sin(angle))
         # It swings through until it is ahead.
         ahead = Watch("ahead", coordinate=f"{legs[swing]}_rz", level=-self.slope, stops=1)
         runs = self._run(y, self.without[swing], 5.0, [ahead])

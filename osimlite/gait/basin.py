@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError
 from osimlite.gait.cycle import Cycle
@@ -94,22 +95,26 @@ def stood(engine: CompiledEngine, footing: Footing, states: Floats, depth: float
     return placed
 
 
-def perturbed(step_map: StepMap, cycle: Cycle, part: float, count: int, seed: int) -> Floats:
-    """Random starts (count, 2n) near a cycle.
+def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int) -> Floats:
+    """Random starts (count, 2n) near a state.
 
-    Every value and every speed that is not neutral is multiplied by a number that lies within `part` of 1; then the
-    walker is lifted or lowered until the foot that strikes is on the ground, as it was.
+    Every value and every speed, as far as it is not neutral, is multiplied by a number that lies within `part` of 1;
+    then the walker is lifted or lowered until the foot that stands is as deep in the ground as it was.
 
     Args:
         step_map: of the walker.
-        cycle: its cycle.
+        state: best one at which a single foot stands (2n,).
         part: 0.05 for five per cent.
         count: how many starts.
         seed: of the random numbers.
     """
-    change = np.random.default_rng(seed).uniform(-part, part, (count, len(cycle.state))) * cycle.state
-    across = step_map.basis @ step_map.basis.T
-    return stood(step_map.engine, step_map.footing, cycle.state + change @ across)
+    here = np.array(state, dtype=float)
+    change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
+    engine, footing = step_map.engine, step_map.footing
+    _, depths = along_slope(engine, here[None], step_map.numbers)
+    deepest = [max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet]
+    foot = int(np.argmax(deepest))
+    return stood(engine, footing, here + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot)
 
 
 def walks_from(

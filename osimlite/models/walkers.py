@@ -28,12 +28,12 @@ STEADY_START = {
 
 
 HUMAN_START = {
-    "Pelvis_tx": (0.0, 0.68),
-    "Pelvis_ty": (0.89, 0.12),
-    "RHip_rz": (0.15, -0.69),
-    "LHip_rz": (-0.11, 2.9),
-    "RKnee_rz": (0.037, -0.12),
-    "LKnee_rz": (-0.73, -4.0),
+    "Pelvis_tx": (0.0, 0.45),
+    "Pelvis_ty": (0.9, 0.03),
+    "RHip_rz": (0.0073, -0.52),
+    "LHip_rz": (0.22, 0.97),
+    "RKnee_rz": (0.041, 0.024),
+    "LKnee_rz": (-0.73, 2.5),
 }
 """Value and speed of each coordinate of the human walker in the middle of a step, rounded to two digits."""
 
@@ -61,7 +61,7 @@ def steady_walker(shank_inertia: float = 0.091, foot_ahead: float = 0.072) -> Mo
 
 
 def human_walker(
-    slope: float = 4.15, foot_radius: float = 0.17, foot_ahead: float = 0.048, knee_stiffness: float = 15.8
+    slope: float = 2.5, foot_radius: float = 0.17, foot_ahead: float = 0.044, knee_stiffness: float = 15.8
 ) -> Model:
     """Build the walker whose mass is distributed as in a human, on a gentle slope.
 
