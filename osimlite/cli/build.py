@@ -42,14 +42,10 @@ def build(
     from osimlite.document.printer import to_text, write
     from osimlite.errors import OsimliteError
     from osimlite.lint import validate
-    from osimlite.models import BUILT_IN
-    from osimlite.models.source import describe, make_model
+    from osimlite.models.source import make_model
 
     if list_models:
-        import textwrap
-
-        for name in BUILT_IN:
-            typer.echo(textwrap.fill(f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)))
+        _list_models()
         return
     if source is None:
         raise OsimliteError("name a model to build, or use --list")
@@ -71,3 +67,13 @@ def build(
     warnings = len(report.warnings)
     advice = f"; {warnings} warning{'s' * (warnings != 1)}: see osimlite validate {target}" if warnings else ""
     typer.echo(f"{target}: {count} components{advice}")
+
+
+def _list_models() -> None:
+    import textwrap
+
+    from osimlite.models import BUILT_IN
+    from osimlite.models.source import describe
+
+    for name in BUILT_IN:
+        typer.echo(textwrap.fill(f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)))

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from osimlite.cli import _options as options
+from osimlite.text import listed
+
+if TYPE_CHECKING:
+    from osimlite.translate.fidelity import Fidelity
 
 
 def translate(
@@ -47,11 +51,9 @@ def translate(
     from typing import cast
 
     from rich.console import Console
-    from rich.table import Table
 
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError
-    from osimlite.text import listed
     from osimlite.translate.export import Limits, to_urdf
 
     if to != "urdf":
@@ -71,15 +73,8 @@ def translate(
     written = urdf.write(output)
 
     console = Console()
-    table = Table(title=f"What URDF cannot say of {urdf.fidelity.model}", title_justify="left", show_lines=True)
-    table.add_column("what", overflow="fold", ratio=4)
-    table.add_column("done about it", overflow="fold", ratio=3)
-    table.add_column("where", overflow="fold", ratio=3)
-    for group in urdf.fidelity.groups():
-        names = [path.rsplit("/", 1)[1] or "the model" for path in group.components]
-        table.add_row(group.cannot_say, group.done, listed(names, most=3))
-    if table.row_count:
-        console.print(table)
+    if len(urdf.fidelity):
+        console.print(_table(urdf.fidelity))
     robot = urdf.robot
     console.print(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
@@ -87,3 +82,17 @@ def translate(
         highlight=False,
         soft_wrap=True,
     )
+
+
+def _table(fidelity: Fidelity) -> Any:
+    """What is lost, one row for all components of which the same is said."""
+    from rich.table import Table
+
+    table = Table(title=f"What URDF cannot say of {fidelity.model}", title_justify="left", show_lines=True)
+    table.add_column("what", overflow="fold", ratio=4)
+    table.add_column("done about it", overflow="fold", ratio=3)
+    table.add_column("where", overflow="fold", ratio=3)
+    for group in fidelity.groups():
+        names = [path.rsplit("/", 1)[1] or "the model" for path in group.components]
+        table.add_row(group.cannot_say, group.done, listed(names, most=3))
+    return table

@@ -25,7 +25,7 @@ SIDES = (("Right", 1.0, 30.0), ("Left", -1.0, -10.0))
 def dynamic_walker(
     pelvis_width: float = 0.20, thigh_length: float = 0.40, shank_length: float = 0.435, slope: float = 10.0
 ) -> Model:
-    """Build the walker.
+    """Build the walker of the exercise "Building a Dynamic Walker": passive, with knees, on a slope.
 
     Args:
         pelvis_width: distance from the middle of the pelvis to each hip (m); the exercise's pelvisWidth.

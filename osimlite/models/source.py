@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -58,7 +57,7 @@ def parameters_of(source: str) -> dict[str, Any]:
 def describe(name: str) -> str:
     """One line about a built-in model: its summary and its parameters."""
     function = _function(BUILT_IN[name])
-    summary = (inspect.getdoc(sys.modules[function.__module__]) or "").split("\n")[0]
+    summary = (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build the ").removesuffix(".")
     parameters = ", ".join(f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values())
     return f"{summary} ({parameters})"
 
