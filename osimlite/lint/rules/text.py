@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Final
 
 from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError, VersionError
@@ -15,7 +16,17 @@ _OLDEST_FOR_OPENSIM = 10901
 """The oldest version that OpenSim 4.6 loads."""
 _SOCKETS = 30505
 """The version in which joints, points and forces got sockets."""
-_SOCKET = re.compile(r"<(socket_(?:parent|child)_frame)>")
+_SOCKET = re.compile(r"<(socket_\w+)>")
+_LATE: Final = (
+    (re.compile(r"\w+Joint"), ("socket_parent_frame", "socket_child_frame")),
+    (re.compile("Marker"), ("socket_parent_frame",)),
+    (re.compile("(?:Conditional|Moving)PathPoint"), ("socket_coordinate", *(f"socket_{x}_coordinate" for x in "xyz"))),
+    (re.compile(r"Contact(?:HalfSpace|Sphere|Mesh)"), ("socket_frame",)),
+    (re.compile(r"\w*BushingForce|WeldConstraint"), ("socket_frame1", "socket_frame2")),
+    (re.compile("(?:Point|ConstantDistance)Constraint"), ("socket_body_1", "socket_body_2")),
+    (re.compile("PointOnLineConstraint"), ("socket_line_body", "socket_follower_body")),
+)
+"""Sockets that OpenSim does not take in an older document, by class; those of other classes it does."""
 
 
 @rule("OSIM001", "syntax-error", severity=ERROR)
@@ -164,7 +175,8 @@ def document_version(subject: Subject, found: Found) -> None:
     """The document has no version, or none that is read.
 
     ## What it does
-    Reports a `Version` that is missing, no whole number, too old to be read here, or newer than OpenSim 4.6 writes.
+    Reports a `Version` that is missing, no whole number, too old to be read here, newer than OpenSim 4.6 writes, or
+    older than a socket in the document that OpenSim takes in newer ones only.
 
     ## Why is this bad
     OpenSim reads each file by the rules of its version. Without one it fails; from a version it does not know it
@@ -197,10 +209,10 @@ def document_version(subject: Subject, found: Found) -> None:
             number=0,
             attribute="Version",
         )
-    if subject.version is not None and subject.version < _SOCKETS and (word := _SOCKET.search(subject.source.text)):
+    if subject.version is not None and subject.version < _SOCKETS and (late := _late_socket(subject.source)):
         found(
-            f"the document says version {subject.version} and holds <{word[1]}>, which came later: OpenSim reads it by "
-            "the rules of the old format and fails",
+            f"the document says version {subject.version} and holds {late}, which came later: OpenSim reads it by "
+            "the rules of the old format and does not find it",
             number=0,
             attribute="Version",
             suggestion=str(CURRENT_VERSION),
@@ -214,6 +226,20 @@ def document_version(subject: Subject, found: Found) -> None:
             severity=WARNING,
             suggestion=str(CURRENT_VERSION),
         )
+
+
+def _late_socket(source: Source) -> str:
+    """The first socket that is not read in an old document, as ``<socket> in <Class>``; empty if there is none."""
+    if not _SOCKET.search(source.text):
+        return ""
+    for number, span in enumerate(source.spans):
+        for cls, sockets in _LATE:
+            if cls.fullmatch(span.tag):
+                inside = {source.spans[child].tag for child in source.children(number)}
+                late = [socket for socket in sockets if socket in inside]
+                if late:
+                    return f"<{late[0]}> in <{span.tag}>"
+    return ""
 
 
 @rule("OSIM005", "merge-conflict", severity=ERROR)
