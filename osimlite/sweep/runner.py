@@ -113,9 +113,10 @@ class Runner:
             rows = np.array(places)[good]
             for made in self.measures:
                 self._measure(made, batch, rows, measures[made.name], status, reasons)
-        for place in (number for number in range(count) if status[number] == FAILED):
-            for column in measures.values():
-                column[place] = np.nan
+        # A measure may have failed after others had been taken.
+        failed = [place for place in range(count) if status[place] == FAILED]
+        for column in measures.values():
+            column[failed] = np.nan
         return Block(status, reasons, times, measures, time.perf_counter() - started)
 
     def _measure(
@@ -127,20 +128,17 @@ class Runner:
         status: list[str],
         reasons: list[str | None],
     ) -> None:
+        """Fill in a measure of some runs; a function of a user may raise anything, which is told of."""
         try:
             column[rows] = made.of(batch)
-            return
-        except Exception:
+        except Exception as error:
             if len(rows) > 1:
                 # One by one, to find which run it is.
                 for number, row in enumerate(rows):
                     self._measure(made, _part(batch, number), np.array([row]), column, status, reasons)
-                return
-            import sys
-
-            error = sys.exc_info()[1]
-        status[rows[0]] = FAILED
-        reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
+            else:
+                status[rows[0]] = FAILED
+                reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
 
     # --------------------------------------------------------------------------------------------- motions
     def _simulate(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
