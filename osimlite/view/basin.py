@@ -35,7 +35,15 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
         basin.steps, origin="lower", extent=extent, aspect="auto", cmap="viridis", vmin=0, vmax=basin.wanted
     )
     axes.plot(*basin.center, marker="o", mfc="#d55e00", mec="white", ms=8)
-    axes.annotate("cycle", basin.center, (8, 6), textcoords="offset points", color="white", fontsize=10)
+    axes.annotate(
+        "cycle",
+        basin.center,
+        (8, 6),
+        textcoords="offset points",
+        color="black",
+        fontsize=10,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5},
+    )
     axes.set_xlabel(basin.x.label)
     axes.set_ylabel(basin.y.label)
     axes.set_title(f"{title}: {100.0 * basin.part:.0f} % of {basin.steps.size} starts walk", loc="left", fontsize=11)

@@ -1,0 +1,169 @@
+"""The step map, its fixed points, and what is around them, on the walkers of the library."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from osimlite.cli import app
+from osimlite.errors import OsimliteError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.models.walkers import human_walker, steady_walker
+from osimlite.simulation import Simulation
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.gait.basin import find_basin, perturbed, walks_from
+from osimlite.gait.cycle import find_cycle
+from osimlite.gait.stepmap import StepMap
+from osimlite.gait.steps import along_slope, walk_many
+
+
+@pytest.fixture(scope="module")
+def steady():
+    with Simulation(steady_walker(), "compiled") as simulation:
+        start = np.array(simulation.initial_state({}, {}))
+        step_map = StepMap(simulation.engine, start)
+        yield SimpleNamespace(
+            engine=simulation.engine,
+            start=start,
+            step_map=step_map,
+            cycle=find_cycle(step_map),
+            names=names(simulation),
+        )
+
+
+def names(simulation) -> list[str]:
+    infos = simulation.mechanism.coordinates
+    return [infos[place].name for place in simulation.engine.order]
+
+
+def test_the_steady_walker_walks_in_a_stable_cycle(steady):
+    cycle = steady.cycle
+    assert cycle.residual < 1e-9 and cycle.scuffs == 0 and not cycle.per_stride
+    assert (cycle.length, cycle.period) == pytest.approx((0.624657, 0.811430), abs=2e-6)
+    assert cycle.largest == pytest.approx(0.4684, abs=2e-3) and cycle.largest < 0.6
+    assert len(cycle.multipliers) == 11 and cycle.neutral == 3
+    # Along the motion itself the section has no extent.
+    assert np.abs(cycle.multipliers).min() < 1e-4
+
+
+def test_multipliers_say_how_fast_a_walker_comes_back(steady):
+    """The error shrinks over ten steps as the largest multiplier tells."""
+    step_map, cycle = steady.step_map, steady.cycle
+    rng = np.random.default_rng(1)
+    away = cycle.state + step_map.basis @ rng.normal(0.0, 1e-4, 11)
+    y, sizes = away[None], []
+    for _ in range(14):
+        y = step_map(y).states
+        sizes.append(np.linalg.norm(step_map.reduce(y[0]) - step_map.reduce(cycle.state)))
+    rate = (sizes[13] / sizes[3]) ** 0.1
+    assert rate == pytest.approx(cycle.largest, rel=0.15)
+
+
+def test_neutral_directions_are_the_slope_and_the_turn_of_the_pelvis(steady):
+    n = len(steady.names)
+    place = steady.names.index
+    along, turned, spun = (np.zeros(2 * n) for _ in range(3))
+    tilt = np.pi / 2 - 1.57
+    along[[place("Pelvis_tx"), place("Pelvis_ty")]] = np.cos(tilt), np.sin(tilt)
+    for row, first in ((turned, 0), (spun, n)):
+        row[[first + place("Pelvis_rz"), first + place("RHip_rz"), first + place("LHip_rz")]] = 1.0, -1.0, -1.0
+    neutral = steady.step_map.neutral
+    for direction in (along, turned, spun):
+        inside = neutral @ (neutral.T @ direction)
+        assert inside == pytest.approx(direction, abs=1e-5)
+
+
+def test_moving_down_the_slope_moves_the_image(steady):
+    step_map, y = steady.step_map, steady.cycle.state
+    moved = y + 0.3 * step_map.neutral[:, 0]
+    one, other = step_map([y, moved]).states
+    assert step_map.reduce(other) == pytest.approx(step_map.reduce(one), abs=1e-6)
+
+
+def test_the_section_is_a_heel_strike(steady):
+    image = step_map_image(steady)
+    _, depths = along_slope(steady.engine, image[None])
+    assert depths[0, steady.engine.contacts.index("RFootForce")] == pytest.approx(0.0, abs=1e-12)
+
+
+def step_map_image(steady):
+    return steady.step_map(steady.cycle.state[None]).states[0]
+
+
+def test_a_map_of_other_numbers_is_that_of_the_other_model(steady):
+    with Simulation(steady_walker(foot_ahead=0.073), "compiled") as simulation:
+        other = StepMap(simulation.engine, simulation.initial_state({}, {}))
+        expected = other(steady.cycle.state[None]).states
+        numbers = simulation.engine.numbers.copy()
+    found = StepMap(steady.engine, steady.start, numbers=numbers)(steady.cycle.state[None]).states
+    assert found == pytest.approx(expected, abs=1e-7)
+
+
+def test_perturbed_starts_stand_as_deep_as_before(steady):
+    starts = perturbed(steady.step_map, steady.start, 0.05, 8, 3)
+    assert np.array_equal(starts, perturbed(steady.step_map, steady.start, 0.05, 8, 3))
+    place = steady.engine.contacts.index("RFootForce")
+    before, after = (along_slope(steady.engine, np.atleast_2d(rows))[1][:, place] for rows in (steady.start, starts))
+    assert after == pytest.approx(np.full(8, before[0]), abs=1e-9)
+    assert len(walks_from(steady.step_map, steady.cycle, starts, 3)) == 8
+
+
+def test_a_basin_has_the_cycle_in_its_middle(steady):
+    basin = find_basin(steady.step_map, steady.cycle, "RHip_rz/speed", "LHip_rz", reach=0.02, grid=3, wanted=5)
+    assert basin.steps.shape == (3, 3) and basin.steps[1, 1] == 5
+    assert basin.x.label == "speed of RHip_rz (rad/s)" and basin.y.label == "LHip_rz (rad)"
+    assert basin.center == pytest.approx((basin.x.values[1], basin.y.values[1]))
+    with pytest.raises(OsimliteError, match="locked"):
+        find_basin(steady.step_map, steady.cycle, "platform_rz", grid=3)
+
+
+def test_the_human_walker_walks_from_two_digits():
+    model = human_walker()
+    with Simulation(model, "compiled") as simulation:
+        start = simulation.initial_state({}, {})
+        assert all(float(f"{value:.2g}") == value for value in start)
+        (walk,) = walk_many(simulation.engine, [start], 60.0, accuracy=1e-6)
+        assert walk.walks and len(walk.steps) >= 50 and not walk.scuffs
+        cycle = find_cycle(StepMap(simulation.engine, walk.steps[-1].state))
+        assert cycle.residual < 1e-9 and cycle.largest == pytest.approx(0.694, abs=5e-3)
+
+
+def test_the_steady_walker_differs_in_two_properties():
+    """Besides its start, the way that is ready for it, and its name."""
+    theirs, ours = ({part.path: part for part in model.components()} for model in (dynamic_walker(), steady_walker()))
+    assert theirs.keys() == ours.keys()
+    start = {"default_value", "default_speed_value", "range", "half_lengths", "name"}
+    changed = set()
+    for path, part in theirs.items():
+        for spec in type(part).field_specs().values():
+            one, other = getattr(part, spec.name), getattr(ours[path], spec.name)
+            if spec.name not in start and isinstance(one, tuple | float) and one != other:
+                changed.add((path, spec.name))
+    assert changed == {
+        *((f"/bodyset/{side}Shank", "inertia") for side in ("Right", "Left")),
+        *((f"/contactgeometryset/{side}FootContact", "location") for side in "RL"),
+    }
+
+
+def test_who_makes_no_step_has_no_map():
+    with Simulation(dynamic_walker(), "compiled") as simulation, pytest.raises(OsimliteError, match="makes no step"):
+        StepMap(simulation.engine, simulation.initial_state({}, {}))
+
+
+def test_the_command(tmp_path):
+    words = "gait steady-walker --to 5 --perturb 0.05 --starts 4 --steps 3 --basin --grid 2 --reach 0.01 --no-pictures"
+    done = CliRunner().invoke(app(["gait"]), [*words.split(), "-o", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "6 steps, 0 scuffs" in done.output and "stable: largest multiplier 0.468" in done.output
+    assert max(len(line) for line in done.output.splitlines()) <= 80
+    facts = json.loads((tmp_path / "gait.json").read_text())
+    assert facts["cycle"]["step_length_m"] == pytest.approx(0.624657, abs=1e-6)
+    assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
+    done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
+    assert done.exit_code == 0 and "0 steps, 1 scuffs" in done.output and "makes no step" in done.output
