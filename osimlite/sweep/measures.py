@@ -117,7 +117,7 @@ class Run:
         start: initial state.
         end: last state.
         time: at which it ended, s.
-        times: moments at which the state was kept, if a report interval was asked for, s.
+        times: moments up to the end at which the state was kept, if a report interval was asked for, s.
         events: time (s), name of a contact or of what was watched, whether it begins.
         largest_forces: N, by contact.
         engine: that computed it, with its `mechanism`.
@@ -222,16 +222,17 @@ def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
     names, contacts = batch.names, batch.engine.contacts
     for k in range(len(batch.starts)):
         engine = batch.engine_of(k)
+        kept = int(np.searchsorted(batch.report_times, batch.runs.times[k], side="right"))
         run = Run(
             dict(zip(names, batch.values[k].tolist(), strict=True)),
             State(engine, batch.starts[k]),
             State(engine, batch.runs.states[k]),
             float(batch.runs.times[k]),
-            batch.report_times,
+            batch.report_times[:kept],
             batch.runs.events[k],
             dict(zip(contacts, batch.runs.peaks[k, :, 0].tolist(), strict=True)),
             engine,
-            batch.runs.reports[k],
+            batch.runs.reports[k, :kept],
         )
         found.append(function(run))
     return found

@@ -66,7 +66,8 @@ def _columns(motion: Motion, label: str) -> Array:
 def at_times(motion: Motion, columns: Array, times: Array) -> Array:
     """Columns (n, k) of the motion at other times (m,), along straight lines between the moments on record."""
     recorded = np.asarray(motion.times, dtype=float)
-    return np.column_stack([np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])])
+    rows = [np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])]
+    return np.array(rows).reshape(len(rows), len(times)).T
 
 
 def in_mechanism_order(motion: Motion, mechanism: Mechanism, columns: Array) -> Array:

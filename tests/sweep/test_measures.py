@@ -105,6 +105,19 @@ def test_functions_of_ones_own(walker, tmp_path, monkeypatch):
     assert (block.measures[measure_name(deepest)] <= 0.835 - np.maximum(first, 0.0)).all()
 
 
+def kept_times(run):
+    """Times that were kept, of a run that may have ended early."""
+    height = run.history("Pelvis_ty")
+    assert len(height) == len(run.times) and np.isfinite(height).all() and run.times[-1] <= run.time
+    return len(run.times)
+
+
+def test_what_was_kept_ends_with_the_run(walker):
+    block = block_of(walker, "steps", kept_times, to=1.5, report_interval=0.1)
+    kept = block.measures[measure_name(kept_times)]
+    assert "failed" not in block.status and 2 <= kept.min() < 16
+
+
 def test_a_function_that_fails_spoils_its_own_run_only(walker):
     block = block_of(walker, picky, "distance", to=0.5)
     assert block.status == ["done", "failed", "done"]

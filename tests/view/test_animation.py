@@ -9,6 +9,7 @@ import pytest
 from osimlite.errors import MissingDependency, OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
+from osimlite.schema.model import Model
 from osimlite.view import animate
 from osimlite.view.animation import _Film, _hex, _round_down
 from osimlite.view.picture import FORCE
@@ -111,6 +112,11 @@ def test_a_model_without_shapes_is_a_stick_figure(tmp_path):
     with_sticks = next(frames(path))[0]
     del model.contact_geometry_set.objects[:], model.force_set.objects[:]
     assert (with_sticks.max(axis=2) < 70).sum() > 300
+
+
+def test_a_model_without_coordinates_has_a_film_too(tmp_path):
+    still = Recorded(np.array([0.0, 0.1]), (), np.zeros((2, 0)), np.zeros((2, 0)))
+    assert len(list(frames(animate(Model(name="empty"), still, tmp_path / "still.gif", size=SMALL)))) == 3
 
 
 @pytest.mark.parametrize("plane", ["yz", "xz"])
