@@ -119,14 +119,6 @@ class ReducedBulletEngine(BulletEngine):
         self._forces(t, *self._joints(y), self.loads)
         return int(self.loads[-1])
 
-    def force_records(self, t: float, y: list[float]) -> list[float]:
-        """One number for each of the columns."""
-        return self.field.records(t, *self._joints(y))
-
-    def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
-        """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
-        return self.field.energies(t, *self._joints(y))
-
     def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
         """Values and rates of the joints, values and speeds of the state."""
         x, u = y[: self._count], y[self._count :]
