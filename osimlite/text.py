@@ -23,6 +23,11 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; did you mean '{found}'?" if found else ""
 
 
+def counted(number: int, noun: str) -> str:
+    """``"1 step"``, ``"2 steps"``."""
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
 def listed(words: Iterable[str], *, most: int = 8) -> str:
     """``"a, b and c"``, cut after `most` words."""
     items = list(words)

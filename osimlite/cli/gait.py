@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from osimlite.gait.cycle import Cycle
     from osimlite.gait.stepmap import StepMap
     from osimlite.gait.steps import Scuff, Step, Walk
+    from osimlite.schema.model import Model
     from osimlite.simulation.engines.compiled import CompiledEngine
 
 
@@ -65,6 +66,7 @@ def gait(
             "-o", "--output", metavar="FOLDER", help="For gait.json, basin.csv, basin.png.", show_default=False
         ),
     ] = None,
+    skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Count the steps of a walker, find the cycle that it walks in, and say whether that is stable.
 
@@ -78,19 +80,24 @@ def gait(
 
     from osimlite._require import require
     from osimlite.document.reader import read
-    from osimlite.gait.basin import find_basin, perturbed, walks_from
+    from osimlite.gait.basin import basin_places, find_basin, perturbed, walks_from
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation
 
     if basin and pictures and output:
         require("matplotlib", extra="plot", purpose="a picture of a basin")
-    model = read(source) if Path(source).suffix.lower() == ".osim" else make_model(source)
-    with Simulation(model, "compiled") as simulation:
+    _check_numbers(to, accuracy, reach, perturb or ())
+    is_file = Path(source).suffix.lower() == ".osim"
+    model = read(source) if is_file else make_model(source)
+    _refuse_constraints(model)
+    folder = Path(source).parent if is_file else None
+    with Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder) as simulation:
         state = simulation.initial_state(
             options.quantities(start, simulation.mechanism, "--set"),
             options.quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
         engine: Any = simulation.engine
+        basin_places(engine, basin_x, basin_y)
         found, step_map = _walk(engine, state, foot, to, settle, accuracy)
         cycle = found.cycle
         if step_map is not None and cycle is not None:
@@ -105,7 +112,33 @@ def gait(
                         step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
                     )
     files = _write(output, found, pictures) if output else []
+    found.skipped = simulation.forces.skipped
     Console().print(_table(found, files))
+
+
+def _check_numbers(to: float, accuracy: float, reach: float, perturb: Sequence[float]) -> None:
+    """Before the walk, which takes a while, stop at numbers that mean nothing."""
+    from math import inf
+
+    from osimlite.errors import SettingError
+
+    numbers = [("--to", to), ("--accuracy", accuracy), ("--reach", reach), *(("--perturb", part) for part in perturb)]
+    for option, number in numbers:
+        if not 0.0 < number < inf:
+            raise SettingError(f"{option} is a positive number, not {number:g}")
+
+
+def _refuse_constraints(model: Model) -> None:
+    from osimlite.errors import UnsupportedError
+    from osimlite.multibody import build_mechanism
+    from osimlite.simulation.run import kept_constraints
+    from osimlite.text import listed
+
+    if kept := kept_constraints(build_mechanism(model)):
+        raise UnsupportedError(
+            f"gaits are computed by the compiled engine, which cannot keep up {listed(kept)}; set isEnforced of a "
+            "constraint and prescribed of a coordinate to false"
+        )
 
 
 @dataclass
@@ -128,6 +161,7 @@ class Found:
         walk: from the start that was given.
         cycle: that it settles into, if there is one.
         why_not: why no cycle was found, else "".
+        skipped: forces that were left out.
     """
 
     model: str
@@ -137,6 +171,7 @@ class Found:
     why_not: str = ""
     nearby: list[Nearby] = field(default_factory=list)
     basin: Basin | None = None
+    skipped: Sequence[str] = ()
 
 
 def _walk(
@@ -165,12 +200,18 @@ def _walk(
 def _table(found: Found, files: Sequence[Path]) -> Any:
     from rich.table import Table
 
+    from osimlite.simulation.elements import by_class
+    from osimlite.text import counted
+
     walk, cycle = found.walk, found.cycle
     table = Table(title=found.model, title_justify="left", show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     end = f"fell on {walk.fell_on} after {walk.end:.4g} s" if walk.fell_on else f"{walk.ending} after {walk.end:.4g} s"
-    table.add_row("walk", f"{len(walk.steps)} steps, {len(walk.scuffs)} scuffs, {walk.distance:.4g} m; {end}")
+    table.add_row(
+        "walk",
+        f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}, {walk.distance:.4g} m; {end}",
+    )
     if cycle is None:
         table.add_row("cycle", found.why_not)
     else:
@@ -189,6 +230,8 @@ def _table(found: Found, files: Sequence[Path]) -> Any:
     if found.basin is not None:
         basin = found.basin
         table.add_row("basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps")
+    for skipped in by_class(found.skipped):
+        table.add_row("left out", skipped)
     if files:
         table.add_row("files", ", ".join(str(path) for path in files))
     return table

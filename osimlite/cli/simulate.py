@@ -141,6 +141,8 @@ def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, an
 def _table(trajectory: Trajectory, files: Sequence[Path]) -> Any:
     from rich.table import Table
 
+    from osimlite.simulation.elements import by_class
+
     summary = trajectory.summary
     table = Table(title=f"{summary['model']}, {trajectory.times[-1]:g} s", title_justify="left", show_header=False)
     table.add_column(style="bold")
@@ -157,10 +159,11 @@ def _table(trajectory: Trajectory, files: Sequence[Path]) -> Any:
             for event in summary["contact_events"]
             if event["contact"] == name
         ]
-        shown = times if len(times) <= 6 else [*times[:6], f"{len(times) - 6} more"]
+        # The unit follows the last time.
+        shown = ", ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
         size, when = largest["force_N"], largest["time_s"]
-        table.add_row(name, f"at most {size:.4g} N ({when:.4g} s); {', '.join(shown)} s")
-    for skipped in summary["skipped_forces"]:
+        table.add_row(name, f"at most {size:.4g} N ({when:.4g} s)" + (f"; {shown}" if times else ""))
+    for skipped in by_class(summary["skipped_forces"]):
         table.add_row("left out", skipped)
     table.add_row("files", ", ".join(str(path) for path in files))
     return table

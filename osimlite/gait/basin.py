@@ -176,8 +176,9 @@ def find_basin(
     Raises:
         OsimliteError: there is no such coordinate, or nothing to take by default.
     """
-    defaults = _leg_speeds(step_map)
-    places = [_place(step_map.engine, name) if name else other for name, other in zip((x, y), defaults, strict=True)]
+    named = basin_places(step_map.engine, x, y)
+    defaults = (0, 0) if None not in named else _leg_speeds(step_map)
+    places = [other if place is None else place for place, other in zip(named, defaults, strict=True)]
     axes = [_axis(step_map.engine, place, float(cycle.state[place]), reach, grid) for place in places]
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
     states = np.tile(cycle.state, (grid * grid, 1))
@@ -201,6 +202,15 @@ def _leg_speeds(step_map: StepMap) -> tuple[int, int]:
         raise OsimliteError("the legs are not alike; name what the basin is drawn over with --basin-x and --basin-y")
     first = next(k for k in range(n) if step_map.exchange[k] != k)
     return n + first, n + int(step_map.exchange[first])
+
+
+def basin_places(engine: CompiledEngine, x: str = "", y: str = "") -> tuple[int | None, int | None]:
+    """Where in a state the numbers are that a basin changes by name; None where the default is to be taken.
+
+    Raises:
+        OsimliteError: there is no such coordinate, or it is locked.
+    """
+    return _place(engine, x) if x else None, _place(engine, y) if y else None
 
 
 def _place(engine: CompiledEngine, name: str) -> int:

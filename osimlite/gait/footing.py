@@ -58,6 +58,8 @@ def find_footing(engine: CompiledEngine, feet: Sequence[str] | None = None) -> F
     Raises:
         OsimliteError: a contact does not exist, or the model has no two legs.
     """
+    if not engine.contacts:
+        raise OsimliteError(f"'{engine.mechanism.name}' has no contact forces, so that nothing walks")
     soles = _soles(engine)
     known = [sole.contact for sole in soles]
     if feet:
@@ -79,11 +81,13 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
     bodies = {sole.body for sole in soles}
     above = {body: set(_above(mechanism, body)) for body in bodies}
     ends = sorted(body for body in bodies if not any(body in above[other] for other in bodies))
+    if not ends:
+        raise OsimliteError(f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground")
     if len(ends) != 2:
         names = listed(mechanism.bodies[end].name for end in ends)
         raise OsimliteError(
-            f"'{mechanism.name}' touches the ground with the ends of {len(ends)} legs"
-            f"{f' ({names})' if ends else ''}, not of two; say which contacts are feet with --foot"
+            f"'{mechanism.name}' touches the ground with the {'end' if len(ends) == 1 else 'ends'} of "
+            f"{len(ends)} {'leg' if len(ends) == 1 else 'legs'} ({names}), not of two; say which contacts are feet with --foot"
         )
     found = []
     for end in ends:

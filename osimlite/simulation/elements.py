@@ -139,7 +139,7 @@ def force_elements(
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {listed(skipped)}; switch off their appliesForce, "
+            f"osimlite cannot compute {listed(by_class(skipped))}; switch off their appliesForce, "
             "or leave them out with --skip-unsupported (skip_unsupported=True)"
         )
     if external_loads is not None:
@@ -147,6 +147,21 @@ def force_elements(
 
         elements += read_external_loads(mechanism, external_loads)
     return Forces(tuple(elements), tuple(skipped))
+
+
+FEW = 4
+"""So many forces that are left out are told of one by one."""
+
+
+def by_class(skipped: Sequence[str]) -> list[str]:
+    """What was left out for people: one by one if it is few, else how many of each class."""
+    if len(skipped) <= FEW:
+        return list(skipped)
+    groups: dict[str, list[str]] = {}
+    for words in skipped:
+        path, _, kind = words.partition(" (")
+        groups.setdefault(kind.removesuffix(")") or "others", []).append(path)
+    return [f"{len(paths)} of {kind}: {listed(paths, most=2)}" for kind, paths in groups.items()]
 
 
 class ElementBuilder:

@@ -107,9 +107,13 @@ def simulate(
         )
 
 
+def kept_constraints(mechanism: Mechanism) -> list[str]:
+    """Names of what holds besides joints and locks, which not every engine can keep up."""
+    return [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
+
+
 def _refuse_constraints(mechanism: Mechanism, engine: str) -> None:
-    """Stop at what holds besides joints and locks, if the engine cannot keep it up."""
-    kept = [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
+    kept = kept_constraints(mechanism)
     if kept and engine not in KEEP_CONSTRAINTS:
         raise UnsupportedError(
             f"the {engine} engine cannot keep up {listed(kept)}; take the engine {' or '.join(KEEP_CONSTRAINTS)}, or "

@@ -29,6 +29,8 @@ def engine_factory(name: str) -> EngineFactory:
         MissingDependency: the package it works with is not installed.
     """
     if name not in ENGINES:
-        raise OsimliteError(f"there is no engine '{name}'{did_you_mean(name, ENGINES)}; there is {listed(ENGINES)}")
+        raise OsimliteError(
+            f"there is no engine '{name}'{did_you_mean(name, ENGINES) or f'; there is {listed(ENGINES)}'}"
+        )
     make: EngineFactory = import_module(ENGINES[name]).make
     return make
