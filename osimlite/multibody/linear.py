@@ -8,8 +8,9 @@ import numpy as np
 
 from osimlite.multibody.spatial import Array
 
-_REDUNDANT = 1e-9
-"""An equation that differs from what others say by less than this part of itself says nothing new."""
+NEGLIGIBLE = 1e-7
+"""An equation that differs from what others say by less than this part of itself says nothing new, nor does one that
+is shorter than this part of the longest: what is left of it comes from the errors of the pose."""
 
 
 def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
@@ -27,16 +28,15 @@ def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     if not (count and size):
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
-    # Rounding errors are no equation.
-    lengths[lengths <= 1e-13 * lengths.max()] = max(1.0, lengths.max())
+    lengths[lengths <= NEGLIGIBLE * lengths.max()] = max(1.0, lengths.max())
     rows, values = rows / lengths[:, None], values / lengths
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")
         triangle = triangle[:count]
-        if np.abs(triangle.diagonal()).min() > _REDUNDANT:
+        if np.abs(triangle.diagonal()).min() > NEGLIGIBLE:
             return basis[:, :count] @ np.linalg.solve(triangle.T, values), basis[:, count:]
     left, strengths, right = np.linalg.svd(rows)
-    rank = int(np.sum(strengths > _REDUNDANT * strengths[0]))
+    rank = int(np.sum(strengths > NEGLIGIBLE * strengths[0]))
     return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T
 
 

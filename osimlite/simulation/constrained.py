@@ -19,7 +19,7 @@ from osimlite.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.multibody.dynamics import constrained_accelerations
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.kinematics import Kinematics, kinematics
-from osimlite.multibody.linear import shortest, stacked
+from osimlite.multibody.linear import NEGLIGIBLE, shortest, stacked
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
 
@@ -232,7 +232,7 @@ def by_multipliers(matrix: Array, right: Array, rows: Array, values: Array) -> A
             return None
         solved = np.linalg.solve(matrix, np.column_stack((right, rows.T)))
         coupling = rows @ solved[:, 1:]
-        if not np.min(coupling.diagonal()) > 0.0:
+        if not np.min(coupling.diagonal()) > NEGLIGIBLE**2 * np.max(coupling.diagonal()):
             return None
         scales = 1.0 / np.sqrt(coupling.diagonal())
         scaled = coupling * np.outer(scales, scales)
