@@ -4,6 +4,7 @@ from __future__ import annotations
 
 BUILT_IN = {
     "dynamic-walker": "osimlite.models.dynamic_walker:dynamic_walker",
+    "furthest-walker": "osimlite.models.walkers:furthest_walker",
     "steady-walker": "osimlite.models.walkers:steady_walker",
     "human-walker": "osimlite.models.walkers:human_walker",
 }

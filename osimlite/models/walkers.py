@@ -38,6 +38,27 @@ HUMAN_START = {
 """Value and speed of each coordinate of the human walker in the middle of a step, rounded to two digits."""
 
 
+FURTHEST_START = {
+    "Pelvis_tx": (0.0, 0.0780009),
+    "Pelvis_ty": (0.774823, 0.999683),
+    "RHip_rz": (0.016902, 2.92303),
+    "LHip_rz": (0.0600742, -0.848992),
+    "RKnee_rz": (-1.3517, 1.48941),
+    "LKnee_rz": (-0.854596, 2.31941),
+}
+"""Value and speed of each coordinate from which the exercise's own walker makes the most steps that were found."""
+
+
+def furthest_walker() -> Model:
+    """Build the exercise's own walker, with the start from which it makes four steps before it falls.
+
+    It has no cycle that was found: its shanks are so hard to turn that a leg swings too slowly.
+    """
+    model = dynamic_walker()
+    model.name = "FurthestWalker"
+    return _ready(model, FURTHEST_START, 10.0)
+
+
 def steady_walker(shank_inertia: float = 0.091, foot_ahead: float = 0.072) -> Model:
     """Build the walker that differs from the exercise in two properties and never stops.
 
