@@ -27,6 +27,28 @@ class Quantity(NamedTuple):
         return self.number * _SIZES.get(self.unit or "rad", 1.0)
 
 
+def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
+    """What is odd about the value of a coordinate that turns: more than a turn, out of its range, without a unit.
+
+    Args:
+        name: of the coordinate.
+        given: as it was written.
+        range: of the coordinate, rad.
+
+    Returns:
+        A sentence, or "" if there is nothing odd.
+    """
+    if given is None or given.unit is not None or abs(given.number) <= 2.0 * math.pi:
+        return ""
+    low, high = range
+    if low <= given.number <= high:
+        return ""
+    number = f"{given.number:g}"
+    return (
+        f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
+    )
+
+
 def quantity(text: str) -> Quantity | None:
     """Read a quantity; None if the text is none."""
     match = _FORM.fullmatch(text.strip())

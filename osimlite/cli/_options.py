@@ -78,7 +78,10 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
     Raises:
         OsimliteError: a word is not of that form, there is no such coordinate, or the unit does not fit it.
     """
+    import sys
+
     from osimlite.errors import ModelError, OsimliteError
+    from osimlite.quantity import doubt, quantity
     from osimlite.simulation.start import in_units_of
 
     found = {}
@@ -86,6 +89,11 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
     for name, text in named_words(words, option, form).items():
         try:
             found[name] = in_units_of(mechanism, name, text)
+            info = mechanism.coordinates[mechanism.coordinate_index(name)]
+            # A speed has no range.
+            is_angle = option == "--set" and info.motion_type == "rotational"
+            if is_angle and (odd := doubt(name, quantity(text), info.range)):
+                print(f"osimlite: warning: {odd}", file=sys.stderr)
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -60,18 +60,28 @@ def make_plan(
     Raises:
         OsimliteError: they do not describe one.
     """
+    import sys
+
+    from osimlite.errors import SettingError
+    from osimlite.sweep.variables import parse
+
+    ranges = parse(vary or [])
+    if not ranges:
+        raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
+    made = _plan(source, ranges, parameter, stops=(*_stops(below, True), *_stops(above, False)), **choices)
+    for odd in (item.doubt for item in made.variables if item.doubt):
+        print(f"osimlite: warning: {odd}", file=sys.stderr)
+    return made
+
+
+def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any) -> Plan:
     from functools import partial
 
     from osimlite.document.reader import read
     from osimlite.errors import SettingError
     from osimlite.models.source import make_model, parameters_of
     from osimlite.sweep.plan import plan
-    from osimlite.sweep.variables import parse
 
-    ranges = parse(vary or [])
-    if not ranges:
-        raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
-    choices["stops"] = (*_stops(below, True), *_stops(above, False))
     if Path(source).suffix.lower() == ".osim":
         if parameter:
             raise SettingError(f"'{source}' is a file and takes no parameters; vary its properties by their paths")

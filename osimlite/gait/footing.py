@@ -10,7 +10,7 @@ from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.contact_elements import HuntCrossley
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.text import did_you_mean, listed
+from osimlite.text import counted, did_you_mean, listed
 
 _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
 
@@ -86,8 +86,8 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
     if len(ends) != 2:
         names = listed(mechanism.bodies[end].name for end in ends)
         raise OsimliteError(
-            f"'{mechanism.name}' touches the ground with the {'end' if len(ends) == 1 else 'ends'} of "
-            f"{len(ends)} {'leg' if len(ends) == 1 else 'legs'} ({names}), not of two; say which contacts are feet with --foot"
+            f"'{mechanism.name}' touches the ground with the ends of {counted(len(ends), 'leg')} ({names}), not of "
+            "two; say which contacts are feet with --foot"
         )
     found = []
     for end in ends:

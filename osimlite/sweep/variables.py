@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import Quantity, quantity
+from osimlite.quantity import Quantity, doubt, quantity
 from osimlite.schema.model import Model
 from osimlite.sweep.properties import Place, places
 from osimlite.text import did_you_mean
@@ -80,6 +80,7 @@ class Variable:
         high: largest value.
         count: of values in a grid.
         is_log: whether its logarithm is what is spread evenly.
+        doubt: a sentence about what is odd in the range, else "".
     """
 
     name: str
@@ -88,6 +89,7 @@ class Variable:
     high: float
     count: int | None = None
     is_log: bool = False
+    doubt: str = ""
 
     def at(self, fraction: Floats) -> Floats:
         """The values at fractions of the way from low to high, none of which is beyond them; exact at either end."""
@@ -157,7 +159,10 @@ def variables(
     found = []
     for name, given in ranges.items():
         target, unit = _target(name, model, mechanism, parameters)
-        found.append(_variable(name, target, unit, given))
+        made = _variable(name, target, unit, given)
+        if isinstance(target, Start) and not target.is_speed:
+            made = replace(made, doubt=_doubt(made, given, mechanism))
+        found.append(made)
     taken: dict[object, str] = {}
     for item in found:
         for part in item.target.places if isinstance(item.target, Property) else (item.target,):
@@ -216,6 +221,7 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
         count = int(text)
     if len(parts) not in (1, 2):
         raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
+    _refuse_mixed(name, parts)
     low, high = (_number(name, part, unit) for part in (parts[0], parts[-1]))
     if len(parts) == 1:
         count = 1
@@ -228,6 +234,29 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
     if count == 1 and low != high:
         raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
     return Variable(name, target, low, high, count, is_log)
+
+
+def _refuse_mixed(name: str, ends: Sequence[object]) -> None:
+    """Stop at ``20deg:40``; zero is the same in every unit."""
+    read = [quantity(str(part)) for part in ends]
+    with_unit = [each.unit for each in read if each is not None and each.unit is not None]
+    bare = [each.number for each in read if each is not None and each.unit is None and each.number != 0.0]
+    if with_unit and bare:
+        raise SettingError(
+            f"the range of '{name}' has a unit at one end only: {ends[0]}:{ends[-1]}; "
+            f"write it at both, as in {bare[0]:g}{with_unit[0]}"
+        )
+
+
+def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
+    """Whether an angle of the start was written as a number of degrees."""
+    assert isinstance(made.target, Start)
+    info = mechanism.coordinates[mechanism.coordinate_index(made.target.coordinate)]
+    if info.motion_type != "rotational":
+        return ""
+    parts = given.split(":")[:2] if isinstance(given, str) else [str(made.low), str(made.high)]
+    odd = (doubt(made.name, quantity(part), info.range) for part in parts)
+    return next((words for words in odd if words), "")
 
 
 def _number(name: str, part: object, unit: str) -> float:

@@ -99,3 +99,13 @@ def test_pictures_fail_as_a_whole(walker, tmp_path, monkeypatch):
     with pytest.raises(OsimliteError, match="no ink"):
         command.simulate(Path(walker), to=0.05, output=tmp_path / "r", plot=True)
     assert not (tmp_path / "r").exists()
+
+
+def test_degrees_taken_for_radians_are_warned_of(walker, tmp_path):
+    code, _, err = run(walker, "--to", "0.01", "--set", "RHip_rz=400", folder=tmp_path)
+    assert code == 0
+    assert err == (
+        "osimlite: warning: RHip_rz = 400 is in rad, and outside its range of -1.75 to 1.75 rad; did you mean 400deg?\n"
+    )
+    code, _, err = run(walker, "--to", "0.01", "--set", "RHip_rz=40deg", "--set-speed", "RHip_rz=7", folder=tmp_path)
+    assert (code, err) == (0, "")

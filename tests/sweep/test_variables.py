@@ -65,7 +65,7 @@ def test_every_number_that_is_found_can_be_set_and_read():
 
 def test_units():
     assert one("RHip_rz", "20deg:40deg").high == pytest.approx(math.radians(40), abs=1e-15)
-    assert one("Pelvis_tx", "10cm:0.5").low == 0.1
+    assert one("Pelvis_tx", "10cm:0.5m").low == 0.1
     assert one("/forceset/RKneeLimitTorque/upper_limit", "5deg:10").low == 5.0
     assert one("/forceset/RKneeLimitTorque/upper_limit", f"0:{math.pi}rad").high == pytest.approx(180.0)
     for name, text, words in [
@@ -148,3 +148,17 @@ def test_values_stay_within_and_go_back(a, b, is_log, fraction):
     assert low <= value <= high
     assert item.fraction(value) == pytest.approx(fraction, abs=1e-7)
     assert item.at(np.array([0.0, 1.0])).tolist() == [low, high]
+
+
+def test_degrees_taken_for_radians_are_doubted():
+    assert "20deg" in one("RHip_rz", "20:40").doubt and "range of -1.75 to 1.75 rad" in one("RHip_rz", "20:40").doubt
+    assert "40deg" in one("RHip_rz", "0:40").doubt and "20deg" in one("RHip_rz", (20.0, 40)).doubt
+    for fine in ("20deg:40deg", "0.3:0.6", "-1:5"):
+        assert one("RHip_rz", fine).doubt == ""
+    assert one("RHip_rz/speed", "20:40").doubt == "" and one("Pelvis_tx", "20:40").doubt == ""
+
+
+def test_a_unit_stands_at_both_ends():
+    with pytest.raises(SettingError, match="20deg:40; write it at both, as in 40deg"):
+        one("RHip_rz", "20deg:40")
+    assert one("RHip_rz", "0:60deg").high == math.radians(60)
