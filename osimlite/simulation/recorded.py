@@ -75,9 +75,7 @@ class RecordedMotion:
                 turned = table.in_degrees and mechanism.coordinates[place].motion_type == "rotational"
                 values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
         if not mechanism.coordinates:
-            raise ModelError(
-                f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=str(path)
-            )
+            raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=str(path))
         if not found:
             raise ModelError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
