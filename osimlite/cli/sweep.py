@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -55,6 +56,7 @@ def sweep(
         Path, typer.Option("-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run.")
     ] = Path("results.parquet"),
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted sweep.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace results that were made with other settings.")] = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Simulate a model from many starts, or with many values of its numbers: one row of the results for each run.
@@ -66,6 +68,7 @@ def sweep(
     from rich.console import Console
 
     from osimlite.cli._progress import progress_bar
+    from osimlite.sweep.run import settings
     from osimlite.sweep.run import sweep as run
     from osimlite.sweep.sampling import samples as choose
 
@@ -74,9 +77,26 @@ def sweep(
         engine=engine, accuracy=accuracy, report_interval=report_interval, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)
+    if output.is_file() and not (resume or force):
+        _spare(output, settings(plan, chosen))
     with progress_bar("sweeping", chosen.count) as progress:
         outcome = run(plan, chosen, output, resume=resume, workers=workers, cluster=cluster, progress=progress)
     Console().print(_table(plan, outcome))
+    if outcome.status["failed"] == outcome.count:
+        print("osimlite: every run failed", file=sys.stderr)
+        raise typer.Exit(1)
+
+
+def _spare(output: Path, wanted: dict[str, Any]) -> None:
+    """Stop before the results of another sweep are lost; the same sweep makes the same file."""
+    from osimlite.errors import SettingError
+    from osimlite.sweep.results import differences, settings_of
+
+    if unlike := differences(settings_of(output), wanted):
+        raise SettingError(
+            f"'{output}' has results of other settings: {', '.join(unlike)}; name another file with -o, or replace "
+            "them with --force"
+        )
 
 
 def _table(plan: Plan, outcome: Outcome) -> Any:
@@ -84,8 +104,9 @@ def _table(plan: Plan, outcome: Outcome) -> Any:
 
     from osimlite.sweep.measures import measure_name
     from osimlite.sweep.results import ranges
+    from osimlite.text import counted
 
-    table = Table(title=f"{outcome.count} runs", title_justify="left", show_header=False)
+    table = Table(title=counted(outcome.count, "run"), title_justify="left", show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     new = sum(outcome.status.values())
@@ -94,8 +115,11 @@ def _table(plan: Plan, outcome: Outcome) -> Any:
     if new:
         table.add_row("time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second")
         table.add_row("ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common()))
-    for reason, count in outcome.reasons.most_common(3):
-        table.add_row("failed", f"{count}: {reason}")
+    told = outcome.reasons.most_common(3)
+    for reason, count in told:
+        table.add_row("failed", f"{counted(count, 'run')}: {reason}")
+    if others := outcome.status["failed"] - sum(count for _, count in told):
+        table.add_row("failed", f"{counted(others, 'run')} for other reasons; the column 'reason' has them all")
     for name, found in ranges(outcome.path, [measure_name(spec) for spec in plan.measures]).items():
         table.add_row(
             name,

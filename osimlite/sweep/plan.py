@@ -142,6 +142,9 @@ def plan(
     needs_maker = any(isinstance(item.target, Parameter) for item in found)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), found, make=make)
+    if not any(info.motion_type == "translational" and not info.locked for info in mechanism.coordinates):
+        # Only who asks for the distance by name is told that the model has none.
+        made = replace(made, measures=tuple(name for name in made.measures if name != "distance"))
     made = replace(made, **{name: value for name, value in choices.items() if value is not None})
     for name, value in (("to", made.to), ("accuracy", made.accuracy), ("report_interval", made.report_interval)):
         if value is not None and not (isfinite(value) and value > 0.0):

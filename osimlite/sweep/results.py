@@ -56,9 +56,17 @@ def schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
 
 
 def settings_of(path: str | Path) -> dict[str, Any]:
-    """The settings that a Parquet file of results was made with."""
+    """The settings that a Parquet file of results was made with.
+
+    Raises:
+        OsimliteError: the file is none of osimlite's results.
+    """
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-    found: dict[str, Any] = json.loads(pq.read_schema(path).metadata[KEY])
+    try:
+        found: dict[str, Any] = json.loads((pq.read_schema(path).metadata or {})[KEY])
+    except (KeyError, ValueError):
+        # What is no Parquet is an ArrowInvalid, a ValueError.
+        raise OsimliteError("this file is not the results of a sweep; give them another name", file=str(path)) from None
     return found
 
 

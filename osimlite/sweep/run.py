@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
@@ -23,6 +23,9 @@ Progress = Callable[[float, float], object]
 """Called with the number of runs that are done, and of all."""
 
 FIRST_TASK, LARGEST_TASK = 4, 4096
+OTHER_TABLES = (".csv", ".tsv", ".txt", ".json", ".xlsx", ".feather", ".arrow", ".sto", ".mot")
+"""Endings of files of which nobody expects Parquet."""
+
 AHEAD = 3
 """So many tasks for each worker are under way; a lost worker takes no more with it."""
 
@@ -91,6 +94,9 @@ def sweep(
         OsimliteError: the model cannot be simulated, the settings differ, or the cluster cannot be reached.
     """
     path, started = Path(output), time.perf_counter()
+    if path.suffix.lower() in OTHER_TABLES:
+        better = path.with_suffix(".parquet").name
+        raise SettingError(f"the results are a Parquet file, not '{path.name}'; name the file '{better}'")
     wanted = settings(plan, samples)
     table = schema(columns(plan), wanted)
     if resume and path.is_file() and not partial_of(path).exists():

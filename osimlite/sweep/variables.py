@@ -221,8 +221,8 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
         count = int(text)
     if len(parts) not in (1, 2):
         raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
-    _refuse_mixed(name, parts)
     low, high = (_number(name, part, unit) for part in (parts[0], parts[-1]))
+    _refuse_mixed(name, parts, unit)
     if len(parts) == 1:
         count = 1
     if low > high:
@@ -236,12 +236,12 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
     return Variable(name, target, low, high, count, is_log)
 
 
-def _refuse_mixed(name: str, ends: Sequence[object]) -> None:
-    """Stop at ``20deg:40``; zero is the same in every unit."""
+def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
+    """Stop at ``20deg:40`` of what is in rad; zero is the same in every unit."""
     read = [quantity(str(part)) for part in ends]
     with_unit = [each.unit for each in read if each is not None and each.unit is not None]
     bare = [each.number for each in read if each is not None and each.unit is None and each.number != 0.0]
-    if with_unit and bare:
+    if with_unit and bare and not unit.startswith(f"{with_unit[0]}"):
         raise SettingError(
             f"the range of '{name}' has a unit at one end only: {ends[0]}:{ends[-1]}; "
             f"write it at both, as in {bare[0]:g}{with_unit[0]}"

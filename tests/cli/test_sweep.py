@@ -73,6 +73,7 @@ def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     [
         (["sweep", "walker.osim"], "say what to vary"),
         (["sweep", "walker.osim", "--vary", "RHip_rz"], "--vary takes"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "b.csv"], "name the file 'b.parquet'"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=20deg:40:3"], "a unit at one end only"),
         (["sweep", "walker.osim", "--vary", "RHip_rx=0:1"], "did you mean 'RHip_rz'"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1"], "--samples"),
@@ -94,3 +95,35 @@ def test_what_is_wrong_is_one_sentence(
     assert code == 2, error
     assert error.startswith("osimlite: ") and said in error and error.count("\n") == 1
     assert sorted(path.name for path in folder.iterdir() if path.name != "optimum") == ["walker.osim"]
+
+
+def test_results_of_another_sweep_are_spared(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["sweep", "walker.osim", "--to", "0.05", "-o", "r.parquet", "--vary"]
+    assert run(*words, "RHip_rz=0:0.1:2") == 0
+    before = Path("r.parquet").read_bytes()
+    assert run(*words, "RHip_rz=0:0.1:2") == 0 and Path("r.parquet").read_bytes() == before
+    capsys.readouterr()
+    assert run(*words, "RHip_rz=0:0.2:3") == 2
+    assert "--force" in capsys.readouterr().err and Path("r.parquet").read_bytes() == before
+    assert run(*words, "RHip_rz=0:0.2:3", "--force") == 0 and pq.read_table("r.parquet").num_rows == 3
+    Path("r.parquet").write_text("mine")
+    assert run(*words, "RHip_rz=0:0.2:3") == 2 and Path("r.parquet").read_text() == "mine"
+
+
+def test_a_sweep_of_failures_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("sweep", "walker.osim", "--vary", "/bodyset/Pelvis/mass=-3:-1:3", "--to", "0.05") == 1
+    told = capsys.readouterr()
+    assert told.out.count("1 run: ") == 3 and told.err == "osimlite: every run failed\n"
+    assert pq.read_table("results.parquet")["status"].to_pylist() == ["failed"] * 3
+
+
+def test_without_a_sliding_coordinate_there_is_no_distance(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = osimlite.Model(name="pendulum")
+    bob = model.add(osimlite.Body(name="bob", mass=1.0, mass_center=[0, -1, 0], inertia=[1, 1, 1, 0, 0, 0]))
+    model.add(osimlite.PinJoint(name="pin", coordinates=[osimlite.Coordinate(name="q")]).between(model.ground, bob))
+    osimlite.write(model, "pendulum.osim")
+    words = ["sweep", "pendulum.osim", "--vary", "q=0:1:2", "--to", "0.05"]
+    assert run(*words) == 0
+    assert "distance" not in pq.read_table("results.parquet").column_names
+    assert run(*words, "--measure", "distance", "-o", "d.parquet") == 2
+    assert "no distance" in capsys.readouterr().err
