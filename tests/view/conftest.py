@@ -23,7 +23,8 @@ FLAGS = [
 ]
 
 
-@pytest.fixture(scope="session")
+# Not for the whole session: as long as Playwright is there, an event loop runs, and tests of coroutines cannot.
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """Chromium, driven by Playwright; OSIMLITE_CHROMIUM names its program if it is not on the PATH."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra 'dev')")
