@@ -15,7 +15,7 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import solutions, stacked
+from osimlite.multibody.linear import NEGLIGIBLE, solutions, stacked
 from osimlite.multibody.spatial import Array
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def constrained_accelerations(
     """
     if equations is None:
         return _solve(mechanism, matrix, right, None, order)
-    particular, free = solutions(*equations)
+    particular, free = solutions(*equations, NEGLIGIBLE)
     reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free, order)
     udot: Array = particular + free @ reduced
     return udot

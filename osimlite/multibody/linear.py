@@ -8,9 +8,12 @@ import numpy as np
 
 from osimlite.multibody.spatial import Array
 
+_REDUNDANT = 1e-9
+"""An equation that differs from what others say by less than this part of itself says nothing new."""
+_ROUNDING = 1e-13
+"""What is shorter than this part of the longest equation is rounding error."""
 NEGLIGIBLE = 1e-7
-"""An equation that differs from what others say by less than this part of itself says nothing new, nor does one that
-is shorter than this part of the longest: what is left of it comes from the errors of the pose."""
+"""In an assembled pose, an equation shorter than this part of the longest comes from the errors of the pose."""
 
 
 def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
@@ -18,25 +21,26 @@ def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
 
 
-def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
+def solutions(rows: Array, values: Array, negligible: float = _ROUNDING) -> tuple[Array, Array]:
     """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
 
     Where equations contradict each other, the solution has the least squares of their errors, each equation counted
-    with a left side of unit length. The directions are orthonormal.
+    with a left side of unit length; those shorter than `negligible` times the longest are left out. The directions are
+    orthonormal.
     """
     count, size = rows.shape
     if not (count and size):
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths <= NEGLIGIBLE * lengths.max()] = max(1.0, lengths.max())
+    lengths[lengths <= negligible * lengths.max()] = max(1.0, lengths.max())
     rows, values = rows / lengths[:, None], values / lengths
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")
         triangle = triangle[:count]
-        if np.abs(triangle.diagonal()).min() > NEGLIGIBLE:
+        if np.abs(triangle.diagonal()).min() > _REDUNDANT:
             return basis[:, :count] @ np.linalg.solve(triangle.T, values), basis[:, count:]
     left, strengths, right = np.linalg.svd(rows)
-    rank = int(np.sum(strengths > NEGLIGIBLE * strengths[0]))
+    rank = int(np.sum(strengths > _REDUNDANT * strengths[0]))
     return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T
 
 
