@@ -29,7 +29,7 @@ def numeric(function: Object | None, arguments: int, where: str, *, opensim_deri
         UnsupportedError: a function of another class.
     """
     if function is None:
-        raise ModelError(f"{where} has no function; give it one, for instance a LinearFunction")
+        raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")
     kind = type(function)
     try:
         if isinstance(function, schema.MultiplierFunction):

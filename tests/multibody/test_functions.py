@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from osimlite.errors import ModelError
 from osimlite.multibody import functions as f
 from osimlite.multibody.motions import EllipsoidPoint
+from osimlite.multibody.schema_functions import numeric
 from tests.multibody.cases import function, load
 
 TABLE = load("functions_table.json")["functions"]
@@ -139,3 +141,8 @@ def test_a_step_has_the_derivatives_of_its_values(x):
 def test_a_weighted_sum():
     value, gradient, hessian = f.WeightedSum((2.0, -1.0), 0.5).evaluate(np.array((3.0, 4.0)))
     assert (value, gradient.tolist(), hessian.tolist()) == (2.5, [2.0, -1.0], [[0.0, 0.0], [0.0, 0.0]])
+
+
+def test_a_function_that_is_not_there_is_named():
+    with pytest.raises(ModelError, match=r"the function of '/constraintset/c' is missing; give one"):
+        numeric(None, 1, "the function of '/constraintset/c'")
