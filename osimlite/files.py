@@ -25,11 +25,15 @@ def model_files(paths: Iterable[Path]) -> list[Path]:
 
     Raises:
         MissingFileError: a path is not there.
+        OsimliteError: a folder has no such file.
     """
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            found.extend(sorted(file for file in path.rglob("*.osim") if file.is_file()))
+            below = sorted(file for file in path.rglob("*.osim") if file.is_file())
+            if not below:
+                raise OsimliteError("there is no .osim file in this folder", file=str(path))
+            found.extend(below)
         elif path.exists():
             found.append(path)
         else:

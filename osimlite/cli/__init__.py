@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from typer import Typer
 
+    from osimlite.errors import OsimliteError
+
 COMMANDS = (
     "build",
     "validate",
@@ -93,6 +95,20 @@ def _plainly(words: list[str]) -> dict[str, Any] | None:
     return asked if paths else None
 
 
+def _built_in(error: OsimliteError) -> str:
+    """What to do if a file that is not there has the name of a built-in model."""
+    from osimlite.errors import MissingFileError
+
+    if not isinstance(error, MissingFileError) or error.file is None or os.path.exists(error.file):
+        return ""
+    from osimlite.models import BUILT_IN
+
+    name = error.file.removesuffix(".osim")
+    return (
+        f"; 'osimlite build {name} -o {name}.osim' writes the built-in model of this name" if name in BUILT_IN else ""
+    )
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exits with 0 (done), 1 (the answer is no) or 2 (could not be carried out)."""
     from osimlite.errors import OsimliteError
@@ -112,7 +128,7 @@ def main(arguments: list[str] | None = None) -> None:
             raise SystemExit(run(**asked))
         app(names)(args=words, prog_name="osimlite")
     except OsimliteError as error:
-        print(f"osimlite: {error}", file=sys.stderr)
+        print(f"osimlite: {error}{_built_in(error)}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
     except KeyboardInterrupt:
         print("osimlite: interrupted", file=sys.stderr)

@@ -28,7 +28,7 @@ def format(
     from osimlite.files import model_files, write_atomically
     from osimlite.schema.model import CURRENT_VERSION
 
-    changed, failed, same = 0, 0, 0
+    changed, same, worst = 0, 0, 0
     for path in model_files(paths):
         try:
             document = read_document(Source.of_file(path))
@@ -38,7 +38,7 @@ def format(
                 )
         except OsimliteError as error:
             typer.echo(f"osimlite: {error}", err=True)
-            failed += 1
+            worst = max(worst, error.exit_code)
             continue
         before = document.source.text
         after = to_text(document.model)
@@ -56,8 +56,8 @@ def format(
     if same and not (changed and show_diff):
         files = "1 file is" if same == 1 else f"{same} files are"
         typer.echo(f"{files} formatted already", err=True)
-    if failed:
-        raise typer.Exit(2)
+    if worst:
+        raise typer.Exit(worst)
     if changed and (check or show_diff):
         raise typer.Exit(1)
 

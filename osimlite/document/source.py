@@ -54,6 +54,8 @@ class Source:
             return cls(Path(path).read_bytes(), str(path))
         except OSError as error:
             reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
+            if isinstance(error, IsADirectoryError):
+                reason = "this is a folder; name a model file in it"
             raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
 
     @classmethod

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, ca
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
-from osimlite.schema.complaints import explained, misspelt
+from osimlite.schema.complaints import explained, misspelt, unnamed
 from osimlite.schema.equality import same
 from osimlite.schema.fields import (
     Held,
@@ -122,7 +122,9 @@ class Object(BaseModel, metaclass=ObjectType):
         cls.tag = tag or cls.__name__
         cls.abstract = abstract
 
-    def __init__(self, **properties: Any) -> None:
+    def __init__(self, *positional: Any, **properties: Any) -> None:
+        if positional:
+            raise ModelError(unnamed(type(self), positional[0]))
         for given in properties.keys() - type(self).model_fields.keys():
             spec = field_specs(type(self)).get(given)
             if spec is None or spec.name in properties:

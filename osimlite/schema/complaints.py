@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
@@ -26,4 +27,13 @@ def explained(cls: type[Object], error: ValidationError) -> str:
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"]) or "?"
     reason = first["msg"].removeprefix("Value error, ")
-    return f"{cls.__name__}.{place}: {reason}"
+    given = first.get("input")
+    angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", given) if isinstance(given, str) else None
+    hint = f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
+    return f"{cls.__name__}.{place}: {reason}{hint}"
+
+
+def unnamed(cls: type[Object], given: object) -> str:
+    """Properties have names."""
+    example = repr(given) if isinstance(given, str) else "..."
+    return f"{cls.__name__} takes its properties by name, as in {cls.__name__}(name={example})"

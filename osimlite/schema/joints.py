@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
+from osimlite.errors import ModelError
 from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
@@ -55,7 +56,16 @@ class Joint(ModelComponent, abstract=True):
             turned: how the joint is turned in the parent frame (body-fixed X-Y-Z angles, rad).
             child_at: where the joint is in the child frame (m).
             child_turned: how the joint is turned in the child frame (rad).
+
+        Raises:
+            ModelError: what is to be connected is no frame.
         """
+        for frame in (parent, child):
+            if not isinstance(frame, PhysicalFrame):
+                raise ModelError(
+                    f"'{self.name}' connects frames, such as model.ground and a Body, not {frame!r}; "
+                    "give the component itself"
+                )
         inner = PhysicalOffsetFrame(
             name=f"{parent.name}_offset", socket_parent=parent, translation=at, orientation=turned
         )

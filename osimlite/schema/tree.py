@@ -167,6 +167,11 @@ class Tree:
         found = self.resolve(use).target
         if found is None:
             text = value if isinstance(value, str) else value.name
+            if not text:
+                raise ModelError(
+                    f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} is missing or empty; "
+                    "'osimlite validate' lists every such place"
+                )
             raise ModelError(
                 f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} names '{text}', "
                 f"but the model has no such {use.reference.target}{did_you_mean(text, self.spellings(use))}"

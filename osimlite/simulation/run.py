@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from math import floor, isfinite
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +185,8 @@ class Simulation:
         """Simulate once; arguments and errors as those of :func:`simulate`."""
         started = time.perf_counter()
         times = report_times(to, report_interval)
+        if fixed_step is not None:
+            _check_step(fixed_step)
         if self._show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         initial, initial_speeds = (
@@ -311,12 +314,34 @@ class Simulation:
         return Trajectory(self.mechanism, times, *self.state.histories(states), report)
 
 
+LONGEST_STEP = 0.1
+"""A longer fixed step (s) follows no motion of bodies: a thousandth is usual, and MuJoCo takes 0.002 by itself."""
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is a number: not every caller checks types."""
+    return isinstance(value, Real)
+
+
+def _check_step(h: float) -> None:
+    if not (_is_number(h) and isfinite(h) and h > 0.0):
+        raise SettingError(f"the fixed step is a positive and finite number of seconds, not {h!r}")
+    if h > LONGEST_STEP:
+        raise SettingError(
+            f"a fixed step of {h:g} s is too long for any motion of bodies; take at most {LONGEST_STEP:g} s, with "
+            "contacts about 0.001 s"
+        )
+
+
 def report_times(to: float, interval: float) -> list[float]:
     """0, interval, 2 interval ... and `to` (s).
 
     Raises:
         SimulationError: a number has no meaning.
     """
+    for number in (to, interval):
+        if not _is_number(number):
+            raise SettingError(f"a time is a number of seconds, not {number!r}")
     if not (isfinite(to) and to > 0.0):
         raise SettingError(f"a simulation goes on for a positive time, not {to:g} s")
     if not (isfinite(interval) and interval > 0.0):

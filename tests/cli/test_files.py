@@ -119,6 +119,15 @@ def test_errors_are_one_sentence(tmp_path: Path) -> None:
     code, out, error = run("info", "nowhere.osim", folder=tmp_path)
     assert (code, out) == (2, "")
     assert error == "osimlite: nowhere.osim: cannot read the file: no such file\n"
+    for command in ("info", "validate", "format"):
+        code, out, error = run(command, "steady-walker", folder=tmp_path)
+        assert (code, out) == (2, "") and "'osimlite build steady-walker -o steady-walker.osim'" in error
+        assert error.count("\n") == 1
+    code, _, error = run("info", ".", folder=tmp_path)
+    assert code == 2 and error.endswith("this is a folder; name a model file in it\n")
+    assert run("format", ".", folder=tmp_path) == (2, "", "osimlite: .: there is no .osim file in this folder\n")
+    (tmp_path / "empty.osim").touch()
+    assert run("format", "empty.osim", folder=tmp_path)[0] == 1
 
 
 def test_build_takes_data(fixtures: Path, tmp_path: Path) -> None:

@@ -73,6 +73,8 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"report_interval": 1e-9}, "ten million rows"),
         ({"accuracy": 0.0}, "between 0 and 1"),
         ({"fixed_step": -1e-3}, "positive and finite"),
+        ({"fixed_step": 5.0}, "5 s is too long"),
+        ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
         ({"engine": "bulet"}, "did you mean 'bullet'"),
         ({"route": "quick"}, "no route"),
