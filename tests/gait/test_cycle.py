@@ -166,4 +166,4 @@ def test_the_command(tmp_path):
     assert facts["cycle"]["step_length_m"] == pytest.approx(0.624657, abs=1e-6)
     assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
     done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
-    assert done.exit_code == 0 and "0 steps, 1 scuffs" in done.output and "makes no step" in done.output
+    assert done.exit_code == 0 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output
