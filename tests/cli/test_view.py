@@ -69,11 +69,14 @@ def test_what_cannot_be_shown_is_said(
 def test_the_page_is_served_until_interrupted(walker: Path) -> None:
     command = [sys.executable, "-u", "-m", "osimlite", "view", "walker.osim", "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
-        assert served.stdout is not None and served.stderr is not None
-        line = served.stdout.readline()
-        (url,) = re.findall(r"http://127\.0\.0\.1:\d+/", line)
-        with urllib.request.urlopen(url) as page:
-            assert "DynamicWalkerModel" in page.read().decode()
-        served.send_signal(signal.SIGINT)
-        assert served.wait(20) == 130
-        assert "Traceback" not in served.stderr.read()
+        try:
+            assert served.stdout is not None and served.stderr is not None
+            line = served.stdout.readline()
+            (url,) = re.findall(r"http://127\.0\.0\.1:\d+/", line)
+            with urllib.request.urlopen(url) as page:
+                assert "DynamicWalkerModel" in page.read().decode()
+            served.send_signal(signal.SIGINT)
+            assert served.wait(20) == 130
+            assert "Traceback" not in served.stderr.read()
+        finally:
+            served.kill()
