@@ -24,18 +24,19 @@ if TYPE_CHECKING:
     from osimlite.simulation import simulate as simulate
     from osimlite.translate import to_urdf as to_urdf
 
-__all__ = [
-    "Model",
-    "OsimliteError",
-    "mechanism",
-    "read",
-    "read_text",
-    "simulate",
-    "to_text",
-    "to_urdf",
-    "validate",
-    "write",
-]
+    # When the program runs, `__getattr__` makes the list, of the component classes too.
+    __all__ = [
+        "Model",
+        "OsimliteError",
+        "mechanism",
+        "read",
+        "read_text",
+        "simulate",
+        "to_text",
+        "to_urdf",
+        "validate",
+        "write",
+    ]
 
 _FUNCTIONS = {
     "read": "osimlite.document.reader",
@@ -51,6 +52,10 @@ _FUNCTIONS = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__all__":
+        from osimlite.schema.registry import MODULES
+
+        return sorted({*_FUNCTIONS, *MODULES})
     module = _FUNCTIONS.get(name)
     if module is None and not name.startswith("_"):
         from osimlite.schema.registry import MODULES

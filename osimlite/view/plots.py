@@ -66,7 +66,7 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
 
 
 def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
-    """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), the latter zero at the start.
+    """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), zero at the origin of the ground.
 
     A trajectory knows what contacts and springs store besides; of another motion that cannot be told.
     """
@@ -74,14 +74,14 @@ def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Arr
     known = getattr(motion, "energy", None)
     if known is not None:
         kinetic, height = np.asarray(known["kinetic"]), np.asarray(known["gravity"])
-        parts = {"kinetic": kinetic, "potential of gravity": height - height[0]}
+        parts = {"kinetic": kinetic, "potential of gravity": height}
         return times, {**parts, STORED: np.asarray(known["stored"])}
     places = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_ENERGIES)).astype(int))
     q = in_mechanism_order(motion, mechanism, np.asarray(motion.values)[places])
     u = in_mechanism_order(motion, mechanism, np.asarray(motion.speeds)[places])
     kinetic = np.array([mechanism.kinetic_energy(*state) for state in zip(q, u, strict=True)])
     height = np.array([mechanism.potential_energy(row) for row in q])
-    return times[places], {"kinetic": kinetic, "potential of gravity": height - height[0]}
+    return times[places], {"kinetic": kinetic, "potential of gravity": height}
 
 
 def _figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
@@ -174,7 +174,7 @@ def _energy(times: Array, parts: Mapping[str, Array]) -> Any:
     figure, (panel,) = _sheet("Energy", [3.6])
     _lines(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
     panel.set_ylabel("energy (J)")
-    note = "gravity: zero at the start"
+    note = "gravity: zero at the origin of the ground"
     if STORED not in parts:
         note += "; energy stored in contacts and limit springs is not in the sum"
     _finish((panel,), times, note)

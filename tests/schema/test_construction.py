@@ -10,6 +10,7 @@ from importlib import import_module
 import pytest
 from pydantic import BaseModel
 
+import osimlite
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.base import Object, defaults, field_specs
 from osimlite.schema.fields import Held, Reference, Value, epoch
@@ -175,3 +176,9 @@ def test_the_docstring_has_every_property(cls):
 def test_the_docstring_says_units_and_defaults():
     assert "    mass_center: 3 numbers in m; 0 0 0 by default" in CLASSES["Body"].__doc__
     assert "socket_frame: the name of a PhysicalFrame; nothing by default" in CLASSES["ContactSphere"].__doc__
+
+
+def test_a_star_brings_the_component_classes():
+    names: dict[str, object] = {}
+    exec("from osimlite import *", names)
+    assert names["PinJoint"] is osimlite.PinJoint and names["simulate"] is osimlite.simulate
