@@ -23,6 +23,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; did you mean '{found}'?" if found else ""
 
 
+def or_known(word: str, known: Iterable[str], *more: str) -> str:
+    """``"; did you mean 'x'?"``, or if nothing is near all that there is: ``"; there is x, y and z"``."""
+    choices = list(known)
+    return did_you_mean(word, choices) or f"; there is {listed([*choices, *more])}"
+
+
 def counted(number: int, noun: str) -> str:
     """``"1 step"``, ``"2 steps"``."""
     return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -10,7 +10,7 @@ from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.contact_elements import HuntCrossley
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.text import counted, did_you_mean, listed
+from osimlite.text import counted, listed, or_known
 
 _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
 
@@ -67,8 +67,8 @@ def find_footing(engine: CompiledEngine, feet: Sequence[str] | None = None) -> F
         for contact in (contact for foot in given for contact in foot):
             if contact not in known:
                 raise OsimliteError(
-                    f"no sphere touches a half space in '{contact}'{did_you_mean(contact, known)}; "
-                    f"there are {listed(known) or 'none'}"
+                    f"no sphere touches a half space in '{contact}'"
+                    f"{or_known(contact, known) if known else '; none does'}"
                 )
         if len(given) < 2:
             raise OsimliteError(f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each")

@@ -22,7 +22,7 @@ from osimlite._load import module_named, module_of_file
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep.variables import Floats
-from osimlite.text import did_you_mean, listed
+from osimlite.text import did_you_mean, or_known
 
 BUILT_IN = {
     "distance": "osimlite.sweep.measures:distance",
@@ -165,8 +165,7 @@ def measure(spec: Any, engine: Any) -> Measure:
         except ModelError as error:
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
         return Measure(name, partial(_ends, place, locked))
-    near = did_you_mean(name, BUILT_IN)
-    raise SettingError(f"there is no measure '{name}'{near}; there is {listed(BUILT_IN)}, and module:function")
+    raise SettingError(f"there is no measure '{name}'{or_known(name, BUILT_IN, 'module:function')}")
 
 
 EVENTS_PER_SECOND = 100

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from osimlite._require import require
 from osimlite.errors import SettingError
 from osimlite.sweep.variables import Floats, Variable
-from osimlite.text import did_you_mean, listed
+from osimlite.text import listed, or_known
 
 Counts = NDArray[np.uint64]
 
@@ -102,9 +102,7 @@ def samples(
     if sampler is None:
         sampler = "grid" if count is None and all(item.count for item in varied) else "sobol"
     if sampler not in SAMPLERS:
-        raise SettingError(
-            f"there is no sampler '{sampler}'{did_you_mean(sampler, SAMPLERS)}; there is {listed(SAMPLERS)}"
-        )
+        raise SettingError(f"there is no sampler '{sampler}'{or_known(sampler, SAMPLERS)}")
     if seed < 0:
         raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
     if sampler == "grid":

@@ -14,7 +14,7 @@ import numpy as np
 from osimlite._require import require
 from osimlite.errors import SettingError
 from osimlite.sweep.variables import Floats
-from osimlite.text import did_you_mean, listed
+from osimlite.text import or_known
 
 Ask = Callable[[Floats], Floats]
 """Costs (k,) of points (k, d); raises `Enough` when no more are wanted."""
@@ -119,7 +119,7 @@ def method_named(name: str) -> Callable[[Ask, Search], str]:
         SettingError: there is none.
     """
     if name not in METHODS:
-        raise SettingError(f"there is no method '{name}'{did_you_mean(name, METHODS)}; there is {listed(METHODS)}")
+        raise SettingError(f"there is no method '{name}'{or_known(name, METHODS)}")
     return METHODS[name]
 
 

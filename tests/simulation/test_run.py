@@ -76,7 +76,8 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"fixed_step": 5.0}, "5 s is too long"),
         ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
-        ({"engine": "bulet"}, "did you mean 'bullet'"),
+        ({"engine": "bulet"}, r"did you mean 'bullet'\?$"),
+        ({"engine": "xyz"}, "there is bullet and compiled$"),
         ({"route": "quick"}, "no route"),
     ],
 )

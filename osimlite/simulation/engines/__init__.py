@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from osimlite.errors import OsimliteError
-from osimlite.text import did_you_mean, listed
+from osimlite.text import or_known
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.protocol import EngineFactory
@@ -29,8 +29,6 @@ def engine_factory(name: str) -> EngineFactory:
         MissingDependency: the package it works with is not installed.
     """
     if name not in ENGINES:
-        raise OsimliteError(
-            f"there is no engine '{name}'{did_you_mean(name, ENGINES) or f'; there is {listed(ENGINES)}'}"
-        )
+        raise OsimliteError(f"there is no engine '{name}'{or_known(name, ENGINES)}")
     make: EngineFactory = import_module(ENGINES[name]).make
     return make
