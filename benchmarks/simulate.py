@@ -75,15 +75,15 @@ def main() -> None:
     report("Whole processes (machine code in the cache)", whole, console=console)
 
 
-def run_ours(simulation: Simulation, accuracy: float) -> Callable[[], list[float]]:
+def run_ours(simulation: Simulation, accuracy: float, to: float = TO) -> Callable[[], list[float]]:
     def run() -> list[float]:
-        trajectory = simulation.run(TO, accuracy=accuracy)
+        trajectory = simulation.run(to, accuracy=accuracy)
         return [float(value) for value in trajectory.values[-1]]
 
     return run
 
 
-def run_opensim(model: Any, accuracy: float, runs: int) -> Callable[[], list[float]]:
+def run_opensim(model: Any, accuracy: float, runs: int, to: float = TO) -> Callable[[], list[float]]:
     coordinates = model.getCoordinateSet()
     # A manager starts once. All are made ready here, so that only the motion is timed.
     ready = []
@@ -98,7 +98,7 @@ def run_opensim(model: Any, accuracy: float, runs: int) -> Callable[[], list[flo
     def run() -> list[float]:
         # The state it returns lives as long as the manager.
         manager = ready.pop()
-        end = manager.integrate(TO)
+        end = manager.integrate(to)
         return [coordinates.get(place).getValue(end) for place in range(coordinates.getSize())]
 
     return run
