@@ -140,7 +140,7 @@ def force_elements(
     if skipped and not skip_unsupported:
         raise UnsupportedError(
             f"osimlite cannot compute {listed(by_class(skipped))}; switch off their appliesForce, "
-            "or leave them out with --skip-unsupported (skip_unsupported=True)"
+            "or leave them out with --skip-unsupported (skip_unsupported=True); docs/forces.md says what is computed"
         )
     if external_loads is not None:
         from osimlite.simulation.external_loads import read_external_loads

@@ -118,7 +118,7 @@ def _refuse_constraints(mechanism: Mechanism, engine: str) -> None:
     if kept and engine not in KEEP_CONSTRAINTS:
         raise UnsupportedError(
             f"the {engine} engine cannot keep up {listed(kept)}; take the engine {' or '.join(KEEP_CONSTRAINTS)}, or "
-            "set isEnforced of a constraint and prescribed of a coordinate to false"
+            "set isEnforced of a constraint and prescribed of a coordinate to false (docs/constraints.md)"
         )
 
 
