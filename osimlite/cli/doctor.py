@@ -139,7 +139,7 @@ def _show_places(console: Console, model: Path | None) -> None:
     """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
     from osimlite.files import GEOMETRY_VARIABLE
     from osimlite.lint.settings import settings_for
-    from osimlite.translate.mesh_files import geometry_folders
+    from osimlite.meshes.folders import geometry_folders
 
     folder = Path.cwd() if model is None else model.resolve() if model.is_dir() else model.resolve().parent
     settings = settings_for(folder)

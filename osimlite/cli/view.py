@@ -64,8 +64,8 @@ def view(
     from rich.console import Console
 
     from osimlite.document.reader import read
+    from osimlite.meshes.folders import geometry_folders
     from osimlite.multibody import build_mechanism
-    from osimlite.translate.mesh_files import geometry_folders
     from osimlite.view.shown import Shown
 
     model = read(file)

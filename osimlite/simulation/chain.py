@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from osimlite.multibody.mechanism import GROUND
+from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.script import ZERO, Matrix, Scalar, Script, Vector, matrix, vector
-from osimlite.translate.robot import Robot, RobotJoint
 
 
 class Placed(NamedTuple):

@@ -183,7 +183,7 @@ class ElementBuilder:
     @property
     def mesh_folders(self) -> tuple[Path, ...]:
         """Where mesh files are looked for."""
-        from osimlite.translate.mesh_files import geometry_folders
+        from osimlite.meshes.folders import geometry_folders
 
         return geometry_folders(self.folder)
 

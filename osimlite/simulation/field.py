@@ -28,11 +28,11 @@ from osimlite.forces import (
 )
 from osimlite.multibody.functions import Constant, Function
 from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.chain import Chain, Column
 from osimlite.simulation.contact_elements import PairContact
 from osimlite.simulation.elements import ForceElement, Triple
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
-from osimlite.translate.robot import Robot, RobotJoint
 
 LAWS: dict[str, Callable[..., Any]] = {
     name: law

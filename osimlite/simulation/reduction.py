@@ -17,8 +17,8 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import DriftAngle
 from osimlite.multibody.spatial import Array
-from osimlite.translate.lines import as_line
-from osimlite.translate.robot import RobotJoint
+from osimlite.robot.lines import as_line
+from osimlite.robot.robot import RobotJoint
 
 
 class Reduced(NamedTuple):

@@ -155,7 +155,7 @@ class Simulation:
         )
         visuals = None
         if show:
-            from osimlite.translate.visuals import collect_visuals
+            from osimlite.robot.visuals import collect_visuals
 
             visuals = collect_visuals(model, self.mechanism)
         self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.errors import ModelError, OsimliteError
+from osimlite.meshes.folders import find_file
+from osimlite.meshes.obj import obj_polygons
+from osimlite.meshes.stl import stl_corners
+from osimlite.meshes.surface import Indices, Polygons
+from osimlite.meshes.vtp import vtp_polygons
 from osimlite.multibody.spatial import Array
-from osimlite.translate.mesh_files import find_file
-from osimlite.translate.obj import obj_polygons
-from osimlite.translate.stl import stl_corners
-from osimlite.translate.surface import Indices, Polygons
-from osimlite.translate.vtp import vtp_polygons
 
 _SAME_POINT = 8.7e-7
 """STL files have no common points; corners nearer than this in every direction are one, as for Simbody (m)."""

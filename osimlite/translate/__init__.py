@@ -6,16 +6,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from osimlite.robot.build import build_robot as build_robot
+    from osimlite.robot.robot import Robot as Robot
     from osimlite.translate.export import Urdf as Urdf
     from osimlite.translate.export import to_urdf as to_urdf
     from osimlite.translate.fidelity import Fidelity as Fidelity
-    from osimlite.translate.robot import Robot as Robot
-    from osimlite.translate.robot import build_robot as build_robot
 
-_PUBLIC = {"Urdf": "export", "to_urdf": "export", "Fidelity": "fidelity", "Robot": "robot", "build_robot": "robot"}
+_PUBLIC = {
+    "Urdf": "translate.export",
+    "to_urdf": "translate.export",
+    "Fidelity": "translate.fidelity",
+    "Robot": "robot.robot",
+    "build_robot": "robot.build",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'osimlite.translate' has no attribute '{name}'")
-    return getattr(import_module(f"osimlite.translate.{_PUBLIC[name]}"), name)
+    return getattr(import_module(f"osimlite.{_PUBLIC[name]}"), name)

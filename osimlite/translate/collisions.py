@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.errors import ModelError
+from osimlite.meshes import curved
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, offset
+from osimlite.robot.mesh_files import MeshFiles
+from osimlite.robot.shapes import Ball, Box, MeshFile, Shape, Visual
+from osimlite.robot.visuals import mesh_shape
 from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactMesh, ContactSphere
 from osimlite.schema.model import Model
-from osimlite.translate import meshes
 from osimlite.translate.fidelity import Fidelity
-from osimlite.translate.mesh_files import MeshFiles
-from osimlite.translate.shapes import Ball, Box, MeshFile, Shape, Visual
-from osimlite.translate.visuals import mesh_shape
 
 SLAB = (1.0, 200.0, 200.0)
 """Size (m) of the box that stands for a half space: its thickness, and its edges along the surface."""
@@ -77,12 +77,12 @@ def _shape(
             return Box(SLAB), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             file = mesh_files.add(
-                ("ellipsoid", *geometry.radii), "ellipsoid", ".obj", meshes.ellipsoid(geometry.radii).encode()
+                ("ellipsoid", *geometry.radii), "ellipsoid", ".obj", curved.ellipsoid(geometry.radii).encode()
             )
             told("an ellipsoid, and its material", "a collision shape in a mesh file", file)
             return MeshFile(file), here
         case ContactMesh():
-            shape = mesh_shape(geometry.filename, path, mesh_files, fidelity)
+            shape = mesh_shape(geometry.filename, path, mesh_files, fidelity.add)
             if shape is not None:
                 done = "a collision shape of the file; many programs take its convex hull"
                 told("the material of a contact mesh", done, shape.file)

@@ -10,20 +10,22 @@ from typing import Literal
 
 from osimlite.errors import OsimliteError
 from osimlite.files import make_folder, write_atomically
+from osimlite.meshes.folders import geometry_folders
 from osimlite.multibody import build_mechanism
+from osimlite.robot.build import build_robot
+from osimlite.robot.merge_fixed import merge_fixed
+from osimlite.robot.mesh_files import MeshFiles
+from osimlite.robot.names import legal, legal_names
+from osimlite.robot.range_limits import range_limits
+from osimlite.robot.robot import Robot
+from osimlite.robot.urdf import urdf_text
+from osimlite.robot.visuals import Visuals, collect_visuals
 from osimlite.schema.model import Model
 from osimlite.translate.collisions import collect_collisions
 from osimlite.translate.fidelity import Fidelity
-from osimlite.translate.mesh_files import MeshFiles, geometry_folders
-from osimlite.translate.passes.merge_fixed import merge_fixed
-from osimlite.translate.passes.names import legal, legal_names
-from osimlite.translate.passes.range_limits import range_limits
-from osimlite.translate.passes.strength import strength
-from osimlite.translate.robot import Robot, build_robot
 from osimlite.translate.sidecar import coordinates_json
+from osimlite.translate.strength import strength
 from osimlite.translate.survey import survey
-from osimlite.translate.urdf import urdf_text
-from osimlite.translate.visuals import Visuals, collect_visuals
 
 Limits = Literal["none", "range"]
 Locked = Literal["fixed", "joint"]
@@ -115,7 +117,7 @@ def to_urdf(
     fidelity = Fidelity(mechanism.name, "urdf")
     places = geometry_folders(None if folder is None else Path(folder), [Path(place) for place in geometry])
     mesh_files = MeshFiles(places)
-    shapes = collect_visuals(model, mechanism, fidelity, mesh_files=mesh_files) if visuals else Visuals()
+    shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files=mesh_files) if visuals else Visuals()
     touching = collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}
     robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body, collisions=touching)
     if merge:

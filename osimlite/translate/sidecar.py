@@ -12,8 +12,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from osimlite.multibody.functions import IDENTITY
-from osimlite.translate.laws import as_data, couplers, mimics
-from osimlite.translate.robot import Robot
+from osimlite.robot.mimics import couplers, mimics
+from osimlite.robot.robot import Robot
+from osimlite.translate.function_data import as_data
 
 FORMAT, VERSION = "osimlite-coordinates", 1
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 
 from osimlite.multibody.functions import IDENTITY
+from osimlite.robot.mimics import Mimic, couplers, mimics
+from osimlite.robot.principal_axes import breaks_triangle_rule, principal_axes
+from osimlite.robot.robot import Robot
 from osimlite.schema.base import Component
 from osimlite.schema.constraints import Constraint
 from osimlite.schema.contact import ContactGeometry
@@ -20,9 +23,6 @@ from osimlite.schema.probes import Probe
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
 from osimlite.translate.fidelity import Fidelity
-from osimlite.translate.laws import Mimic, couplers, mimics
-from osimlite.translate.passes.principal_axes import breaks_triangle_rule, principal_axes
-from osimlite.translate.robot import Robot
 
 COMPUTE = "compute its value by the file of coordinates"
 """What to do about a joint that the robot's file leaves free."""

@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
+from osimlite.meshes.folders import find_file
+from osimlite.meshes.surface import Surface
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array, offset, rotation_about, transform
+from osimlite.robot.visuals import frame_of
 from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
 from osimlite.schema.base import Component, field_specs
 from osimlite.schema.forces import Force, HuntCrossleyForce
@@ -21,9 +24,6 @@ from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint
 from osimlite.schema.tree import Use
-from osimlite.translate.mesh_files import find_file
-from osimlite.translate.surface import Surface
-from osimlite.translate.visuals import frame_of
 from osimlite.view import surfaces
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
 

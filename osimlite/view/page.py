@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 from osimlite.lint.diagnostic import Finding
+from osimlite.meshes.surface import Surface
 from osimlite.multibody.constraints import Coupler, Lock, Prescribed
 from osimlite.multibody.functions import IDENTITY, Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import AxisMotion
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.translate.laws import as_data
+from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
-from osimlite.translate.surface import Surface
 from osimlite.view.inspect import component_tree, finding_rows, pins
 from osimlite.view.motion import Motion, in_mechanism_order
 from osimlite.view.pushes import Pushes

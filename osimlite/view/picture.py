@@ -11,8 +11,8 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import OsimliteError
+from osimlite.meshes.surface import Surface
 from osimlite.multibody.spatial import Array
-from osimlite.translate.surface import Surface
 from osimlite.view import surfaces
 from osimlite.view.canvas import Canvas
 from osimlite.view.scene import Bodies, Color, Scene

@@ -110,10 +110,10 @@ def computed_forces(
         OsimliteError: a file is missing or cannot be read.
         SimulationError: at a state the rates of coordinates are not defined.
     """
+    from osimlite.robot.build import build_robot
+    from osimlite.robot.merge_fixed import merge_fixed
     from osimlite.simulation.elements import force_elements
     from osimlite.simulation.field import ForceField
-    from osimlite.translate.passes.merge_fixed import merge_fixed
-    from osimlite.translate.robot import build_robot
 
     elements = force_elements(model, mechanism, skip_unsupported=True, folder=folder).elements
     if not elements:

@@ -13,10 +13,10 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
+from osimlite.meshes.surface import Surface
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.translate.surface import Surface
 
 Color = tuple[float, float, float]
 Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "frames"]

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import OsimliteError
+from osimlite.meshes.obj import obj_polygons
+from osimlite.meshes.stl import stl_corners
+from osimlite.meshes.surface import Indices, Surface, triangulated
+from osimlite.meshes.vtp import read_vtp
 from osimlite.multibody.spatial import Array
-from osimlite.translate.obj import obj_polygons
-from osimlite.translate.stl import stl_corners
-from osimlite.translate.surface import Indices, Surface, triangulated
-from osimlite.translate.vtp import read_vtp
 
 SLICES, STACKS = 48, 24
 

@@ -204,7 +204,7 @@ def test_worlds_are_left(mechanism):
 
 
 def test_bodies_can_be_seen(walker, mechanism):
-    from osimlite.translate.visuals import collect_visuals
+    from osimlite.robot.visuals import collect_visuals
 
     with BulletEngine(mechanism, Forces(()), visuals=collect_visuals(walker, mechanism)) as engine:
         shapes = bullet.getVisualShapeData(engine._body.id, physicsClientId=engine._body.client)

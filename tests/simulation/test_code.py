@@ -13,13 +13,13 @@ import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model
 from osimlite.forces.hunt_crossley import contact_forces, half_space_sphere, simbody_pair_order
 from osimlite.multibody import build_mechanism
+from osimlite.robot.build import build_robot
+from osimlite.robot.merge_fixed import merge_fixed
 from osimlite.simulation.chain import Chain
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.bullet import BulletEngine
 from osimlite.simulation.script import Script
 from osimlite.simulation.solver import SingularMassError, tree_solver
-from osimlite.translate.passes.merge_fixed import merge_fixed
-from osimlite.translate.robot import build_robot
 
 NUMBERS = st.floats(-3.0, 3.0)
 SCALARS = st.one_of(st.sampled_from(["a", "b", "c"]), st.sampled_from([0.0, 1.0, -1.0]), NUMBERS)

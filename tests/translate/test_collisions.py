@@ -11,6 +11,7 @@ import pytest
 from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
+from osimlite.robot.urdf import UNLIMITED, urdf_text
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.contact import (
     ContactCylinder,
@@ -24,8 +25,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.joints import SliderJoint
 from osimlite.translate import build_robot, to_urdf
-from osimlite.translate.urdf import UNLIMITED, urdf_text
-from tests.translate.readers import in_bullet, written
+from tests.robot.readers import in_bullet, written
 from tests.translate.test_export import kinds, one_body, unaccounted
 
 

@@ -35,8 +35,8 @@ from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
 from osimlite.translate.survey import CONTAINERS
+from tests.robot.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 from tests.translate.evaluator import Reader
-from tests.translate.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 
 
 def kinds(urdf: Urdf) -> dict[str, list[str]]:

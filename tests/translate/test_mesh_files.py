@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
+from osimlite.meshes.stl import binary_stl
 from osimlite.schema.geometry import Appearance, Mesh
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
-from osimlite.translate.mesh_files import find_file, geometry_folders
-from osimlite.translate.stl import binary_stl
-from tests.translate.readers import in_bullet, written
+from tests.robot.readers import in_bullet, written
 from tests.translate.test_export import kinds, one_body, vertices, visuals
 
 TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
@@ -116,39 +115,11 @@ def test_damaged_meshes_are_told(bones):
 
 
 # ------------------------------------------------------------------------------------------------ where they are
-def test_folders_are_searched_in_order(tmp_path, monkeypatch):
-    monkeypatch.setenv("OSIMLITE_GEOMETRY", f"{tmp_path / 'd'}::{tmp_path / 'e'}")
-    folders = geometry_folders(tmp_path / "a", [tmp_path / "b", tmp_path / "c"])
-    assert [path.relative_to(tmp_path).as_posix() for path in folders] == ["a", "a/Geometry", "b", "c", "d", "e"]
-    for folder in reversed(folders):
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "bone.obj").write_text(f"v {folder.name}")
-        assert find_file("bone.obj", folders) == folder / "bone.obj"
-    assert geometry_folders(None) == folders[-2:]
-
-
 def test_a_file_spelled_alike_is_taken_and_reported(bones):
     urdf = to_urdf(one_body(Mesh(mesh_file="geometry\\femur.VTP"), Mesh(mesh_file="PELVIS.stl")), folder=bones)
     assert [item["filename"] for item in meshes(urdf)] == ["meshes/Femur.obj", "meshes/pelvis.stl"]
     details = [record.detail for record in urdf.fidelity if record.kind == "mesh-name"]
     assert details == ["geometry\\femur.VTP as Femur.vtp", "PELVIS.stl as pelvis.stl"]
-
-
-def test_a_file_spelled_exactly_anywhere_comes_first(tmp_path):
-    for folder, name in (("a", "Bone.obj"), ("b", "bone.obj")):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / name).write_text("")
-    assert find_file("bone.obj", [tmp_path / "a", tmp_path / "b"]) == tmp_path / "b" / "bone.obj"
-    assert find_file("BONE.obj", [tmp_path / "a", tmp_path / "b"]) == tmp_path / "a" / "Bone.obj"
-
-
-def test_absolute_names_parents_and_nonsense(tmp_path):
-    (tmp_path / "a").mkdir()
-    (tmp_path / "bone.obj").write_text("")
-    assert find_file(str(tmp_path / "bone.obj"), []) == tmp_path / "bone.obj"
-    assert find_file("../bone.obj", [tmp_path / "a"]) == tmp_path / "a" / ".." / "bone.obj"
-    for name in ("", ".", "..", "a", "\0", "x" * 5000, "C:\\Geometry\\bone.obj", str(tmp_path / "gone.obj")):
-        assert find_file(name, [tmp_path, tmp_path / "none"]) is None
 
 
 def test_names_of_two_files_are_kept_apart_and_legal(tmp_path):

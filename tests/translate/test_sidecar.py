@@ -25,6 +25,11 @@ from osimlite.multibody.joints import TransformAxis, custom
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import DriftAngle, EllipsoidPoint
 from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.robot.build import build_robot
+from osimlite.robot.merge_fixed import merge_fixed
+from osimlite.robot.mimics import mimics
+from osimlite.robot.names import legal_names
+from osimlite.robot.urdf import urdf_text
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.coordinates import Coordinate
@@ -36,17 +41,12 @@ from osimlite.schema.functions import LinearFunction, MultiplierFunction, Polyno
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
-from osimlite.translate.laws import as_data, mimics
-from osimlite.translate.lines import Line, as_line
-from osimlite.translate.passes.merge_fixed import merge_fixed
-from osimlite.translate.passes.names import legal_names
-from osimlite.translate.robot import build_robot
+from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import coordinates_json
-from osimlite.translate.urdf import urdf_text
 from tests.multibody.strategies import Case, cases
+from tests.robot.readers import mujoco_poses, worst_body, yourdfpy_poses
+from tests.robot.test_robot import one_body
 from tests.translate.evaluator import Reader, evaluate
-from tests.translate.readers import mujoco_poses, worst_body, yourdfpy_poses
-from tests.translate.test_robot import one_body
 
 
 def worst(reader: Reader, mechanism: Mechanism, q) -> float:
@@ -188,32 +188,6 @@ def test_the_guide_describes_the_file(repo):
     assert said["joints"][0].keys() | {"identity"} == made["joints"][0].keys()
     piece = said["joints"][0]["function"]
     assert len(piece["pieces"]) == len(piece["x"]) + 1
-
-
-def test_straight_lines_are_known_in_any_form():
-    lines = [
-        Linear(2.0, 1.0),
-        f.WeightedSum((2.0,), 1.0),
-        f.Polynomial((0.0, 2.0, 1.0)),
-        f.MultivariatePolynomial.complete((1.0, 2.0, 0.0), 1, 2),
-        Scaled(-2.0, Linear(-1.0, -0.5)),
-        f.SimmSpline((-1.0, 3.0), (-1.0, 7.0)),
-        Scaled(0.5, f.SimmSpline((-1.0, 3.0), (-2.0, 14.0))),
-        f.PiecewiseLinear((-1.0, 3.0), (-1.0, 7.0)),
-    ]
-    assert [as_line(function) for function in lines] == [Line(2.0, 1.0)] * len(lines)
-    assert as_line(f.SimmSpline(X, [0.3] * len(X))) == Line(0.0, 0.3)
-    curves = [
-        f.Polynomial((1.0, 2.0, 1.0)),
-        f.WeightedSum((1.0, 2.0)),
-        f.MultivariatePolynomial.complete((1.0, 2.0, 3.0), 1, 2),
-        f.MultivariatePolynomial.complete((1.0, 2.0, 3.0), 2, 1),
-        f.Sine(1.0, 1.0, 0.0, 0.0),
-        Scaled(2.0, f.SimmSpline(X, Y)),
-        f.SimmSpline((0.0, 0.0), (0.0, 1.0)),
-        f.PiecewiseLinear(X, Y),
-    ]
-    assert [as_line(function) for function in curves] == [None] * len(curves)
 
 
 def test_axes_along_straight_splines_are_joints_of_one_coordinate():

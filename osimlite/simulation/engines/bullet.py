@@ -17,6 +17,10 @@ import numpy as np
 from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.robot.build import build_robot
+from osimlite.robot.merge_fixed import merge_fixed
+from osimlite.robot.names import legal_names
+from osimlite.robot.robot import Robot
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet_file import require_masses
 from osimlite.simulation.engines.bullet_stepper import BulletStepper
@@ -26,12 +30,9 @@ from osimlite.simulation.field import ForceField, own_coordinates
 from osimlite.simulation.integrators import Observer, Projection, RungeKuttaMerson, Stepper
 from osimlite.simulation.solver import SingularMassError, tree_solver
 from osimlite.simulation.speeds import Speeds
-from osimlite.translate.passes.merge_fixed import merge_fixed
-from osimlite.translate.passes.names import legal_names
-from osimlite.translate.robot import Robot, build_robot
 
 if TYPE_CHECKING:
-    from osimlite.translate.visuals import Visuals
+    from osimlite.robot.visuals import Visuals
 
 MASS_MATRIX, ARTICULATED_BODY, RECURSION = "mass-matrix", "articulated-body", "recursion"
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY, RECURSION)

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.translate.passes.principal_axes import principal_axes
-from osimlite.translate.robot import Link, Robot
-from osimlite.translate.urdf import urdf_text
+from osimlite.robot.principal_axes import principal_axes
+from osimlite.robot.robot import Link, Robot
+from osimlite.robot.urdf import urdf_text
 
 
 def robot_text(robot: Robot) -> str:

@@ -18,6 +18,7 @@ from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.robot.robot import Robot
 from osimlite.simulation.body_code import BodyStates
 from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
@@ -28,7 +29,6 @@ from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.field import ForceField
 from osimlite.simulation.integrators import Observer, Stepper
 from osimlite.simulation.reduction import Reduction
-from osimlite.translate.robot import Robot
 
 
 class ReducedBulletEngine(BulletEngine):

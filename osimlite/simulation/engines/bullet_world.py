@@ -13,9 +13,9 @@ from typing import Any
 
 from osimlite._require import require
 from osimlite.errors import SimulationError
+from osimlite.robot.principal_axes import principal_axes
+from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.engines.bullet_file import excess, robot_text, temporary_file
-from osimlite.translate.passes.principal_axes import principal_axes
-from osimlite.translate.robot import Robot, RobotJoint
 
 __all__ = ["World", "bullet"]
 

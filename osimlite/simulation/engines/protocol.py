@@ -17,7 +17,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, Observer, Stepper
 
 if TYPE_CHECKING:
-    from osimlite.translate.visuals import Visuals
+    from osimlite.robot.visuals import Visuals
 
 
 @dataclass(frozen=True)

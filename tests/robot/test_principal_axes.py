@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.multibody.spatial import rotation_xyz
-from osimlite.translate.passes.principal_axes import breaks_triangle_rule, principal_axes
-from osimlite.translate.urdf import roll_pitch_yaw
+from osimlite.robot.principal_axes import breaks_triangle_rule, principal_axes
+from osimlite.robot.urdf import roll_pitch_yaw
 
 sizes = st.floats(1e-6, 1e3)
 angles = st.one_of(st.floats(-4.0, 4.0), st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi]))

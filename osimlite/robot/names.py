@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from osimlite.translate.robot import WORLD, Robot
+from osimlite.robot.robot import WORLD, Robot
 
 LONGEST = 200
 """Characters in a name; some readers cut lines that are too long."""

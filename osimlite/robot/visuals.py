@@ -6,23 +6,34 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import copysign
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
+from osimlite.meshes import curved
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, rotation_about, transform
+from osimlite.robot.mesh_files import MeshFiles, MeshProblem
+from osimlite.robot.shapes import Ball, Box, MeshFile, Shape, Tube, Visual
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, FrameGeometry, Geometry, Mesh, Sphere
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
-from osimlite.translate import meshes
-from osimlite.translate.fidelity import Fidelity
-from osimlite.translate.mesh_files import MeshFiles, MeshProblem
-from osimlite.translate.shapes import Ball, Box, MeshFile, Shape, Tube, Visual
 
 _Y_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""
 _Y_TO_Z[np.abs(_Y_TO_Z) < 1e-15] = 0.0
+
+
+class Note(Protocol):
+    """Is told what a shape cannot say; `osimlite.translate.fidelity.Fidelity.add` is one."""
+
+    def __call__(self, kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+        """Take note of it; the arguments are those of a record of the translation."""
+
+
+def _unheard(kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+    """Let nobody know."""
 
 
 @dataclass
@@ -36,7 +47,7 @@ class Visuals:
 def collect_visuals(
     model: Model,
     mechanism: Mechanism,
-    fidelity: Fidelity | None = None,
+    note: Note = _unheard,
     folders: Sequence[Path] = (),
     mesh_files: MeshFiles | None = None,
 ) -> Visuals:
@@ -45,19 +56,18 @@ def collect_visuals(
     Args:
         model: where the geometry is.
         mechanism: of the same model; knows where frames are.
-        fidelity: is told of what cannot be drawn.
+        note: is told of what cannot be drawn.
         folders: where mesh files are looked for.
         mesh_files: takes the mesh files up, and knows the folders, instead.
     """
-    account = Fidelity(model.name, "picture") if fidelity is None else fidelity
-    return _Collector(model, mechanism, account, mesh_files or MeshFiles(folders)).collect()
+    return _Collector(model, mechanism, note, mesh_files or MeshFiles(folders)).collect()
 
 
 class _Collector:
-    def __init__(self, model: Model, mechanism: Mechanism, fidelity: Fidelity, mesh_files: MeshFiles) -> None:
+    def __init__(self, model: Model, mechanism: Mechanism, note: Note, mesh_files: MeshFiles) -> None:
         self.tree = model.tree()
         self.mechanism = mechanism
-        self.fidelity = fidelity
+        self.note = note
         self.mesh_files = mesh_files
         self.found = Visuals(files=mesh_files.files)
 
@@ -68,7 +78,7 @@ class _Collector:
         return self.found
 
     def _add(self, geometry: Geometry, path: str) -> None:
-        note = self.fidelity.add
+        note = self.note
         frame = frame_of(self.tree, geometry)
         if frame is None or frame not in self.mechanism.frames:
             note("visual", path, "a shape in a frame that is not fixed to a body", "left out")
@@ -91,7 +101,7 @@ class _Collector:
 
     def _shape(self, geometry: Geometry, path: str) -> tuple[Shape, Array] | None:
         """The shape, and its frame in the frame of the geometry."""
-        note, here = self.fidelity.add, np.eye(4)
+        note, here = self.note, np.eye(4)
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:
             case Brick():
@@ -102,7 +112,7 @@ class _Collector:
                 radii = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
                 if radii[0] == radii[1] == radii[2]:
                     return Ball(radii[0]), here
-                file = self._mesh_file("ellipsoid", radii, meshes.ellipsoid(radii))
+                file = self._mesh_file("ellipsoid", radii, curved.ellipsoid(radii))
                 note("ellipsoid", path, "an ellipsoid", "written as a mesh file", f"{file}, half axes {radii} m")
                 return MeshFile(file), here
             case Cylinder():
@@ -114,7 +124,7 @@ class _Collector:
                 )
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
-                file = self._mesh_file("elliptic_cylinder", (a, b, length), meshes.elliptic_cylinder((a, b), length))
+                file = self._mesh_file("elliptic_cylinder", (a, b, length), curved.elliptic_cylinder((a, b), length))
                 note("elliptic-cylinder", path, "a cylinder that is not round", "written as a mesh file", file)
                 return MeshFile(file), _Y_TO_Z
             case Mesh():
@@ -123,7 +133,7 @@ class _Collector:
         return None
 
     def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
-        shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.fidelity, geometry.scale_factors)
+        shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.note, geometry.scale_factors)
         return None if shape is None else (shape, np.eye(4))
 
     def _mesh_file(self, name: str, key: tuple[float, ...], content: str) -> str:
@@ -147,7 +157,7 @@ def mesh_shape(
     name: str,
     path: str,
     mesh_files: MeshFiles,
-    fidelity: Fidelity,
+    note: Note,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> MeshFile | None:
     """A mesh file of the model as a shape; None, and a record that tells why, if nothing can be made of it.
@@ -156,10 +166,10 @@ def mesh_shape(
         name: of the file, as in the model.
         path: absolute path of the component that names it.
         mesh_files: finds the file and takes it up.
-        fidelity: is told what became of the file.
+        note: is told what became of the file.
         scale: factors, of which negative ones mirror the surface.
     """
-    what, note = f"a mesh in the file {name}", fidelity.add
+    what = f"a mesh in the file {name}"
     signs = (copysign(1.0, scale[0]), copysign(1.0, scale[1]), copysign(1.0, scale[2]))
     try:
         copy = mesh_files.copy(name, signs)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from osimlite.translate.lines import as_line
-from osimlite.translate.robot import Robot, RobotJoint
+from osimlite.robot.lines import as_line
+from osimlite.robot.robot import Robot, RobotJoint
 
 
 def range_limits(robot: Robot) -> Robot:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from osimlite.multibody.spatial import Array, transform
-from osimlite.translate.passes.principal_axes import principal_axes
-from osimlite.translate.robot import Link, Robot
+from osimlite.robot.principal_axes import principal_axes
+from osimlite.robot.robot import Link, Robot
 
 
 class Bullet:

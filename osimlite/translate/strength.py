@@ -6,10 +6,10 @@ import math
 from dataclasses import replace
 
 from osimlite.errors import ModelError
+from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.model import Model
 from osimlite.translate.fidelity import Fidelity
-from osimlite.translate.robot import Robot, RobotJoint
 
 
 def strength(

@@ -7,7 +7,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.meshes.surface import Array
 
 SLICES, STACKS = 32, 16
 

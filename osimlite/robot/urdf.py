@@ -27,11 +27,11 @@ from itertools import pairwise
 
 from osimlite.document.escape import quoted
 from osimlite.multibody.spatial import Array
-from osimlite.translate.laws import Mimic, mimics
-from osimlite.translate.passes.names import UniqueNames
-from osimlite.translate.passes.principal_axes import principal_axes
-from osimlite.translate.robot import Link, Robot, RobotJoint
-from osimlite.translate.shapes import Ball, Box, MeshFile, Tube, Visual
+from osimlite.robot.mimics import Mimic, mimics
+from osimlite.robot.names import UniqueNames
+from osimlite.robot.principal_axes import principal_axes
+from osimlite.robot.robot import Link, Robot, RobotJoint
+from osimlite.robot.shapes import Ball, Box, MeshFile, Tube, Visual
 
 UNLIMITED = 1e9
 """Limit of position, velocity or effort (m, m/s, rad/s, N, N·m) where the model has none."""
@@ -49,7 +49,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
     """Write a robot as URDF.
 
     Args:
-        robot: with legal names (see `osimlite.translate.passes.names`).
+        robot: with legal names (see `osimlite.robot.names`).
         visuals: whether to say what links look like.
     """
     out, unique = _Writer(), UniqueNames()

@@ -20,8 +20,7 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from osimlite.errors import OsimliteError
-from osimlite.multibody.spatial import Array
-from osimlite.translate.surface import Indices, Polygons, Surface, strip_triangles, triangulated
+from osimlite.meshes.surface import Array, Indices, Polygons, Surface, strip_triangles, triangulated
 
 _DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
     "vtkZLibDataCompressor": zlib.decompress,

@@ -1,22 +1,9 @@
-"""The neutral robot: links and one-axis joints, between the mechanism and every target format.
-
-How it corresponds to the mechanism it was built from:
-
-- The root link, "world", is ground. Every body has one link; `Link.bodies` says by absolute path which bodies a link
-  carries and where their frames are in the link's frame (identity unless `body_frames` was off or links were merged).
-- A joint of the model is a chain of joints here: one per single-axis motion of its mobilizer, in their order, with
-  massless links (mass and inertia zero) between them. Nothing depends on names: `RobotJoint.coordinates` are places
-  in `Mechanism.coordinates`, and the joint's value is `RobotJoint.function` of them. Most often that function is the
-  identity, and then `RobotJoint.coordinate` is the one place, and the joint is named after the coordinate.
-- `Robot.joint_values(q)` gives the values of all moving joints by name, for joints driven by any function.
-- A locked coordinate is a fixed joint at its value unless asked otherwise.
-"""
+"""From the mechanism to the neutral robot: each joint is spread out into motions along or about one axis."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -25,140 +12,13 @@ from osimlite.multibody.functions import IDENTITY, Constant, Function, Linear, S
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.motions import AxisMotion, Fixed
-from osimlite.multibody.spatial import Array, rotation_about, transform
-from osimlite.translate.lines import as_line
-from osimlite.translate.shapes import Visual
-
-WORLD = "world"
-"""Name of the root link, which URDF readers that let robots float take as the sign that it is fixed."""
-
-JointKind = Literal["fixed", "revolute", "prismatic"]
+from osimlite.multibody.spatial import Array
+from osimlite.robot.lines import as_line
+from osimlite.robot.robot import WORLD, Link, Robot, RobotJoint
+from osimlite.robot.shapes import Visual
 
 _ALONG = 1e-14
 """How far off an axis, relative to its own length, a vector may be and still count as lying along it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Link:
-    """A rigid body of the robot.
-
-    Attributes:
-        name: unique among links and joints.
-        mass: kg; 0 for a link that only stands between two joints.
-        center: mass centre (3,) in the link frame, m.
-        inertia: (3, 3) about the mass centre along the axes of the link frame, kg·m².
-        visuals: what it looks like.
-        collisions: what it touches others with; their colours mean nothing.
-        bodies: frame (4, 4) in the link frame of each body it carries, by the body's absolute path.
-    """
-
-    name: str
-    mass: float = 0.0
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    visuals: tuple[Visual, ...] = ()
-    collisions: tuple[Visual, ...] = ()
-    bodies: Mapping[str, Array] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class RobotJoint:
-    """A joint that moves along or about one axis, or not at all.
-
-    The child link's frame in the parent link's frame is `origin`, then the motion by the joint's value along or about
-    `axis`.
-
-    Attributes:
-        name: unique among links and joints.
-        kind: how it moves.
-        parent: name of the link it starts from.
-        child: name of the link it moves.
-        origin: (4, 4), the joint in the parent link.
-        axis: unit vector (3,) in the joint's frame.
-        coordinates: places in the mechanism of the coordinates that decide the value; empty for a fixed joint.
-        function: the joint's value (rad, m) as a function of these coordinates.
-        limits: hard limits of the value, or None.
-        effort: greatest force (N, N·m) that a program may put on it, or None.
-        velocity: greatest rate (m/s, rad/s) that a program may ask of it, or None.
-        source: absolute path of the model's joint that it is a part of.
-    """
-
-    name: str
-    kind: JointKind
-    parent: str
-    child: str
-    origin: Array
-    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))
-    coordinates: tuple[int, ...] = ()
-    function: Function = IDENTITY
-    limits: tuple[float, float] | None = None
-    effort: float | None = None
-    velocity: float | None = None
-    source: str = ""
-
-    @property
-    def coordinate(self) -> int | None:
-        """The coordinate whose value is the joint's value, or None if there is no such coordinate."""
-        return self.coordinates[0] if self.kind != "fixed" and self.function == IDENTITY else None
-
-    def value(self, q: Array) -> float:
-        """The joint's value (rad, m) at coordinate values q (n,) of the mechanism; 0 for a fixed joint."""
-        return self.function.evaluate(q[list(self.coordinates)])[0] if self.coordinates else 0.0
-
-    def across(self, value: float) -> Array:
-        """The child link's frame in the parent link's (4, 4) at a joint value."""
-        if self.kind == "fixed":
-            return self.origin
-        if self.kind == "revolute":
-            return self.origin @ transform(rotation_about(self.axis, value))
-        return self.origin @ transform(None, self.axis * value)
-
-
-@dataclass(frozen=True, eq=False)
-class Robot:
-    """A tree of links from `WORLD`: links stand after those that carry them, joints in the order of their children."""
-
-    name: str
-    links: tuple[Link, ...]
-    joints: tuple[RobotJoint, ...]
-    mechanism: Mechanism
-
-    @cached_property
-    def moving(self) -> tuple[RobotJoint, ...]:
-        """The joints that are not fixed."""
-        return tuple(joint for joint in self.joints if joint.kind != "fixed")
-
-    @cached_property
-    def link_of(self) -> dict[str, tuple[Link, Array]]:
-        """By absolute path of each body (and ground), its link and the body's frame (4, 4) in the link's."""
-        return {path: (link, frame) for link in self.links for path, frame in link.bodies.items()}
-
-    @cached_property
-    def joint_of(self) -> dict[int, RobotJoint]:
-        """The joint whose value is the coordinate, by the coordinate's place in the mechanism, where there is one."""
-        return {joint.coordinate: joint for joint in reversed(self.moving) if joint.coordinate is not None}
-
-    def joint_values(self, q: Values) -> dict[str, float]:
-        """Values (rad, m) of all moving joints by name, at coordinate values `q` of the mechanism."""
-        values = self.mechanism.values(q)
-        return {joint.name: joint.value(values) for joint in self.moving}
-
-    def joint_jacobian(self, q: Values) -> Array:
-        """Rates of the m moving joints per rates of the n coordinates (m, n), in the order of `moving`."""
-        values = self.mechanism.values(q)
-        jacobian = np.zeros((len(self.moving), len(values)))
-        for row, joint in enumerate(self.moving):
-            places = list(joint.coordinates)
-            jacobian[row, places] = joint.function.evaluate(values[places])[1]
-        return jacobian
-
-    def link_transforms(self, q: Values) -> dict[str, Array]:
-        """Transform (4, 4) of every link in the root link."""
-        values = self.mechanism.values(q)
-        placed = {self.links[0].name: np.eye(4)}
-        for joint in self.joints:
-            placed[joint.child] = placed[joint.parent] @ joint.across(joint.value(values))
-        return placed
 
 
 def build_robot(

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError
-from osimlite.translate.surface import Surface, triangulated
-from osimlite.translate.vtp import read_vtp
+from osimlite.meshes.surface import Surface, triangulated
+from osimlite.meshes.vtp import read_vtp
 
 WRITTEN_BY_VTK = (
     "ascii",

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.multibody.spatial import Array
-
+Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from osimlite.multibody.spatial import Array, skew
-from osimlite.translate.robot import Link, Robot
+from osimlite.robot.robot import Link, Robot
 
 
 def merge_fixed(robot: Robot) -> Robot:

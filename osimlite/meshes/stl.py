@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.multibody.spatial import Array
+from osimlite.meshes.surface import Array
 
 _HEAD = b"binary STL".ljust(80)
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

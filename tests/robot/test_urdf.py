@@ -15,16 +15,17 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.functions import Linear
 from osimlite.multibody.joints import TransformAxis, custom
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.translate.passes.merge_fixed import merge_fixed
-from osimlite.translate.passes.names import legal_names
-from osimlite.translate.passes.range_limits import range_limits
-from osimlite.translate.robot import Robot, build_robot
-from osimlite.translate.shapes import MeshFile, Visual
-from osimlite.translate.urdf import UNLIMITED, number, urdf_text
+from osimlite.robot.build import build_robot
+from osimlite.robot.merge_fixed import merge_fixed
+from osimlite.robot.names import legal_names
+from osimlite.robot.range_limits import range_limits
+from osimlite.robot.robot import Robot
+from osimlite.robot.shapes import MeshFile, Visual
+from osimlite.robot.urdf import UNLIMITED, number, urdf_text
 from tests.multibody.cases import mixed_tree
 from tests.multibody.strategies import Case, cases
-from tests.translate.readers import in_bullet, inertial_frame, mujoco_poses, worst_body, yourdfpy_poses
-from tests.translate.test_robot import one_body
+from tests.robot.readers import in_bullet, inertial_frame, mujoco_poses, worst_body, yourdfpy_poses
+from tests.robot.test_robot import one_body
 
 
 def walker() -> Mechanism:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.translate.surface import Polygons
+from osimlite.meshes.surface import Polygons
 
 
 def obj_polygons(content: bytes, name: str) -> Polygons:

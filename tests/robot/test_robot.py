@@ -12,13 +12,14 @@ from osimlite.multibody.functions import IDENTITY, Linear
 from osimlite.multibody.joints import Mobilizer, TransformAxis, custom
 from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
 from osimlite.multibody.spatial import offset, skew
-from osimlite.translate.passes.merge_fixed import merge_fixed
-from osimlite.translate.passes.names import legal, legal_names
-from osimlite.translate.passes.range_limits import range_limits
-from osimlite.translate.robot import WORLD, Robot, build_robot
+from osimlite.robot.build import build_robot
+from osimlite.robot.merge_fixed import merge_fixed
+from osimlite.robot.names import legal, legal_names
+from osimlite.robot.range_limits import range_limits
+from osimlite.robot.robot import WORLD, Robot
 from tests.multibody.cases import mixed_tree
 from tests.multibody.strategies import Case, cases
-from tests.translate.readers import worst_body
+from tests.robot.readers import worst_body
 
 
 def walker() -> Mechanism:

@@ -1,0 +1,66 @@
+"""The functions that drive joints, as data for other programs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from osimlite.errors import UnsupportedError
+from osimlite.multibody import functions as f
+from osimlite.multibody.arc import ArcPoint
+from osimlite.multibody.motions import EllipsoidPoint
+from osimlite.multibody.smoothing_spline import PiecewisePolynomial
+
+
+def as_data(function: f.Function) -> dict[str, Any]:
+    """A function as JSON-ready data, exact: ``type`` and what that type needs (see docs/urdf.md).
+
+    Raises:
+        UnsupportedError: a function of another class.
+    """
+    match function:
+        case f.Constant(value):
+            return {"type": "constant", "value": value}
+        case f.Linear(rate, start):
+            return {"type": "linear", "slope": rate, "start": start}
+        case f.WeightedSum(weights, start):
+            return {"type": "weighted-sum", "weights": weights, "start": start}
+        case f.Polynomial(coefficients):
+            return {"type": "polynomial", "coefficients": coefficients[::-1]}
+        case f.Sine(amplitude, omega, phase, offset):
+            return {"type": "sine", "amplitude": amplitude, "omega": omega, "phase": phase, "offset": offset}
+        case f.Step():
+            return {
+                "type": "step",
+                "x": (function.start, function.end),
+                "y": (function.start_value, function.end_value),
+            }
+        case f.MultivariatePolynomial(coefficients, powers):
+            return {"type": "multivariate-polynomial", "coefficients": coefficients, "powers": powers}
+        case f.Scaled(scale, inner):
+            return {"type": "scaled", "scale": scale, "function": as_data(inner)}
+        case f.PiecewiseLinear(x, y):
+            return {"type": "piecewise-linear", "x": x, "y": y}
+        case f.PiecewiseConstant(x, y):
+            return {"type": "piecewise-constant", "x": x, "y": y}
+        case EllipsoidPoint(component, radius):
+            return {"type": "ellipsoid-point", "component": component, "radius": radius}
+        case ArcPoint(component, length, neutral):
+            return {"type": "arc-point", "component": component, "length": length, "neutral": neutral}
+        case f.SimmSpline():
+            # The first and the last point go on in straight lines.
+            first, *_, last = function.pieces
+            return {
+                "type": "piecewise-polynomial",
+                "of": "SimmSpline",
+                "y": function.y,
+                "x": function.x,
+                "pieces": [first[:2], *function.pieces[:-1], last[:2]],
+            }
+        case PiecewisePolynomial():
+            return {
+                "type": "piecewise-polynomial",
+                "of": "GCVSpline",
+                "x": function.knots[1:].tolist(),
+                "pieces": function.pieces.tolist(),
+            }
+    raise UnsupportedError(f"a function of class {type(function).__name__} cannot be written as data")

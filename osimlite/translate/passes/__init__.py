@@ -1,1 +1,0 @@
-"""Passes: small changes from one neutral robot to another, one per module."""
