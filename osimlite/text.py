@@ -6,13 +6,14 @@ from collections.abc import Iterable
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | None:
-    """The known name most like `word` (rapidfuzz's weighted ratio, case ignored), or None if none is near."""
+    """The known name most like `word` (case and a namespace before a colon ignored), or None if none is near."""
     from rapidfuzz import fuzz, process
 
     choices = list(known)
-    exact_but_case = [choice for choice in choices if choice.lower() == word.lower()]
-    if exact_but_case:
-        return exact_but_case[0]
+    for exact in (word, word.rpartition(":")[2]):
+        but_for_case = [choice for choice in choices if choice.lower() == exact.lower()]
+        if but_for_case:
+            return but_for_case[0]
     found = process.extractOne(word, choices, scorer=fuzz.ratio, processor=str.lower, score_cutoff=cutoff)
     return found[0] if found else None
 

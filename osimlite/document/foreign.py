@@ -1,34 +1,13 @@
-"""XML that no class of ours stands for: plug-in classes and misspelt tags, kept as they were written.
-
-lxml takes no ``::`` in a tag, which OpenSim has, so a stand-in takes its place while a text is parsed.
-"""
+"""XML that no class of ours stands for: plug-in classes and misspelt tags, kept as they were written."""
 
 from __future__ import annotations
-
-import re
 
 from lxml import etree
 
 from osimlite.document.comments import is_generated
 from osimlite.document.escape import escape, quoted
+from osimlite.document.names import as_written, without_namespaces
 from osimlite.errors import ModelError
-
-_COLONS = re.compile(rb"::")
-_TAG_SO_FAR = re.compile(rb"</?[A-Za-z_][A-Za-z0-9_.-]*")
-STAND_IN = "\u00b7"
-"""Takes the place of ``::`` in a tag: two bytes in UTF-8 as well, and legal in a name where ``::`` is not."""
-_STAND_IN_BYTES = STAND_IN.encode()
-
-
-def without_colons(data: bytes) -> bytes:
-    """UTF-8 text with the stand-in for ``::`` in tags; every position stays what it was."""
-    pieces, done = [], 0
-    for match in _COLONS.finditer(data):
-        place = match.start()
-        if _TAG_SO_FAR.fullmatch(data, data.rfind(b"<", max(0, place - 200), place), place):
-            pieces += [data[done:place], _STAND_IN_BYTES]
-            done = place + 2
-    return b"".join([*pieces, data[done:]]) if pieces else data
 
 
 def is_element(node: etree._Element) -> bool:
@@ -48,7 +27,7 @@ def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = No
         ModelError: the text is no XML element.
     """
     try:
-        element = etree.fromstring(without_colons(xml.encode()))
+        element = etree.fromstring(without_namespaces(xml.encode()))
     except etree.XMLSyntaxError as error:
         raise ModelError(f"the content of an unknown component is no XML element: {error.msg}") from None
     if name and element.get("name") != name:
@@ -63,7 +42,7 @@ def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> l
         if isinstance(element, etree._Comment) and (not comments or is_generated(element.text or "")):
             return []
         return [indent + etree.tostring(element, encoding="unicode", with_tail=False)]
-    tag = element.tag.replace(STAND_IN, "::")
+    tag = as_written(element.tag)
     head = f"{indent}<{tag}" + "".join(f" {key}={quoted(text)}" for key, text in _attributes(element))
     texts = [element.text, *(child.tail for child in element)]
     if not len(element):
@@ -79,4 +58,4 @@ def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> l
 
 
 def _attributes(element: etree._Element) -> list[tuple[str, str]]:
-    return [(str(key), str(text)) for key, text in element.items()]
+    return [(as_written(str(key)), str(text)) for key, text in element.items()]

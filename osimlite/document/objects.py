@@ -10,8 +10,9 @@ from typing import Any, NamedTuple, TypeVar
 from lxml import etree
 
 from osimlite.document.comments import is_generated
-from osimlite.document.foreign import STAND_IN, is_element, xml_of
+from osimlite.document.foreign import is_element, xml_of
 from osimlite.document.lexical import ABSENT, Unclean, converter
+from osimlite.document.names import as_parsed, as_written
 from osimlite.document.notes import Note, NoteKind
 from osimlite.schema.base import (
     FieldSpec,
@@ -59,7 +60,7 @@ def plan_for(cls: type[Object]) -> Plan:
     steps: dict[Any, Step] = {}
     named: dict[str, FieldSpec] = {}
     for tag, spec in field_specs(cls).items():
-        tag = tag.replace("::", STAND_IN)
+        tag = as_parsed(tag)
         if not isinstance(spec.kind, Held):
             steps[tag] = Step(_TEXT, spec.name, converter(spec.kind), spec)
         elif spec.kind.form == "unnamed":
@@ -216,7 +217,7 @@ class ObjectReader:
             elif key != "name":
                 extra = extra or _Extra()
                 kind: NoteKind = "include" if key == "file" else "unknown-attribute"
-                extra.late.append((kind, number, str(key), None, str(attribute)))
+                extra.late.append((kind, number, as_written(str(key)), None, str(attribute)))
         if name:
             values["name"] = name
             present.add("name")
@@ -277,8 +278,9 @@ class ObjectReader:
                 # OpenSim reads no other file for the members of a set.
                 member: Object = self.object(child, cls) if spec.legacy else self._owned(child, cls)
             elif is_element(child):
-                known = class_for(child.tag.replace(STAND_IN, "::"))
-                late.append(("unknown-class" if known is None else "wrong-class", self.count, child.tag, spec, known))
+                tag = as_written(child.tag)
+                known = class_for(tag)
+                late.append(("unknown-class" if known is None else "wrong-class", self.count, tag, spec, known))
                 member = self._unknown(child)
             else:
                 remember(child, pending)
@@ -300,7 +302,7 @@ class ObjectReader:
         extra: _Extra,
     ) -> None:
         """Read a child whose tag is no property: an object by its property's name, or something unknown."""
-        tag = child.tag.replace(STAND_IN, "::")
+        tag = as_written(child.tag)
         name = child.get("name") or None
         held = class_for(tag)
         spec = named.get(name) if name is not None else None
@@ -328,14 +330,14 @@ class ObjectReader:
         number = self.count
         self.count += size(element)
         name = element.get("name") or ""
-        values = {"name": name, "class_name": element.tag.replace(STAND_IN, "::"), "content": content}
+        values = {"name": name, "class_name": as_written(element.tag), "content": content}
         return Unknown.build(values, {"name"} if name else set(), number, self.home)
 
     def _text_of(self, element: etree._Element, number: int, spec: FieldSpec, extra: _Extra) -> str:
         """The text of a value element that has comments or, wrongly, elements inside."""
         inner = [node for node in element if is_element(node)]
         if inner:
-            extra.late.append(("child-in-value", number, inner[0].tag, spec, None))
+            extra.late.append(("child-in-value", number, as_written(inner[0].tag), spec, None))
             self.count += sum(size(node) for node in inner)
         elif sum(1 for piece in (element.text, *(node.tail for node in element)) if piece and piece.strip()) > 1:
             extra.late.append(("child-in-value", number, "!--", spec, None))
@@ -347,7 +349,7 @@ class ObjectReader:
         for child in block:
             if not is_element(child):
                 continue
-            cls = class_for(child.tag.replace(STAND_IN, "::"))
+            cls = class_for(as_written(child.tag))
             if cls is None:
                 found.append(self._unknown(child))
                 continue
@@ -375,7 +377,7 @@ class ObjectReader:
 @cache
 def _accepted(tag: Any, accepts: type[Object] | None) -> type[Object] | None:
     """The class of a tag if it is one that a property for `accepts` may hold; a comment's tag is a function."""
-    cls = class_for(tag.replace(STAND_IN, "::")) if isinstance(tag, str) else None
+    cls = class_for(as_written(tag)) if isinstance(tag, str) else None
     return cls if cls is not None and accepts is not None and issubclass(cls, accepts) else None
 
 

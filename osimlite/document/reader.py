@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, cast
 from lxml import etree
 
 from osimlite.document.comments import all_generated
-from osimlite.document.foreign import is_element, without_colons
+from osimlite.document.foreign import is_element
+from osimlite.document.names import as_written, without_namespaces
 from osimlite.document.notes import Note
 from osimlite.document.objects import Included, ObjectReader, layout_of, remember, size
 from osimlite.document.source import Source
@@ -36,6 +37,9 @@ _COUNT = etree.XPath("count(descendant-or-self::*)")
 
 _MIXED = etree.XPath("boolean(/descendant::*[*]/text())")
 """Whether there is text beside an element; blank text the parser leaves out."""
+
+_ATTRIBUTES = etree.XPath("boolean(//@*[name() != 'name' and name() != 'file' and name() != 'Version'])")
+"""Whether there is an attribute besides those that mean something."""
 
 _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
@@ -86,6 +90,7 @@ def read_document(source: Source, *, to_check: bool = False) -> Document:
         root = parse(source)
         if to_check:
             source.mixed = cast("bool", _MIXED(root))
+            source.attributes = cast("bool", _ATTRIBUTES(root))
     except NotWellFormedError as fault:
         from osimlite.document.repair import read_repaired
 
@@ -170,7 +175,7 @@ def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
 
 
 def parse(source: Source, *, recover: bool = False) -> etree._Element:
-    """The element tree of a text, ``::`` in tags replaced by the stand-in.
+    """The element tree of a text, without namespaces: see :mod:`osimlite.document.names`.
 
     With `recover` the parser goes on after what is not well-formed; the tree is then a guess.
 
@@ -185,7 +190,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
             "a DOCTYPE with declarations inside is not read; remove it",
             file=source.file, line=line, column=column,
         )  # fmt: skip
-    data = without_colons(data)
+    data = without_namespaces(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark before them.
     unmarked = data.removeprefix(BOM_UTF8)
     body = unmarked.lstrip()
@@ -227,8 +232,9 @@ def version_of(source: Source, root: etree._Element) -> int:
         VersionError: the version is missing, no whole number, or too old to be read.
     """
     text = root.get("Version")
-    # A number too long for a version would take Python long to convert.
-    number = int(text) if text is not None and re.fullmatch(r"\s*[0-9]{1,9}\s*", text) else None
+    # OpenSim reads an int of 32 bits, and nothing may follow it but blanks.
+    digits = None if text is None else re.fullmatch(r"[ \t\r\n]*\+?0*([0-9]{1,10})[ \t\r\n]*", text)
+    number = int(digits[1]) if digits is not None and int(digits[1]) < 2**31 else None
     if root.tag == "OpenSimDocument" and number is not None and number >= OLDEST:
         return number
     if root.tag == "Model" and text is None:
@@ -237,7 +243,7 @@ def version_of(source: Source, root: etree._Element) -> int:
     line, column, _ = source.of_tag(0)
     if root.tag != "OpenSimDocument":
         raise DocumentError(
-            f"the root element is <{root.tag}>, not <OpenSimDocument>: this is no OpenSim document",
+            f"the root element is <{as_written(root.tag)}>, not <OpenSimDocument>: this is no OpenSim document",
             file=source.file, line=line, column=column,
         )  # fmt: skip
     if number is None:
@@ -263,7 +269,7 @@ def _model_in(source: Source, root: etree._Element, reader: ObjectReader) -> Mod
         if not is_element(child):
             remember(child, pending)
         elif model is not None:
-            reader.notes.append(Note("second-object", reader.count, child.tag))
+            reader.notes.append(Note("second-object", reader.count, as_written(child.tag)))
             reader.count += size(child)
         elif child.tag == "Model":
             model = reader.top(child, Model)
@@ -273,8 +279,9 @@ def _model_in(source: Source, root: etree._Element, reader: ObjectReader) -> Mod
         else:
             line, column, _ = source.of_tag(reader.count)
             raise DocumentError(
-                f"the document holds a <{child.tag}>, not a <Model>", file=source.file, line=line, column=column
-            )
+                f"the document holds a <{as_written(child.tag)}>, not a <Model>",
+                file=source.file, line=line, column=column,
+            )  # fmt: skip
     if model is None:
         line, column, _ = source.of_tag(0)
         raise DocumentError("the document holds no <Model>", file=source.file, line=line, column=column)

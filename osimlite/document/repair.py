@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from lxml import etree
 
+from osimlite.document.names import ATTRIBUTE, as_written
 from osimlite.document.notes import Note, NoteKind
 from osimlite.document.source import Source
 from osimlite.document.spans import markup
@@ -23,7 +24,6 @@ _HYPHENS = re.compile(r"-{2,}|-\Z")
 _AMPERSAND = re.compile(r"&(?!#[0-9]+;|#x[0-9a-fA-F]+;)(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
 _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
 _BLANK_CONTROLS = re.compile("[\f\v]")
-_ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
 _DECLARATION = re.compile(r"<\?xml\s")
 _SPECIAL = re.compile(r"<!(?:--|\[CDATA\[)")
 _EN_DASH = "\u2013"
@@ -65,7 +65,7 @@ def read_repaired(
     root = parse(Source(text.encode("utf-8", "replace"), source.file))
     spans = source.spans
     tags = [element.tag for element in root.iter(etree.Element)]
-    if len(tags) != len(spans) or any(_bare(span.tag) != _bare(tag) for span, tag in zip(spans, tags, strict=True)):
+    if len(tags) != len(spans) or any(span.tag != as_written(tag) for span, tag in zip(spans, tags, strict=True)):
         raise fault
     notes = []
     for repair in sorted(repairs, key=lambda repair: repair.offset):
@@ -122,10 +122,6 @@ def _unended(text: str) -> int | None:
     return None if found is None else found.start()
 
 
-def _bare(tag: str) -> str:
-    return tag.replace("::", "\u00b7")
-
-
 def _blanked(text: str) -> str:
     """As many spaces, the line ends kept."""
     return re.sub(r"[^\r\n]", " ", text)
@@ -156,7 +152,7 @@ def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
 
 def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     """Of an attribute that stands twice the last one counts, as for OpenSim."""
-    given = list(_ATTRIBUTE.finditer(piece))
+    given = list(ATTRIBUTE.finditer(piece))
     last = {match["name"]: match for match in given}
     for match in given:
         kept = last[match["name"]]

@@ -40,6 +40,8 @@ class Source:
         """Whether there may be comments other than OpenSim's own."""
         self.mixed: bool | None = None
         """Whether there is text beside elements, where that has been looked for in a well-formed text."""
+        self.attributes: bool | None = None
+        """Whether there are attributes without a meaning, where they have been looked for in a well-formed text."""
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from osimlite.document.names import as_written
 from osimlite.document.reader import Document, document_of, parse, read_document, version_of
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
@@ -74,6 +75,6 @@ def _same_elements(source: Source, root: etree._Element, sure_until: int | None)
     for number, (span, element) in enumerate(numbered):
         if sure_until is not None and source.of_tag(number).line >= sure_until:
             return True
-        if span.tag.replace("::", "\u00b7") != element.tag:
+        if span.tag != as_written(element.tag):
             return False
     return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from osimlite.document.foreign import STAND_IN
+from osimlite.document.names import as_written
 from osimlite.document.source import Position, Source
 
 _PLAIN = (
@@ -12,6 +12,7 @@ _PLAIN = (
     (r"Premature end of data in tag (\S+) line (\d+)", r"the file ends before <\1> of line \2 is closed"),
     (r"Couldn't find end of Start Tag (\S+)(?: line \d+)?", r"the tag <\1 has no '>'"),
     (r"EndTag: '</' not found", "the file ends before its elements are closed"),
+    (r"Failed to parse QName '(.*)'", r"'\1' is no name of an element or attribute"),
     (r"StartTag: invalid element name", "no tag begins with this '<'; write &lt; for the character itself"),
     (r"Extra content at the end of the document", "something follows after the root element has ended"),
     (r"Specification mandates value for attribute (\S+)", r"the attribute \1 has no value"),
@@ -28,7 +29,7 @@ _PLAIN = (
 
 def plain_words(message: str) -> str:
     """The parser's message without its place, and readable."""
-    message = " ".join(re.sub(r", line \d+, column \d+$", "", message).replace(STAND_IN, "::").split())
+    message = " ".join(as_written(re.sub(r", line \d+, column \d+$", "", message)).split())
     for pattern, words in _PLAIN:
         match = re.fullmatch(pattern, message)
         if match is not None:
@@ -39,15 +40,12 @@ def plain_words(message: str) -> str:
 def place_of(source: Source, line: int, column: int, message: str) -> Position:
     """Where in the text the parser gave up, when it says `line` and `column` of what it was given.
 
-    It was given one character for each ``::``, and after a wrong closing tag it stands behind it.
+    After a wrong closing tag it stands behind it.
     """
     lines = source.lines
     line = min(max(line, 1), len(lines))
     text = lines[line - 1]
-    # The parser counts a stand-in once; each before the place moves it on by one.
-    given = text.replace("::", STAND_IN)
-    column = min(max(column, 1), len(given) + 1)
-    column += given[: column - 1].count(STAND_IN)
+    column = min(max(column, 1), len(text) + 1)
     if "tag mismatch" in message:
         column = max(text.rfind("</", 0, column - 1), 0) + 1
     return Position(line, max(1, min(column, len(text))))

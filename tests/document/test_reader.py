@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.document.reader import Document, read_document
 from osimlite.document.source import Source
-from osimlite.errors import DocumentError, MissingFileError
+from osimlite.errors import DocumentError, MissingFileError, VersionError
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.model import Model
@@ -148,6 +148,31 @@ def test_what_is_no_document_is_refused_with_its_place(text: str, line: int, wor
         osimlite.read_text(text)
     assert caught.value.line == line
     assert caught.value.column is not None and caught.value.column >= 1
+
+
+@pytest.mark.parametrize(
+    ("text", "version"),
+    [
+        *(
+            (text, 40600)
+            for text in ("+40600", " 40600\t", "\n40600 ", "0040600", "+000000000040600", "&#52;0600")
+        ),
+        ("2147483647", 2**31 - 1),
+        *(
+            (text, None)
+            for text in ("", "+", "++40600", "+ 40600", "-40600", "40600.0", "4.06e4", "40600 1", "0x9E98", "40_600",
+                         "2147483648", "\u00a040600", "\uff14\uff10\uff16\uff10\uff10")
+        ),
+    ],
+)  # fmt: skip
+def test_a_version_is_read_as_opensim_reads_it(text: str, version: int | None) -> None:
+    """Each was tried with OpenSim 4.6."""
+    document = f'<OpenSimDocument Version="{text}"><Model/></OpenSimDocument>'
+    if version is not None:
+        assert read_document(Source(document.encode())).version == version
+    else:
+        with pytest.raises(VersionError, match="not a whole number"):
+            osimlite.read_text(document)
 
 
 def test_entities_and_files_of_others_are_not_followed(tmp_path: Path) -> None:

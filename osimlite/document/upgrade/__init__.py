@@ -11,6 +11,7 @@ from importlib import import_module
 
 from lxml import etree
 
+from osimlite.document.names import as_written
 from osimlite.document.upgrade import v40500_path_names, v40600_controllers  # noqa: F401
 from osimlite.document.upgrade.draft import REGISTERED, Change, Draft, Element, Refused, Step
 from osimlite.document.upgrade.v40600_class_names import class_names
@@ -81,7 +82,8 @@ class Upgraded:
         for element in self._draft.touched:
             parent = element.getparent()
             if parent is not None:
-                found.setdefault((self._draft.numbers[parent], element.tag), self._draft.numbers[element])
+                place = (self._draft.numbers[parent], as_written(element.tag))
+                found.setdefault(place, self._draft.numbers[element])
         return found
 
 

@@ -8,12 +8,10 @@ from typing import NamedTuple
 
 from lxml import etree
 
+from osimlite.document.names import as_written
 from osimlite.schema.registry import class_for
 
 Element = etree._Element
-
-STAND_IN = "\u00b7"
-"""Stands for ``::`` in the tags of the tree."""
 
 _FAMILY_OF_MEMBERS = {
     "ConstraintSet": "Constraint",
@@ -94,7 +92,7 @@ def step(*, below: int, order: int | None = None) -> Callable[[Callable[[Draft],
 @cache
 def families(tag: str) -> frozenset[str]:
     """The names of the class that a tag stands for and of its bases; none for a tag that is no class."""
-    cls = class_for(tag.replace(STAND_IN, "::"))
+    cls = class_for(as_written(tag))
     return frozenset() if cls is None else frozenset(base.__name__ for base in cls.__mro__)
 
 
@@ -231,7 +229,7 @@ class Draft:
 def describe(element: Element) -> str:
     """An element as a reader knows it: its class and its name."""
     name = element.get("name")
-    tag = element.tag.replace(STAND_IN, "::")
+    tag = as_written(element.tag)
     return f"{tag} '{name}'" if name else tag
 
 

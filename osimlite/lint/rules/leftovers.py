@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
+from osimlite.document.names import ATTRIBUTE
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
@@ -20,10 +22,12 @@ def unknown_attribute(subject: Subject, found: Found) -> None:
     """An element has an attribute that means nothing.
 
     ## What it does
-    Reports attributes of objects other than `name` and `file`.
+    Reports attributes of objects other than `name` and `file`; a warning on an element that is no object. Attributes of
+    XML itself (`xmlns`, and all with a colon) are for information.
 
     ## Why is this bad
-    OpenSim ignores them: properties are elements, not attributes.
+    OpenSim ignores them: properties are elements, not attributes. Those of objects stay when a model is written, those
+    of other elements are lost.
 
     ## Example
     ```xml
@@ -41,7 +45,43 @@ def unknown_attribute(subject: Subject, found: Found) -> None:
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
         suggestion = "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
         fix = without_attribute(subject.source, note.number, note.word) if suggestion is None else None
-        found(message, owner, at=subject.attribute_name(note.number, note.word), suggestion=suggestion, fix=fix)
+        of_xml = INFO if _of_xml(note.word) else None
+        place = subject.attribute_name(note.number, note.word)
+        found(message, owner, at=place, severity=of_xml, suggestion=suggestion, fix=None if of_xml else fix)
+    for number, tag, word in _beside_objects(subject):
+        found(
+            f"OpenSim ignores the attribute '{word}' of <{tag}>; it is lost when the model is written",
+            at=subject.attribute_name(number, word),
+            severity=INFO if _of_xml(word) else WARNING,
+            fix=None if _of_xml(word) else without_attribute(subject.source, number, word),
+        )
+
+
+def _of_xml(attribute: str) -> bool:
+    """Whether an attribute is for programs that read any XML."""
+    return attribute == "xmlns" or ":" in attribute
+
+
+def _beside_objects(subject: Subject) -> Iterator[tuple[int, str, str]]:
+    """Every attribute without a meaning of an element that is no object: the element's number and tag, its name."""
+    source = subject.source
+    if source is None or not source.attributes:
+        return
+    known = {(note.number, note.word) for note in subject.notes if note.kind == "unknown-attribute"}
+    kept = {note.number for note in subject.notes if note.kind in _KEPT_WHOLE}
+    inside = 0
+    for number, span in enumerate(source.spans):
+        if span.start < inside:
+            continue
+        if number in kept:
+            inside = span.end
+            continue
+        head = source.text[span.start : span.tag_end]
+        for match in ATTRIBUTE.finditer(head) if "=" in head else ():
+            word = match["name"]
+            meant = ("Version",) if number == 0 else ("name", "file")
+            if word not in meant and (number, word) not in known:
+                yield number, span.tag, word
 
 
 @rule("OSIM106", "stray-text", severity=WARNING, mends="safe")
@@ -179,6 +219,7 @@ def force_outside_set(subject: Subject, found: Found) -> None:
         )
 
 
+_KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag"))
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
 _BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")

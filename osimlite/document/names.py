@@ -1,0 +1,70 @@
+"""Colons in the names of elements and attributes, which mean nothing to OpenSim.
+
+For OpenSim a colon is a letter: ``HuntCrossleyForce::ContactParameters`` is the name of a class, and an ``xmlns`` is an
+attribute like any other. For lxml it sets off a namespace. While a text is parsed, other characters stand in for it.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+
+_COLON = "\u02d0"
+_XMLNS = "xml\u0274s"
+_STAND_INS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
+
+ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
+"""An attribute in a start tag."""
+_CANDIDATE = re.compile(rb":|(?<=\s)xmlns(?=\s*=)")
+_TAG_SO_FAR = re.compile(
+    rb"</?[A-Za-z_\x80-\xff][^\s<>=\"'/]*"
+    rb"(?:\s+[^\s<>=\"'/]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*"
+    rb"(?:\s+[^\s<>=\"'/]+)?"
+)
+_WINDOW = 4096
+"""How far before a colon its tag is looked for."""
+_HIDING = ((b"<!--", b"-->"), (b"<![CDATA[", b"]]>"))
+
+
+def as_parsed(name: str) -> str:
+    """A name as it is in the element tree."""
+    return name.replace(":", _COLON)
+
+
+def as_written(name: str) -> str:
+    """A name of the element tree, or words of the parser about one, as it is in the text."""
+    return name.replace(_COLON, ":").replace(_XMLNS, "xmlns")
+
+
+def without_namespaces(data: bytes) -> bytes:
+    """UTF-8 text in which no name has a colon; every character keeps its line and column."""
+    pieces, done = [], 0
+    hidden: list[tuple[int, int]] | None = None
+    for match in _CANDIDATE.finditer(data):
+        place = match.start()
+        tag = data.rfind(b"<", max(0, place - _WINDOW), place)
+        so_far = data[tag:place] if match[0] == b":" else data[tag:place].rstrip()
+        if tag < 0 or _TAG_SO_FAR.fullmatch(so_far) is None:
+            continue
+        if hidden is None:
+            hidden = _hidden(data)
+        before = bisect_right(hidden, (tag, len(data))) - 1
+        if before >= 0 and place < hidden[before][1]:
+            continue
+        pieces += [data[done:place], _STAND_INS[match[0]]]
+        done = match.end()
+    return b"".join([*pieces, data[done:]]) if pieces else data
+
+
+def _hidden(data: bytes) -> list[tuple[int, int]]:
+    """Where text stands that may look like a tag and is none, in order."""
+    found = []
+    for opening, ending in _HIDING:
+        place = data.find(opening)
+        while place >= 0:
+            end = data.find(ending, place)
+            if end < 0:
+                break
+            found.append((place, end))
+            place = data.find(opening, end)
+    return sorted(found)
