@@ -15,7 +15,8 @@ _STAND_INS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
 
 ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
 """An attribute in a start tag."""
-_CANDIDATE = re.compile(rb":|(?<=\s)xmlns(?=\s*=)")
+_COLONS = re.compile(b":")
+_NAMESPACE = re.compile(rb"(?<=\s)xmlns(?=\s*=)")
 _TAG_SO_FAR = re.compile(
     rb"</?[A-Za-z_\x80-\xff][^\s<>=\"'/]*"
     rb"(?:\s+[^\s<>=\"'/]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*"
@@ -40,10 +41,12 @@ def without_namespaces(data: bytes) -> bytes:
     """UTF-8 text in which no name has a colon; every character keeps its line and column."""
     pieces, done = [], 0
     hidden: list[tuple[int, int]] | None = None
-    for match in _CANDIDATE.finditer(data):
-        place = match.start()
+    found = [match.span() for match in _COLONS.finditer(data)]
+    if b"xmlns" in data:
+        found = sorted([*found, *(match.span() for match in _NAMESPACE.finditer(data))])
+    for place, end in found:
         tag = data.rfind(b"<", max(0, place - _WINDOW), place)
-        so_far = data[tag:place] if match[0] == b":" else data[tag:place].rstrip()
+        so_far = data[tag:place] if end - place == 1 else data[tag:place].rstrip()
         if tag < 0 or _TAG_SO_FAR.fullmatch(so_far) is None:
             continue
         if hidden is None:
@@ -51,8 +54,8 @@ def without_namespaces(data: bytes) -> bytes:
         before = bisect_right(hidden, (tag, len(data))) - 1
         if before >= 0 and place < hidden[before][1]:
             continue
-        pieces += [data[done:place], _STAND_INS[match[0]]]
-        done = match.end()
+        pieces += [data[done:place], _STAND_INS[data[place:end]]]
+        done = end
     return b"".join([*pieces, data[done:]]) if pieces else data
 
 
