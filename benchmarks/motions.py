@@ -27,7 +27,7 @@ from osimlite.errors import OsimliteError
 from osimlite.schema.forces import CoordinateLimitForce, Force
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
-from osimlite.simulation.more_elements import MAKERS
+from osimlite.simulation.element_makers import MAKERS
 from simulate import run_opensim, run_ours
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"

@@ -202,7 +202,7 @@ class ElementBuilder:
             from osimlite.simulation.contact_elements import hunt_crossley
 
             return hunt_crossley(self, force)
-        from osimlite.simulation.more_elements import MAKERS
+        from osimlite.simulation.element_makers import MAKERS
 
         maker = MAKERS.get(type(force))
         if maker is None:

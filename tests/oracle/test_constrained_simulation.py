@@ -14,7 +14,7 @@ from osimlite.document.reader import read_text
 from osimlite.schema.forces import CoordinateLimitForce, Force
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
-from osimlite.simulation.more_elements import MAKERS
+from osimlite.simulation.element_makers import MAKERS
 from tests.oracle.test_constraints import CASES, _chain
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -51,8 +51,8 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
+from osimlite.simulation.element_makers import MAKERS
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.more_elements import MAKERS
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 

@@ -1,4 +1,4 @@
-"""Which class of force has which element, but for those that every walker has."""
+"""What makes the element of a force, by the class of the force; the two that every walker has are not among them."""
 
 from __future__ import annotations
 
