@@ -32,6 +32,10 @@ class OsimliteError(Exception):
         return f"{place}: {self.message}" if place else self.message
 
 
+class DoubtfulWarning(UserWarning):
+    """Something can be done as it is asked for, but was hardly meant so."""
+
+
 class DocumentError(OsimliteError):
     """The text cannot be read as an OpenSim document."""
 

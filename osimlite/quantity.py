@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+import sys
+import warnings
+from pathlib import Path
 from typing import NamedTuple
+
+from osimlite.errors import DoubtfulWarning
 
 _FORM = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|cm|mm|m)?(?:/s)?")
 _SIZES = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -38,7 +43,7 @@ def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
     Returns:
         A sentence, or "" if there is nothing odd.
     """
-    if given is None or given.unit is not None or abs(given.number) <= 2.0 * math.pi:
+    if given is None or given.unit is not None or not 2.0 * math.pi < abs(given.number) < math.inf:
         return ""
     low, high = range
     if low <= given.number <= high:
@@ -47,6 +52,16 @@ def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
     return (
         f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
     )
+
+
+def tell(odd: str) -> None:
+    """Warn of what :func:`doubt` says, where the program of the user called; an empty text is nothing to tell of."""
+    if not odd:
+        return
+    level, frame, ours = 1, sys._getframe(), str(Path(__file__).parent)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(ours):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(odd, DoubtfulWarning, stacklevel=level)
 
 
 def quantity(text: str) -> Quantity | None:

@@ -111,7 +111,9 @@ def _built_in(error: OsimliteError) -> str:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exits with 0 (done), 1 (the answer is no) or 2 (could not be carried out)."""
-    from osimlite.errors import OsimliteError
+    import warnings
+
+    from osimlite.errors import DoubtfulWarning, OsimliteError
 
     words = sys.argv[1:] if arguments is None else arguments
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
@@ -126,7 +128,10 @@ def main(arguments: list[str] | None = None) -> None:
             from osimlite.cli._validating import run
 
             raise SystemExit(run(**asked))
-        app(names)(args=words, prog_name="osimlite")
+        with warnings.catch_warnings():
+            # Commands say themselves what is odd about what was typed.
+            warnings.simplefilter("ignore", DoubtfulWarning)
+            app(names)(args=words, prog_name="osimlite")
     except OsimliteError as error:
         print(f"osimlite: {error}{_built_in(error)}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None

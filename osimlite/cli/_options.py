@@ -81,18 +81,16 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
     import sys
 
     from osimlite.errors import ModelError, OsimliteError
-    from osimlite.quantity import doubt, quantity
-    from osimlite.simulation.start import in_units_of
+    from osimlite.simulation.start import doubt_of, in_units_of
 
     found = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
     for name, text in named_words(words, option, form).items():
         try:
             found[name] = in_units_of(mechanism, name, text)
-            info = mechanism.coordinates[mechanism.coordinate_index(name)]
             # A speed has no range.
-            is_angle = option == "--set" and info.motion_type == "rotational"
-            if is_angle and (odd := doubt(name, quantity(text), info.range)):
+            info = mechanism.coordinates[mechanism.coordinate_index(name)]
+            if option == "--set" and (odd := doubt_of(info, name, text)):
                 print(f"osimlite: warning: {odd}", file=sys.stderr)
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.

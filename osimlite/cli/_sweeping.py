@@ -61,16 +61,20 @@ def make_plan(
         OsimliteError: they do not describe one.
     """
     import sys
+    import warnings
 
-    from osimlite.errors import SettingError
+    from osimlite.errors import DoubtfulWarning, SettingError
     from osimlite.sweep.variables import parse
 
     ranges = parse(vary or [])
     if not ranges:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
-    made = _plan(source, ranges, parameter, stops=(*_stops(below, True), *_stops(above, False)), **choices)
-    for odd in (item.doubt for item in made.variables if item.doubt):
-        print(f"osimlite: warning: {odd}", file=sys.stderr)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", DoubtfulWarning)
+        levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
+        made = _plan(source, ranges, parameter, **levels, **choices)
+    for each in told:
+        print(f"osimlite: warning: {each.message}", file=sys.stderr)
     return made
 
 
@@ -98,17 +102,13 @@ def _make(make_model: Any, source: str, given: dict[str, str], parameters: dict[
     return make_model(source, {**given, **{name: repr(value) for name, value in parameters.items()}})
 
 
-def _stops(words: Sequence[str] | None, is_below: bool) -> list[Any]:
+def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
     from osimlite.errors import SettingError
     from osimlite.quantity import quantity
-    from osimlite.sweep.plan import Stop
 
-    found = []
-    option = "--stop-below" if is_below else "--stop-above"
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
-    for name, text in named_words(words, option, form).items():
-        given = quantity(text)
-        if given is None:
+    found = named_words(words, option, form)
+    for text in found.values():
+        if quantity(text) is None:
             raise SettingError(f"{option} takes {form}, got '{text}'")
-        found.append(Stop(name, given.value, is_below))
     return found

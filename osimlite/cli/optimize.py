@@ -60,6 +60,7 @@ def optimize(
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json.")
     ] = Path("optimum"),
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted or finished search.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace what another search found.")] = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Look for the start, or the numbers, with which a model does best; writes it with them, ready to simulate.
@@ -79,8 +80,8 @@ def optimize(
     with progress_bar("searching", budget) as progress:
         found = search(
             plan, Objective(objective, maximize), output, method=method, budget=budget, popsize=popsize, seed=seed,
-            sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, workers=workers,
-            cluster=cluster, progress=progress,
+            sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, force=force,
+            workers=workers, cluster=cluster, progress=progress,
         )  # fmt: skip
     Console().print(_table(objective, found))
 

@@ -68,7 +68,6 @@ def sweep(
     from rich.console import Console
 
     from osimlite.cli._progress import progress_bar
-    from osimlite.sweep.run import settings
     from osimlite.sweep.run import sweep as run
     from osimlite.sweep.sampling import samples as choose
 
@@ -77,26 +76,14 @@ def sweep(
         engine=engine, accuracy=accuracy, report_interval=report_interval, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)
-    if output.is_file() and not (resume or force):
-        _spare(output, settings(plan, chosen))
     with progress_bar("sweeping", chosen.count) as progress:
-        outcome = run(plan, chosen, output, resume=resume, workers=workers, cluster=cluster, progress=progress)
+        outcome = run(
+            plan, chosen, output, resume=resume, force=force, workers=workers, cluster=cluster, progress=progress
+        )
     Console().print(_table(plan, outcome))
     if outcome.status["failed"] == outcome.count:
         print("osimlite: every run failed", file=sys.stderr)
         raise typer.Exit(1)
-
-
-def _spare(output: Path, wanted: dict[str, Any]) -> None:
-    """Stop before the results of another sweep are lost; the same sweep makes the same file."""
-    from osimlite.errors import SettingError
-    from osimlite.sweep.results import differences, settings_of
-
-    if unlike := differences(settings_of(output), wanted):
-        raise SettingError(
-            f"'{output}' has results of other settings: {', '.join(unlike)}; name another file with -o, or replace "
-            "them with --force"
-        )
 
 
 def _table(plan: Plan, outcome: Outcome) -> Any:

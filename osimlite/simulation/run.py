@@ -10,20 +10,20 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from osimlite.errors import SettingError, SimulationError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines import KEEP_CONSTRAINTS, engine_factory
+from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson, Stepper
 from osimlite.simulation.recorder import Recorder
-from osimlite.simulation.start import in_units_of
+from osimlite.simulation.start import doubt_of, in_units_of
 from osimlite.simulation.trajectory import Report, Trajectory
-from osimlite.text import listed
 
 Progress = Callable[[float], object]
 """Called with the simulated time (s) reached."""
@@ -113,15 +113,6 @@ def kept_constraints(mechanism: Mechanism) -> list[str]:
     return [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
 
 
-def _refuse_constraints(mechanism: Mechanism, engine: str) -> None:
-    kept = kept_constraints(mechanism)
-    if kept and engine not in KEEP_CONSTRAINTS:
-        raise UnsupportedError(
-            f"the {engine} engine cannot keep up {listed(kept)}; take the engine {' or '.join(KEEP_CONSTRAINTS)}, or "
-            "set isEnforced of a constraint and prescribed of a coordinate to false (docs/constraints.md)"
-        )
-
-
 class Simulation:
     """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
 
@@ -144,7 +135,6 @@ class Simulation:
     ) -> None:
         make = engine_factory(engine)
         self.mechanism: Mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives, rolling=rolling)
-        _refuse_constraints(self.mechanism, engine)
         self.forces = force_elements(
             model,
             self.mechanism,
@@ -189,6 +179,8 @@ class Simulation:
             _check_step(fixed_step)
         if self._show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
+        for name, value in (initial or {}).items():
+            tell(doubt_of(self.mechanism.coordinates[self.mechanism.coordinate_index(name)], name, value))
         initial, initial_speeds = (
             {name: in_units_of(self.mechanism, name, value) for name, value in (given or {}).items()}
             for given in (initial, initial_speeds)

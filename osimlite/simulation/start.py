@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import quantity
+from osimlite.quantity import Quantity, doubt, quantity
+
+if TYPE_CHECKING:
+    from osimlite.multibody.parts import CoordinateInfo
 
 
 def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
@@ -24,3 +29,19 @@ def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
         wanted = "deg or rad" if kind == "rotational" else "m, cm or mm"
         raise SettingError(f"coordinate '{name}' is {kind}: give '{given}' in {wanted}")
     return read.value
+
+
+def doubt_of(info: CoordinateInfo, name: str, given: float | str) -> str:
+    """What is odd about a value as people give it: degrees that are taken for radians.
+
+    Args:
+        info: of the coordinate.
+        name: what it was called.
+        given: rad or m, or a text with a unit.
+
+    Returns:
+        A sentence, or "" if there is nothing odd.
+    """
+    if info.motion_type != "rotational":
+        return ""
+    return doubt(name, quantity(given) if isinstance(given, str) else Quantity(float(given), None), info.range)

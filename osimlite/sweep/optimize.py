@@ -18,13 +18,12 @@ from osimlite.files import make_folder, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, differences, partial_of, schema, settings_of
+from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
 from osimlite.sweep.variables import Floats
 from osimlite.sweep.variants import Variants
-from osimlite.text import listed
 
 HISTORY, BEST, SUMMARY = "history.parquet", "best.osim", "summary.json"
 """What a search writes into its folder."""
@@ -89,6 +88,7 @@ def optimize(
     is_bounded: bool = True,
     start: Sequence[float] | None = None,
     resume: bool = False,
+    force: bool = False,
     workers: int | None = None,
     cluster: str | None = None,
     progress: Progress | None = None,
@@ -108,6 +108,7 @@ def optimize(
         is_bounded: whether the ranges are bounds, or say only where to begin.
         start: values to begin at; by default those of the model where they are within the ranges, else the middle.
         resume: go on with an interrupted search, or with a finished one and a larger budget.
+        force: replace what another search has left in the folder.
         workers: as of a sweep.
         cluster: as of a sweep.
         progress: called as runs are done.
@@ -137,7 +138,7 @@ def optimize(
     where = make_folder(folder)
     with pool(plan, workers=workers, cluster=cluster) as workforce:
         evaluations = _Evaluations(plan, free, objective.sign, is_bounded, budget, workforce, progress)
-        partial = _open(where / HISTORY, schema(_columns(plan), wanted), resume, evaluations)
+        partial = _open(where / HISTORY, schema(_columns(plan), wanted), resume, force, evaluations)
         evaluations.partial = partial
         try:
             ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
@@ -185,20 +186,23 @@ def _start(
     return np.array(found)
 
 
-def _open(path: Path, table: Any, resume: bool, evaluations: _Evaluations) -> Partial:
+def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations) -> Partial:
     """The history, and what is in it already."""
-    if resume and path.exists() and not partial_of(path).exists():
-        before = settings_of(path)
-        unlike = differences(before, json.loads(table.metadata[b"osimlite"]))
-        if unlike:
-            raise SettingError(f"the search in '{path.parent}' has other settings: {listed(unlike)}; ask for the same")
+    if path.is_file() and not force and not (resume and partial_of(path).exists()):
+        spare(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        batches = pq.read_table(path).to_batches()
-        partial = Partial(path, table)
-        for batch in batches:
-            partial.add(batch.columns)
-            evaluations.remember(batch)
-        return partial
+        before = pq.read_table(path)
+        if resume:
+            partial = Partial(path, table)
+            for batch in before.to_batches():
+                partial.add(batch.columns)
+                evaluations.remember(batch)
+            return partial
+        if before.num_rows > evaluations.budget:
+            raise SettingError(
+                f"'{path}' has {before.num_rows} runs of this search, more than are asked for now; keep them with "
+                "--resume, or replace them with --force"
+            )
     partial = Partial(path, table, resume=resume)
     partial.read(evaluations.remember)
     return partial

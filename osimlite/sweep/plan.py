@@ -14,8 +14,11 @@ from osimlite.document.printer import to_text
 from osimlite.document.reader import read_text
 from osimlite.errors import SettingError
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.start import doubt_of, in_units_of
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.variables import Parameter, Range, Variable, variables
 from osimlite.text import did_you_mean
@@ -122,6 +125,8 @@ def plan(
     vary: Mapping[str, Range],
     *,
     parameters: Mapping[str, Any] = MappingProxyType({}),
+    below: Mapping[str, float | str] = MappingProxyType({}),
+    above: Mapping[str, float | str] = MappingProxyType({}),
     **choices: Any,
 ) -> Plan:
     """Make a plan.
@@ -130,6 +135,8 @@ def plan(
         source: the model, or what makes it from the parameters that it is given.
         vary: ranges by name, see :mod:`osimlite.sweep.variables`.
         parameters: that `source` takes, with their defaults.
+        below: levels that end a run when a coordinate falls below them: rad, m, or a text such as "30deg".
+        above: levels that end a run when a coordinate rises above them, likewise.
         choices: further attributes of :class:`Plan`.
 
     Raises:
@@ -139,6 +146,8 @@ def plan(
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
     found = variables(vary, model, mechanism, parameters)
+    for item in found:
+        tell(item.doubt)
     needs_maker = any(isinstance(item.target, Parameter) for item in found)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), found, make=make)
@@ -149,8 +158,23 @@ def plan(
     for name, value in (("to", made.to), ("accuracy", made.accuracy), ("report_interval", made.report_interval)):
         if value is not None and not (isfinite(value) and value > 0.0):
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
-    names = [name for info in mechanism.coordinates for name in (info.name, info.path)]
-    for stop in made.stops:
-        if stop.coordinate not in names:
-            raise SettingError(f"there is no coordinate '{stop.coordinate}'{did_you_mean(stop.coordinate, names)}")
-    return made
+    named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))
+    given = (_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops)
+    return replace(made, stops=(*given, *named))
+
+
+def _stops(mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bool) -> list[Stop]:
+    return [_stop(mechanism, name, level, is_below) for name, level in levels.items()]
+
+
+def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -> Stop:
+    infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
+    if name not in infos:
+        raise SettingError(f"there is no coordinate '{name}'{did_you_mean(name, infos)}")
+    if infos[name].locked:
+        raise SettingError(f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves")
+    level = in_units_of(mechanism, name, given)
+    if not isfinite(level):
+        raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")
+    tell(doubt_of(infos[name], name, given))
+    return Stop(name, level, is_below)

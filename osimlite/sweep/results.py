@@ -81,6 +81,20 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return found
 
 
+def spare(path: Path, wanted: Mapping[str, Any]) -> None:
+    """Stop before finished results of other settings are lost.
+
+    Raises:
+        SettingError: there are such results.
+        OsimliteError: the file is none of osimlite's results.
+    """
+    if unlike := differences(settings_of(path), wanted):
+        raise SettingError(
+            f"'{path}' has results of other settings: {listed(unlike)}; name another place with -o, or replace them "
+            "with --force"
+        )
+
+
 def partial_of(path: Path) -> Path:
     """Where the rows of a file are until all of them are there."""
     return path.with_name(f"{path.name}.partial")

@@ -15,7 +15,7 @@ from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, differences, partial_of, schema, settings_of, undisturbed
+from osimlite.sweep.results import Partial, partial_of, schema, spare, undisturbed
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
 
@@ -71,6 +71,7 @@ def sweep(
     output: str | Path,
     *,
     resume: bool = False,
+    force: bool = False,
     workers: int | None = None,
     cluster: str | None = None,
     progress: Progress | None = None,
@@ -85,13 +86,15 @@ def sweep(
         samples: with which numbers.
         output: Parquet file to write.
         resume: go on with an interrupted sweep.
+        force: replace results that were made with other settings, or whatever else has that name.
         workers: threads or processes of this machine; by default one for each core.
         cluster: address of a Dask scheduler whose workers do it instead.
         progress: called as runs are done.
 
     Raises:
         Interrupted: by the keyboard; the sweep can be resumed.
-        OsimliteError: the model cannot be simulated, the settings differ, or the cluster cannot be reached.
+        OsimliteError: the model cannot be simulated, there are results of other settings, or the cluster cannot be
+            reached.
     """
     path, started = Path(output), time.perf_counter()
     if path.suffix.lower() in OTHER_TABLES:
@@ -99,10 +102,11 @@ def sweep(
         raise SettingError(f"the results are a Parquet file, not '{path.name}'; name the file '{better}'")
     wanted = settings(plan, samples)
     table = schema(columns(plan), wanted)
-    if resume and path.is_file() and not partial_of(path).exists():
-        if unlike := differences(settings_of(path), wanted):
-            raise OsimliteError(f"'{path}' has other settings: {', '.join(unlike)}; give the results another name")
-        return Outcome(path, samples.count, samples.count)
+    # Who goes on with an interrupted sweep was asked before it began.
+    if path.is_file() and not force and not (resume and partial_of(path).exists()):
+        spare(path, wanted)
+        if resume:
+            return Outcome(path, samples.count, samples.count)
     with pool(plan, workers=workers, cluster=cluster) as workforce:
         partial = Partial(path, table, resume=resume)
         outcome = Outcome(path, samples.count, partial.rows)

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 
 from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import Quantity, doubt, quantity
+from osimlite.quantity import Quantity, quantity
 from osimlite.schema.model import Model
+from osimlite.simulation.start import doubt_of
 from osimlite.sweep.properties import Place, places
 from osimlite.text import did_you_mean
 
@@ -251,11 +252,9 @@ def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
 def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
     """Whether an angle of the start was written as a number of degrees."""
     assert isinstance(made.target, Start)
+    ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
     info = mechanism.coordinates[mechanism.coordinate_index(made.target.coordinate)]
-    if info.motion_type != "rotational":
-        return ""
-    parts = given.split(":")[:2] if isinstance(given, str) else [str(made.low), str(made.high)]
-    odd = (doubt(made.name, quantity(part), info.range) for part in parts)
+    odd = (doubt_of(info, made.name, end) for end in ends)
     return next((words for words in odd if words), "")
 
 

@@ -107,5 +107,7 @@ def test_degrees_taken_for_radians_are_warned_of(walker, tmp_path):
     assert err == (
         "osimlite: warning: RHip_rz = 400 is in rad, and outside its range of -1.75 to 1.75 rad; did you mean 400deg?\n"
     )
-    code, _, err = run(walker, "--to", "0.01", "--set", "RHip_rz=40deg", "--set-speed", "RHip_rz=7", folder=tmp_path)
-    assert (code, err) == (0, "")
+    for value in ("40deg", "500deg"):
+        words = ("--set", f"RHip_rz={value}", "--set-speed", "RHip_rz=7")
+        code, _, err = run(walker, "--to", "0.01", *words, folder=tmp_path)
+        assert (code, err) == (0, "")

@@ -80,6 +80,9 @@ def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-p", "a=1"], "takes no parameters"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-below", "RHip_rz=low"], "--stop-below takes"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-below", "RHip=0"], "RHip"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-below", "Pelvis_ty=30deg"], "in m, cm or mm"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-above", "RHip_rz=2m"], "in deg or rad"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-above", "platform_rz=2"], "is locked"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "nowhere/r.parquet"], "nowhere"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "."], "folder"),
         (["sweep", "dynamic-walker", "--vary", "slope=1:5:2", "-p", "slope=2"], "slope"),
@@ -108,6 +111,14 @@ def test_results_of_another_sweep_are_spared(folder: Path, capsys: pytest.Captur
     assert run(*words, "RHip_rz=0:0.2:3", "--force") == 0 and pq.read_table("r.parquet").num_rows == 3
     Path("r.parquet").write_text("mine")
     assert run(*words, "RHip_rz=0:0.2:3") == 2 and Path("r.parquet").read_text() == "mine"
+
+
+def test_degrees_that_are_taken_for_radians_are_doubted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["sweep", "walker.osim", "--to", "0.01", "--vary", "RHip_rz=20:40:2", "--stop-above", "LHip_rz=80"]
+    assert run(*words, "--stop-below", "RHip_rz=-400deg") == 0
+    told = capsys.readouterr().err.splitlines()
+    assert [line.rpartition("; ")[2] for line in told] == ["did you mean 20deg?", "did you mean 80deg?"]
+    assert all(line.startswith("osimlite: warning: ") for line in told)
 
 
 def test_a_sweep_of_failures_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

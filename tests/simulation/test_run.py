@@ -11,7 +11,14 @@ import pytest
 
 import osimlite
 from osimlite import Body, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model, PinJoint, WeldJoint
-from osimlite.errors import ModelError, OsimliteError, SettingError, SimulationError, UnsupportedError
+from osimlite.errors import (
+    DoubtfulWarning,
+    ModelError,
+    OsimliteError,
+    SettingError,
+    SimulationError,
+    UnsupportedError,
+)
 from osimlite.simulation import Simulation, read_sto
 from osimlite.simulation.run import report_times
 
@@ -45,6 +52,14 @@ def test_what_is_set_may_carry_a_unit(walker):
     ):
         with pytest.raises(SettingError, match=words):
             osimlite.simulate(walker, to=0.01, initial=given)
+
+
+def test_degrees_taken_for_radians_are_warned_of(walker):
+    for given, asked in ((40, "40deg"), ("-40", "-40deg")):
+        with pytest.warns(DoubtfulWarning, match=rf"RHip_rz = {given} is in rad, .* did you mean {asked}\?") as told:
+            osimlite.simulate(walker, to=0.01, initial={"RHip_rz": given})
+        assert [each.filename for each in told] == [__file__]
+    osimlite.simulate(walker, to=0.01, initial={"RHip_rz": "500deg", "Pelvis_tx": 9}, initial_speeds={"RHip_rz": 40})
 
 
 def test_locked_coordinate_keeps_its_value(walker):

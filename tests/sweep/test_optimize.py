@@ -104,6 +104,22 @@ def test_a_finished_search_goes_on_with_a_larger_budget(made, tmp_path):
     assert (tmp_path / "two" / HISTORY).read_bytes() == (tmp_path / "whole" / HISTORY).read_bytes()
 
 
+def test_another_search_is_spared_unless_forced(made, tmp_path):
+    choices = {"popsize": 8, "seed": 1}
+    optimize(made, DISTANCE, tmp_path, budget=16, **choices)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for resume in (False, True):
+        with pytest.raises(SettingError, match=r"seed \(1 before, 2 now\); .*--force"):
+            optimize(made, DISTANCE, tmp_path, budget=16, popsize=8, seed=2, resume=resume)
+    with pytest.raises(SettingError, match="has 16 runs of this search, more than"):
+        optimize(made, DISTANCE, tmp_path, budget=8, **choices)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    kept = optimize(made, DISTANCE, tmp_path, budget=8, resume=True, **choices)
+    assert kept.evaluations == 8 and (tmp_path / HISTORY).read_bytes() == before[HISTORY]
+    other = optimize(made, DISTANCE, tmp_path, budget=8, popsize=8, seed=2, force=True)
+    assert pq.read_table(other.history).num_rows == 8
+
+
 def least_drop(run):
     """How far the pelvis comes down, m, and a penalty for starting fast."""
     return run.start["Pelvis_ty"] - run.end["Pelvis_ty"] + run.values["Pelvis_tx/speed"]

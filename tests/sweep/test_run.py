@@ -104,8 +104,29 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
     with pytest.raises(SettingError, match="no interrupted sweep"):
         sweep(made, chosen, tmp_path / "x.parquet", resume=True)
     sweep(made, chosen, path, resume=True)
-    with pytest.raises(OsimliteError, match="another name"):
+    with pytest.raises(SettingError, match=r"samples \(40 before, 41 now\); name another place"):
         sweep(made, samples(made.variables, "sobol", 41, 5), path, resume=True)
+
+
+def test_finished_results_are_spared_unless_forced(made, tmp_path):
+    path, few, more = tmp_path / "r.parquet", *(samples(made.variables, "sobol", count, 5) for count in (6, 8))
+    first = sweep(made, few, path).path.read_bytes()
+    for resume in (False, True):
+        with pytest.raises(SettingError, match="--force"):
+            sweep(made, more, path, resume=resume)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["r.parquet"] and path.read_bytes() == first
+    assert sweep(made, few, path).path.read_bytes() == first
+    with pytest.raises(Interrupted):
+        sweep(made, more, path, force=True, workers=1, progress=Stopper(4))
+    assert path.read_bytes() == first
+    assert sweep(made, more, path, resume=True).before > 0
+    assert pq.read_table(path).num_rows == 8
+    path.write_text("mine")
+    with pytest.raises(OsimliteError, match="not the results of a sweep"):
+        sweep(made, more, path)
+    assert path.read_text() == "mine"
+    sweep(made, more, path, force=True)
+    assert pq.read_table(path).num_rows == 8
 
 
 def test_a_torn_message_at_the_end_is_cut_off(made, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from osimlite.errors import OsimliteError, SettingError
+from osimlite.errors import DoubtfulWarning, OsimliteError, SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.sweep.plan import Plan, Stop, plan
@@ -164,7 +164,7 @@ def test_a_number_that_becomes_zero_changes_the_structure():
 
 def test_runs_that_fail_are_told_of_and_harm_no_others(walker):
     path = "/forceset/RFootForce/contact_parameters/stiffness"
-    made = plan(walker, {path: (-1e6, 1e6), "RHip_rz": (0.0, 1e300)}, to=0.5)
+    made = plan(walker, {path: (-1e6, 1e6), "RHip_rz": "0rad:1e300rad"}, to=0.5)
     block = Runner(made).run(np.array([[1e6, 0.5], [-1e6, 0.5], [1e6, 1e300], [1e6, 0.5]]))
     assert block.status == ["done", "failed", "failed", "done"]
     assert "RFootForce" in (block.reasons[1] or "") and "cannot be computed beyond" in (block.reasons[2] or "")
@@ -187,6 +187,27 @@ def test_stops(walker):
     for number, reason in enumerate(block.reasons):
         name, level = {"Pelvis_ty below 0.7": ("Pelvis_ty", 0.7), "Pelvis_tx above 0.1": ("Pelvis_tx", 0.1)}[reason]
         assert block.measures[f"{name}/value"][number] == pytest.approx(level, abs=1e-6)
+
+
+def test_stops_may_carry_a_unit(walker):
+    made = plan(walker, {"RHip_rz": (0.3, 0.7)}, below={"Pelvis_ty": "50cm"}, above={"LHip_rz": "30deg"})
+    assert made.stops == (Stop("Pelvis_ty", 0.5), Stop("LHip_rz", np.radians(30), False))
+    for choices, words in (
+        ({"below": {"Pelvis_ty": "70deg"}}, "give '70deg' in m, cm or mm"),
+        ({"above": {"LHip_rz": float("nan")}}, "is a number"),
+        ({"above": {"LHip": 1.0}}, "did you mean 'LHip_rz'"),
+        ({"stops": (Stop("platform_rz", 1.0),)}, "'platform_rz' is locked"),
+    ):
+        with pytest.raises(SettingError, match=words):
+            plan(walker, {"RHip_rz": (0.3, 0.7)}, **choices)
+    with pytest.warns(DoubtfulWarning, match="LHip_rz = 60 is in rad"):
+        plan(walker, {"RHip_rz": (0.3, 0.7)}, above={"LHip_rz": 60})
+
+
+def test_degrees_taken_for_radians_are_warned_of(walker):
+    with pytest.warns(DoubtfulWarning, match="did you mean 20deg") as told:
+        plan(walker, {"RHip_rz": (20, 40)})
+    assert [each.filename for each in told] == [__file__]
 
 
 def test_what_is_wrong_is_said_before_anything_runs(walker):
