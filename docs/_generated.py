@@ -18,10 +18,11 @@ from mkdocs.structure.pages import Page
 
 from osimlite.cli import COMMANDS
 from osimlite.lint.engine import all_rules
-from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Value
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import FieldSpec
 
 WIDTH = 92
 """Columns of the help texts."""

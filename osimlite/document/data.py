@@ -20,10 +20,12 @@ from osimlite.document.objects import layout_of
 from osimlite.document.printer import has_content
 from osimlite.errors import DocumentError, MissingFileError, ModelError
 from osimlite.files import write_atomically
-from osimlite.schema.base import Component, FieldSpec, Object, Remark, Unknown, field_specs
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
+from osimlite.schema.layout import Remark
 from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import did_you_mean
 
 SUFFIXES = (".json", ".yaml", ".yml")

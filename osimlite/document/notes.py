@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal, NamedTuple
 
-from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.base import Object
+from osimlite.schema.specs import FieldSpec
 
 NoteKind = Literal[
     "unknown-tag",

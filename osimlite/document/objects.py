@@ -14,20 +14,12 @@ from osimlite.document.foreign import is_element, xml_of
 from osimlite.document.lexical import ABSENT, Unclean, converter
 from osimlite.document.names import as_parsed, as_written
 from osimlite.document.notes import Note, NoteKind
-from osimlite.schema.base import (
-    FieldSpec,
-    Home,
-    Include,
-    Layout,
-    Object,
-    Remark,
-    Unknown,
-    defaults,
-    field_specs,
-)
+from osimlite.schema.base import Object, Unknown
 from osimlite.schema.fields import Held, ObjectList
+from osimlite.schema.layout import Home, Include, Layout, Remark
 from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for
+from osimlite.schema.specs import FieldSpec, defaults, field_specs
 
 Read = TypeVar("Read", bound=Object)
 Included = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | None]

@@ -10,9 +10,11 @@ from osimlite.document.escape import escape, quoted
 from osimlite.document.foreign import relaid
 from osimlite.document.lexical import formatter
 from osimlite.files import write_atomically
-from osimlite.schema.base import Component, FieldSpec, Include, Layout, Object, Remark, Unknown, field_specs
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.layout import Include, Layout, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
+from osimlite.schema.specs import FieldSpec, field_specs
 
 Numbers = Literal["shortest", "opensim"]
 

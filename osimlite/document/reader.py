@@ -21,7 +21,8 @@ from osimlite.document.objects import Included, ObjectReader, layout_of, remembe
 from osimlite.document.source import Source
 from osimlite.document.syntax import place_of, plain_words
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
-from osimlite.schema.base import Include, Object, Remark
+from osimlite.schema.base import Object
+from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
 
 if TYPE_CHECKING:

@@ -159,8 +159,8 @@ def check_one(job: Job) -> list[Finding]:
 
 def looked_at(subject: Subject) -> list[str] | None:
     """Every path outside the text that findings may depend on; None if nobody can say."""
-    from osimlite.schema.base import reference_specs
     from osimlite.schema.fields import Reference
+    from osimlite.schema.specs import reference_specs
 
     if any(note.kind == "include" for note in subject.notes) or b"file=" in getattr(subject.source, "data", b""):
         return None

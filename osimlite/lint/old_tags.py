@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import Final, NamedTuple
 
-from osimlite.schema.base import Object, field_specs
+from osimlite.schema.base import Object
+from osimlite.schema.specs import field_specs
 
 
 class Successor(NamedTuple):

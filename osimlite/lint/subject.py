@@ -15,8 +15,9 @@ from osimlite.document.survey import Survey
 from osimlite.errors import DocumentError
 from osimlite.lint.config import Config
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, FieldSpec, Object, Unknown, lineage
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.model import Model
+from osimlite.schema.specs import FieldSpec, lineage
 from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:

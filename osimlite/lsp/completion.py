@@ -11,10 +11,11 @@ from osimlite.document.lexical import formatter
 from osimlite.lsp.analysis import Analysis
 from osimlite.lsp.cursor import Cursor, Element, cursor_at, single_objects
 from osimlite.lsp.hover import is_list
-from osimlite.schema.base import Component, FieldSpec, Object, field_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.schema.tree import Use
 
 _OPAQUE = ("input", "file", "column", "positional", "point-index")

@@ -9,9 +9,10 @@ import re
 from typing import Literal, NamedTuple
 
 from osimlite.document.spans import Markup, markup
-from osimlite.schema.base import FieldSpec, Object, field_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.registry import class_for
+from osimlite.schema.specs import FieldSpec, field_specs
 
 Kind = Literal["tag", "closing tag", "attribute", "text", "comment"]
 

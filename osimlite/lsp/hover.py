@@ -7,9 +7,10 @@ from lsprotocol import types
 from osimlite.document.lexical import formatter
 from osimlite.lsp.analysis import Analysis
 from osimlite.lsp.cursor import Element, cursor_at
-from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Value
+from osimlite.schema.specs import FieldSpec
 
 
 def hover(analysis: Analysis, offset: int) -> types.Hover | None:

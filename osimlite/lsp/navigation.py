@@ -7,8 +7,9 @@ from lsprotocol import types
 from osimlite.document.spans import markup
 from osimlite.errors import ModelError
 from osimlite.lsp.analysis import Analysis
-from osimlite.schema.base import Component, Object, object_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.editing import rename
+from osimlite.schema.specs import object_specs
 from osimlite.schema.tree import is_a
 
 _SYMBOLS = {

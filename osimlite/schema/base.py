@@ -3,32 +3,17 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, cast, dataclass_transform, get_type_hints
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.complaints import explained, misspelt, unnamed
 from osimlite.schema.equality import same
-from osimlite.schema.fields import (
-    Held,
-    Kind,
-    Legacy,
-    Many,
-    ObjectList,
-    Reference,
-    Tag,
-    Value,
-    class_in,
-    epoch,
-)
-from osimlite.schema.layout import Home as Home
-from osimlite.schema.layout import Include as Include
-from osimlite.schema.layout import Layout as Layout
-from osimlite.schema.layout import Remark as Remark
+from osimlite.schema.fields import Many, ObjectList, Reference, Tag, epoch
+from osimlite.schema.layout import Home, Layout
+from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, reference_specs
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -36,27 +21,6 @@ if TYPE_CHECKING:
     from osimlite.schema.model import Model
 else:
     ModelMetaclass = type(BaseModel)
-
-
-class FieldSpec(NamedTuple):
-    """One property of a class as the reader, the printer and the linter see it.
-
-    `name` is the Python attribute, `tag` the XML element, `accepts` the class of the objects held (None for text).
-    `factory` makes the default value of an object property; `default` is the value of the others.
-    """
-
-    name: str
-    tag: str
-    kind: Kind
-    accepts: type[Object] | None
-    default: Any
-    factory: Any
-    declared_in: type[Object]
-
-    @property
-    def legacy(self) -> bool:
-        """Whether the property belongs to OpenSim's first property system."""
-        return bool(getattr(self.kind, "legacy", False))
 
 
 _SLOTS = ("_model", "_index", "_layout")
@@ -329,96 +293,6 @@ for _base in (Object, Component):
     _base.__annotations__.update({name: _hints[name] for name in _base.__annotations__})
 
 _set = object.__setattr__
-
-
-@cache
-def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
-    """The properties of `cls` by XML tag, in the order OpenSim prints them (first-system properties last)."""
-    specs = []
-    for name, info in cls.model_fields.items():
-        kind = next((item for item in info.metadata if isinstance(item, Kind)), None)
-        if kind is None:
-            continue
-        if any(isinstance(item, Legacy) for item in info.metadata):
-            kind = replace(kind, legacy=True)  # type: ignore[type-var]
-        held = isinstance(kind, Held)
-        accepts = class_in(info.annotation) if held else None
-        tag = accepts.tag if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed" else name
-        tag = next((item.text for item in info.metadata if isinstance(item, Tag)), tag)
-        declared = next(base for base in reversed(cls.__mro__) if name in getattr(base, "__annotations__", {}))
-        default = info.default if info.default_factory is None else None
-        specs.append(FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared))
-    specs.sort(key=lambda spec: spec.legacy)
-    return {spec.tag: spec for spec in specs}
-
-
-@cache
-def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that hold objects."""
-    return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Held))
-
-
-class Holding(NamedTuple):
-    """A property that holds objects, and what it holds as long as no one asks for it.
-
-    Either a list, which is empty, or an object, which is plain if nothing in it has a path or names another.
-    """
-
-    spec: FieldSpec
-    name: str
-    is_list: bool
-    is_plain: bool
-
-
-@cache
-def holding(cls: type[Object]) -> tuple[Holding, ...]:
-    """The properties of `cls` that hold objects."""
-    return tuple(Holding(spec, spec.name, spec.factory is ObjectList, _is_plain(spec)) for spec in object_specs(cls))
-
-
-def _is_plain(spec: FieldSpec) -> bool:
-    made = spec.factory() if spec.factory is not None else None
-    if not isinstance(made, Object):
-        return False
-    return not any(item.is_component or reference_specs(type(item)) for item in made.walk())
-
-
-@cache
-def lineage(cls: type[Object]) -> tuple[str, ...]:
-    """The names of a class and of those it derives from, as far as :class:`Object`."""
-    return tuple(base.__name__ for base in cls.__mro__ if issubclass(base, Object))
-
-
-@cache
-def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that name other components."""
-    return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Reference))
-
-
-@cache
-def name_spec(cls: type[Object]) -> FieldSpec:
-    """The name of a class whose instances bear the name of another component, as a property with tag ``@name``."""
-    assert cls.name_reference is not None
-    return FieldSpec("name", "@name", cls.name_reference, None, "", None, cls)
-
-
-@cache
-def value_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that are numbers, switches or texts."""
-    return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Value))
-
-
-@cache
-def defaults(cls: type[Object]) -> tuple[dict[str, Any], dict[str, Callable[[], Any]]]:
-    """Default values by field name, and the factories of the fields whose default is an object or a list."""
-    plain: dict[str, Any] = {}
-    factories: dict[str, Any] = {}
-    for name, info in cls.model_fields.items():
-        if info.default_factory is None:
-            plain[name] = info.default
-        else:
-            factories[name] = info.default_factory
-    return plain, factories
 
 
 _COPYING = -1

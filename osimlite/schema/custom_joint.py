@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from osimlite.schema.base import FieldSpec, Object, made
+from osimlite.schema.base import Object, made
 from osimlite.schema.fields import Single, Unnamed, Vec3, vec3
 from osimlite.schema.functions import Constant, Function, LinearFunction
 from osimlite.schema.joints import Joint
 from osimlite.schema.references import OwnJointCoordinates
+from osimlite.schema.specs import FieldSpec
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 

@@ -8,8 +8,9 @@ import textwrap
 from functools import cache
 from importlib import import_module
 
-from osimlite.schema.base import FieldSpec, Object, field_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.specs import FieldSpec, field_specs
 
 
 def meaning_of(spec: FieldSpec) -> str:

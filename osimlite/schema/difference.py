@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from osimlite.schema.base import Component, FieldSpec, Object, Unknown, field_specs
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference
 from osimlite.schema.model import Model
+from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.schema.tree import Tree, Use
 
 

@@ -11,10 +11,11 @@ import math
 from importlib import import_module
 from typing import Any
 
-from osimlite.schema.base import FieldSpec, Object, Unknown, field_specs
+from osimlite.schema.base import Object, Unknown
 from osimlite.schema.descriptions import meaning_of
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES
+from osimlite.schema.specs import FieldSpec, field_specs
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -11,16 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import (
-    Component,
-    FieldSpec,
-    Holding,
-    Object,
-    field_specs,
-    holding,
-    name_spec,
-    reference_specs,
-)
+from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Held, Reference, epoch
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS as ILLEGAL_CHARACTERS
 from osimlite.schema.resolution import PATH_RULES, RULES, last_name
@@ -28,6 +19,7 @@ from osimlite.schema.resolution import Failure as Failure
 from osimlite.schema.resolution import Resolution as Resolution
 from osimlite.schema.resolution import is_a as is_a
 from osimlite.schema.resolution import normalised as normalised
+from osimlite.schema.specs import FieldSpec, Holding, field_specs, holding, name_spec, reference_specs
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:

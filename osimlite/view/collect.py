@@ -17,12 +17,13 @@ from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array, offset, rotation_about, transform
 from osimlite.robot.visuals import frame_of
 from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
-from osimlite.schema.base import Component, field_specs
+from osimlite.schema.base import Component
 from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame, TwoFrameLinker
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint
+from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use
 from osimlite.view import surfaces
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks

@@ -11,12 +11,13 @@ from osimlite.document.lexical import formatter
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Finding
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.schema.base import Component, Object, Unknown, field_specs
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Held, Reference
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath, PathPoint
+from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Tree
 from osimlite.view.scene import Scene
 

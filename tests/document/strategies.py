@@ -6,10 +6,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from osimlite.schema.base import Component, Object, field_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
 from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import field_specs
 
 CLASSES: list[type[Object]] = [cls for cls in map(class_for, tags()) if cls is not None and cls is not Model]
 

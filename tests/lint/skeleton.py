@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 from osimlite.document.source import Source
-from osimlite.schema.base import field_specs
 from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for
+from osimlite.schema.specs import field_specs
 
 SKELETON = Path(__file__).resolve().parents[2] / "fixtures" / "lint" / "skeleton.osim"
 

@@ -6,9 +6,9 @@ import pytest
 
 from osimlite.lint import consequences
 from osimlite.lint.consequences import NAN, REFUSED, consequence
-from osimlite.schema.base import field_specs
 from osimlite.schema.fields import Value
 from osimlite.schema.registry import MODULES, class_for
+from osimlite.schema.specs import field_specs
 
 TABLES = ("_REFUSED_OUTSIDE", "_REFUSED_AT_ZERO", "_NAN_OUTSIDE", "_NAN_AT_ZERO")
 ENTRIES = [

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 import osimlite
-from osimlite.schema.base import Component, Object, field_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import field_specs
 
 pytestmark = pytest.mark.oracle
 opensim = pytest.importorskip("opensim")

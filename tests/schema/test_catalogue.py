@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from osimlite.document.lexical import formatter
-from osimlite.schema.base import Object, field_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES, class_for, tags
+from osimlite.schema.specs import field_specs
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "schemas"
 CATALOGUE = json.loads((SCHEMAS / "opensim-4.6.json").read_text())["classes"]

@@ -12,9 +12,10 @@ from pydantic import BaseModel
 
 import osimlite
 from osimlite.errors import MissingNameError, ModelError
-from osimlite.schema.base import Object, defaults, field_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value, epoch
 from osimlite.schema.registry import MODULES
+from osimlite.schema.specs import defaults, field_specs
 
 CLASSES = {name: getattr(import_module(module), name) for name, module in MODULES.items()}
 

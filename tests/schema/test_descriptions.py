@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.base import Object
 from osimlite.schema.descriptions import meaning_of
 from osimlite.schema.json_schema import json_schema
 from osimlite.schema.registry import MODULES
+from osimlite.schema.specs import FieldSpec
 
 LONGEST = 140
 

@@ -8,7 +8,6 @@ import pytest
 
 import osimlite
 from osimlite.errors import MissingNameError, ModelError
-from osimlite.schema.base import field_specs
 from osimlite.schema.contact import ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Reference
@@ -17,6 +16,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
+from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use, normalised
 
 

@@ -9,10 +9,11 @@ from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, Object, defaults, reference_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.fields import Reference
 from osimlite.schema.forces import Force
+from osimlite.schema.specs import defaults, reference_specs
 from osimlite.schema.tree import Use
 
 

@@ -12,8 +12,9 @@ from osimlite.lint.consequences import STRICTER, consequence
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import quantity, shown
-from osimlite.schema.base import FieldSpec, Object, value_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
+from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.text import listed, nearest
 
 

@@ -12,8 +12,9 @@ from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, Object, field_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.forces import Force
+from osimlite.schema.specs import field_specs
 from osimlite.text import nearest
 
 

@@ -10,11 +10,12 @@ from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, closest, nearest_name
-from osimlite.schema.base import Component, Object, Unknown, reference_specs
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.fields import Reference
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
+from osimlite.schema.specs import reference_specs
 from osimlite.schema.tree import Resolution, Use, is_a, normalised
 from osimlite.text import listed, nearest
 

@@ -13,11 +13,12 @@ from osimlite.lint.placement import Pose, default_poses, fixed, on_base
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
-from osimlite.schema.base import Component, FieldSpec, Object, value_specs
+from osimlite.schema.base import Component, Object
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.markers import Station
+from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.schema.tree import is_a
 
 

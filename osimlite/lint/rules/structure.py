@@ -10,10 +10,11 @@ from osimlite.lint.fixes import renamed, replaced, without_element
 from osimlite.lint.old_tags import Successor, successor
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, shown
-from osimlite.schema.base import FieldSpec, Object, field_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import listed, nearest
 
 

@@ -11,8 +11,9 @@ from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import shown
-from osimlite.schema.base import FieldSpec, Object, field_specs
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
+from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import listed
 
 

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.schema.base import FieldSpec, Object
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference
 from osimlite.schema.model import Model
+from osimlite.schema.specs import FieldSpec
 from osimlite.schema.tree import Tree, Use
 
 SIX_DIGITS = 1e-5
