@@ -126,87 +126,14 @@ class ObjectReader:
     ) -> Read:
         """Read one element as an instance of `cls`; `name` overrides the attribute, `skip` is a child to pass over."""
         number = self.count
-        count = number + 1
-        plan = plan_for(cls)
-        steps = plan.steps
+        self.count = number + 1
         values: dict[str, Any] = {}
-        extra: _Extra | None = None
-        late: list[_Late] = []
-        for child in element:
-            step = steps.get(child.tag)
-            if step is None:
-                if child is skip:
-                    count += size(child)
-                    continue
-                extra = extra or _Extra()
-                if is_element(child):
-                    self.count = count
-                    self._indirect(child, cls, plan.named, values, extra)
-                    count = self.count
-                else:
-                    remember(child, extra.pending)
-                continue
-            action, field_name, convert, spec = step
-            if field_name in values:
-                extra = extra or _Extra()
-                self.count = count
-                self._duplicate(child, spec, extra)
-                count = self.count
-                continue
-            if extra is not None and extra.pending:
-                extra.settle(spec.tag)
-            if action == _TEXT:
-                here = count
-                count = here + 1
-                text = child.text or ""
-                if len(child):
-                    extra = extra or _Extra()
-                    self.count = count
-                    text = self._text_of(child, here, spec, extra)
-                    count = self.count
-                try:
-                    values[field_name] = convert(text)
-                except Unclean as unclean:
-                    extra = extra or _Extra()
-                    value = self._default(cls, field_name) if unclean.value is ABSENT else unclean.value
-                    values[field_name] = value
-                    extra.raw[field_name] = (value, text)
-                    noted = None if unclean.value is ABSENT else value
-                    extra.late.append((unclean.trouble, here, unclean.word, spec, noted))
-                continue
-            self.count = count
-            if action == _LIST:
-                values[field_name] = self._members(child, spec, late)
-            elif action == _ONE:
-                values[field_name] = self._owned(child, spec.accepts)
-            else:
-                members = self._members(child, spec, late)
-                for left_out in members[1:]:
-                    late.append(("duplicate-tag", left_out._index, left_out.tag, spec, None))
-                optional = isinstance(spec.kind, Held) and spec.kind.form == "optional"
-                if members and not optional:
-                    # The object of a property is called as the property is, also in the long form.
-                    members[0].__dict__["name"] = spec.tag
-                    members[0].model_fields_set.add("name")
-                if members:
-                    values[field_name] = members[0]
-                elif optional:
-                    values[field_name] = None
-                else:
-                    values[field_name] = getattr(cls, "in_place_of_none", _factory_of)(spec, values)
-            count = self.count
-            if late:
-                extra = extra or _Extra()
-                extra.late.extend(late)
-                late.clear()
-        self.count = count
-        attributes = element.items()
+        extra = self._children(element, cls, skip, values)
         present = set(values)
-        for key, attribute in attributes:
-            if key == "name" and attribute:
-                values["name"] = attribute
-                present.add("name")
-            elif key != "name":
+        for key, attribute in element.items():
+            if key == "name":
+                name = name or str(attribute)
+            else:
                 extra = extra or _Extra()
                 kind: NoteKind = "include" if key == "file" else "unknown-attribute"
                 extra.late.append((kind, number, as_written(str(key)), None, str(attribute)))
@@ -218,6 +145,78 @@ class ObjectReader:
         if inherited:
             layout_of(built).inherited = inherited
         return built if extra is None else self._finish(built, extra)
+
+    def _children(
+        self, element: etree._Element, cls: type[Object], skip: etree._Element | None, values: dict[str, Any]
+    ) -> _Extra | None:
+        """Read the children of an element into `values`, by field name; what they say beyond that is returned."""
+        steps, named = plan_for(cls)
+        extra: _Extra | None = None
+        for child in element:
+            step = steps.get(child.tag)
+            if step is None:
+                if child is skip:
+                    self.count += size(child)
+                else:
+                    extra = extra or _Extra()
+                    self._indirect(child, named, values, extra)
+                continue
+            action, field_name, convert, spec = step
+            if field_name in values:
+                extra = extra or _Extra()
+                self._duplicate(child, spec, extra)
+                continue
+            if extra is not None:
+                extra.settle(spec.tag)
+            if action != _TEXT:
+                values[field_name], late = self._held(child, cls, step, values)
+                if late:
+                    extra = extra or _Extra()
+                    extra.late += late
+                continue
+            # Most elements are values, so they are read here and not in a method of their own.
+            number = self.count
+            self.count = number + 1
+            text = child.text or ""
+            if len(child):
+                extra = extra or _Extra()
+                text = self._text_of(child, number, spec, extra)
+            try:
+                values[field_name] = convert(text)
+            except Unclean as unclean:
+                extra = extra or _Extra()
+                values[field_name] = self._unclean(unclean, text, number, cls, spec, extra)
+        return extra
+
+    def _unclean(
+        self, unclean: Unclean, text: str, number: int, cls: type[Object], spec: FieldSpec, extra: _Extra
+    ) -> Any:
+        """The value that stands for a text which reads only partly, or not at all."""
+        missing = unclean.value is ABSENT
+        value = self._default(cls, spec.name) if missing else unclean.value
+        extra.raw[spec.name] = (value, text)
+        extra.late.append((unclean.trouble, number, unclean.word, spec, None if missing else value))
+        return value
+
+    def _held(
+        self, element: etree._Element, cls: type[Object], step: Step, values: Mapping[str, Any]
+    ) -> tuple[Any, list[_Late]]:
+        """Read the element of a property that holds objects: its value, and what is noted of it."""
+        spec = step.spec
+        if step.action == _ONE:
+            return self._owned(element, spec.accepts), []
+        members, late = self._members(element, spec)
+        if step.action == _LIST:
+            return members, late
+        late += [("duplicate-tag", left_out._index, left_out.tag, spec, None) for left_out in members[1:]]
+        if isinstance(spec.kind, Held) and spec.kind.form == "optional":
+            return (members[0] if members else None), late
+        if not members:
+            return getattr(cls, "in_place_of_none", _factory_of)(spec, values), late
+        # The object of a property is called as the property is, also in the long form.
+        members[0].__dict__["name"] = spec.tag
+        members[0].model_fields_set.add("name")
+        return members[0], late
 
     def _finish(self, built: Read, extra: _Extra) -> Read:
         """Give an object what its element said beyond its properties."""
@@ -257,10 +256,11 @@ class ObjectReader:
         self.notes.extend(note._replace(number=number) for note in notes)
         return item
 
-    def _members(self, wrapper: etree._Element, spec: FieldSpec, late: list[_Late]) -> ObjectList[Any]:
-        """Read the objects inside ``<objects>`` or another wrapper."""
+    def _members(self, wrapper: etree._Element, spec: FieldSpec) -> tuple[ObjectList[Any], list[_Late]]:
+        """Read the objects inside ``<objects>`` or another wrapper; and what is noted of them."""
         self.count += 1
         members: list[Any] = []
+        late: list[_Late] = []
         pending: list[Remark] = []
         accepts = spec.accepts
         assert accepts is not None
@@ -283,17 +283,19 @@ class ObjectReader:
             members.append(member)
         if pending and members:
             layout_of(members[-1]).after.extend(pending)
-        return ObjectList(members)
+        return ObjectList(members), late
 
     def _indirect(
         self,
         child: etree._Element,
-        cls: type[Object],
         named: dict[str, FieldSpec],
         values: dict[str, Any],
         extra: _Extra,
     ) -> None:
-        """Read a child whose tag is no property: an object by its property's name, or something unknown."""
+        """Read a child whose tag is no property: a comment, an object by its property's name, something unknown."""
+        if not is_element(child):
+            remember(child, extra.pending)
+            return
         tag = as_written(child.tag)
         name = child.get("name") or None
         held = class_for(tag)

@@ -71,8 +71,7 @@ def markup(text: str) -> Iterator[Markup]:
 def spans_of(text: str) -> list[Span]:
     """Every element of a text in document order, found by the rules of :func:`markup`.
 
-    Almost every ``<`` begins a plain tag, and splitting the text at them is several times faster than matching each;
-    what is not plain is left to :func:`markup`.
+    An element that nothing ends is taken to be empty; an end that nothing began is passed over.
     """
     tags: list[str] = []
     starts: list[int] = []
@@ -80,74 +79,30 @@ def spans_of(text: str) -> list[Span]:
     inner_ends: list[int] = []
     ends: list[int] = []
     open_numbers: list[int] = []
-    parent = -1
-    passed = 0
-    pieces = text.split("<")
-    next_place = len(pieces[0])
-    for piece in pieces[1:]:
-        here = next_place
-        next_place = here + 1 + len(piece)
-        if here < passed:
+    behind = 0
+    for match in _MARKUP.finditer(text):
+        start, end = match.span()
+        if start < behind:
+            # Inside a comment or its like; the match holds no second "<", and so hides nothing behind its end.
             continue
-        width = piece.find(">")
-        if width > 0:
-            first = piece[0]
-            if first == "/":
-                # Of a closing tag all that counts is where it stands.
-                plain = piece[1:width]
-                if plain.isalnum() or _NAME.fullmatch(plain):
-                    if parent >= 0:
-                        inner_ends[parent] = here
-                        ends[parent] = here + width + 2
-                        open_numbers.pop()
-                        parent = open_numbers[-1] if open_numbers else -1
-                    continue
-            elif first == "!":
-                if piece.startswith("!--") and piece.find("-->", 3) > 0:
-                    continue
-            else:
-                tag, blank, rest = piece[:width].partition(" ")
-                empty = piece[width - 1] == "/"
-                if empty and not blank:
-                    tag = tag[:-1]
-                # With its quotes in pairs, the first ">" ends the tag.
-                paired = not blank or (rest.count('"') % 2 == 0 and "'" not in rest)
-                if paired and (tag.isalnum() or _NAME.fullmatch(tag)):
-                    end = here + width + 2
-                    tags.append(tag)
-                    starts.append(here)
-                    tag_ends.append(end)
-                    inner_ends.append(end)
-                    ends.append(end)
-                    if not empty:
-                        parent = len(tags) - 1
-                        open_numbers.append(parent)
-                    continue
-        match = _MARKUP.match(text, here)
-        if match is None:
-            continue
-        passed = match.end()
-        if match["special"] is not None:
+        if match["close"] is not None:
+            if open_numbers:
+                number = open_numbers.pop()
+                inner_ends[number], ends[number] = start, end
+        elif match["special"] is None:
+            if not match["empty"]:
+                open_numbers.append(len(tags))
+            tags.append(match["open"])
+            starts.append(start)
+            tag_ends.append(end)
+            inner_ends.append(end)
+            ends.append(end)
+        else:
             ending = _SPECIAL[match["special"]][1]
-            found = text.find(ending, passed)
+            found = text.find(ending, end)
             if found < 0:
                 break
-            passed = found + len(ending)
-        elif match["close"] is not None:
-            if parent >= 0:
-                inner_ends[parent] = here
-                ends[parent] = passed
-                open_numbers.pop()
-                parent = open_numbers[-1] if open_numbers else -1
-        else:
-            tags.append(match["open"])
-            starts.append(here)
-            tag_ends.append(passed)
-            inner_ends.append(passed)
-            ends.append(passed)
-            if not match["empty"]:
-                parent = len(tags) - 1
-                open_numbers.append(parent)
+            behind = found + len(ending)
     return [*map(Span._make, zip(tags, starts, tag_ends, inner_ends, ends, strict=True))]
 
 

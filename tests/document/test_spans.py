@@ -44,7 +44,7 @@ def one_by_one(text: str) -> list[Span]:
 
 
 @given(st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
-def test_splitting_finds_what_matching_finds(text: str) -> None:
+def test_one_search_through_a_text_finds_what_its_markup_says(text: str) -> None:
     assert spans_of(text) == one_by_one(text)
 
 
