@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from osimlite.sweep.measures import Batch, Measure, State, measure, measure_name
 from osimlite.sweep.plan import MOST_TRIES, Plan
 from osimlite.sweep.renewal import Variant
 from osimlite.sweep.variables import Floats
-from osimlite.sweep.variants import Variants
+from osimlite.sweep.variants import MOST_KEPT, Variants
 
 DONE, STOPPED, FAILED = "done", "stopped", "failed"
 
@@ -44,6 +44,39 @@ class Block:
     seconds: float
 
 
+class _Sample(NamedTuple):
+    """A row of the samples, with its model and its initial state (2n,)."""
+
+    place: int
+    variant: Variant
+    start: Floats
+
+
+class _Look:
+    """What is looked at in the runs of models of one structure.
+
+    Args:
+        plan: that asks for it.
+        engine: of a model of that structure.
+
+    Raises:
+        OsimliteError: the model has nothing of the kind.
+    """
+
+    def __init__(self, plan: Plan, engine: Any) -> None:
+        self.measures = [measure(spec, engine) for spec in plan.measures]
+        stops = [
+            Watch(stop.words, coordinate=stop.coordinate, level=stop.level, stops=-1 if stop.is_below else 1)
+            for stop in plan.stops
+        ]
+        self.watches = list({item.name: item for made in self.measures for item in made.watches}.values()) + stops
+        if self.watches and plan.engine != "compiled":
+            raise SettingError("what stops a run needs --engine compiled")
+        # Without room for events, none is looked for.
+        rooms = [made.room(plan.to) for made in self.measures]
+        self.most_events = max([*rooms, 1 if self.watches else 0])
+
+
 class Runner:
     """Runs samples; for one thread.
 
@@ -57,17 +90,8 @@ class Runner:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.variants = Variants(plan)
-        self.measures = [measure(spec, self.variants.given.engine) for spec in plan.measures]
-        stops = [
-            Watch(stop.words, coordinate=stop.coordinate, level=stop.level, stops=-1 if stop.is_below else 1)
-            for stop in plan.stops
-        ]
-        self._watches = list({item.name: item for made in self.measures for item in made.watches}.values()) + stops
-        if self._watches and plan.engine != "compiled":
-            raise SettingError("what stops a run needs --engine compiled")
-        # Without room for events, none is looked for.
-        rooms = [made.room(plan.to) for made in self.measures]
-        self._most_events = max([*rooms, 1 if self._watches else 0])
+        given = self.variants.given
+        self._looks: dict[bytes, _Look] = {given.structure: _Look(plan, given.engine)}
         moments = [] if plan.report_interval is None else report_times(plan.to, plan.report_interval)
         self._report_times = np.array(moments)
 
@@ -75,73 +99,87 @@ class Runner:
         """Run samples (k, d); a run that fails is told of, not raised."""
         started = time.perf_counter()
         count = len(values)
-        status, times = [FAILED] * count, np.full(count, np.nan)
-        reasons: list[str | None] = [None] * count
-        measures = {measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures}
-        groups: dict[bytes, list[tuple[int, Variant]]] = {}
+        block = Block(
+            [FAILED] * count,
+            [None] * count,
+            np.full(count, np.nan),
+            {measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures},
+            0.0,
+        )
+        groups: dict[bytes, list[_Sample]] = {}
         for place, row in enumerate(values.tolist()):
             try:
                 variant = self.variants.variant(row)
+                start = self.variants.start(variant, row)
             except OsimliteError as error:
-                reasons[place] = str(error)
+                block.reasons[place] = str(error)
             else:
-                groups.setdefault(variant.structure, []).append((place, variant))
+                groups.setdefault(variant.structure, []).append(_Sample(place, variant, start))
         for group in groups.values():
-            places = [place for place, _ in group]
-            starts = np.stack([self.variants.start(variant, values[place]) for place, variant in group])
-            # Any of the same structure will do, and making one takes time.
-            given = self.variants.given
-            leading = given if group[0][1].structure == given.structure else group[0][1]
-            runs, why = self._simulate(leading.engine, [variant for _, variant in group], starts)
-            for number, place in enumerate(places):
-                status[place], reasons[place] = why[number]
-                times[place] = runs.times[number]
-            good = np.array([number for number, place in enumerate(places) if status[place] != FAILED], dtype=int)
-            if len(good) == 0:
-                continue
-            chosen = [group[number][1] for number in good]
-            batch = Batch(
-                leading.engine,
-                partial(_engine, chosen),
-                self._numbers(chosen),
-                starts[good],
-                _chosen(runs, good),
-                values[places][good],
-                [item.name for item in self.plan.variables],
-                self._report_times,
-            )
-            rows = np.array(places)[good]
-            for made in self.measures:
-                self._measure(made, batch, rows, measures[made.name], status, reasons)
+            try:
+                self._run(group, values, block)
+            except OsimliteError as error:
+                # What is asked for may mean nothing in a model of another structure.
+                for sample in group:
+                    block.status[sample.place], block.reasons[sample.place] = FAILED, str(error)
         # A measure may have failed after others had been taken.
-        failed = [place for place in range(count) if status[place] == FAILED]
-        for column in measures.values():
+        failed = [place for place in range(count) if block.status[place] == FAILED]
+        for column in block.measures.values():
             column[failed] = np.nan
-        return Block(status, reasons, times, measures, time.perf_counter() - started)
+        return replace(block, seconds=time.perf_counter() - started)
 
-    def _measure(
-        self,
-        made: Measure,
-        batch: Batch,
-        rows: Any,
-        column: Floats,
-        status: list[str],
-        reasons: list[str | None],
-    ) -> None:
+    def _run(self, group: Sequence[_Sample], values: Floats, block: Block) -> None:
+        """Run samples whose models have one structure."""
+        # Any of the same structure will do, and making one takes time.
+        given, first = self.variants.given, group[0].variant
+        engine = (given if first.structure == given.structure else first).engine
+        look = self._look(first.structure, engine)
+        starts = np.stack([sample.start for sample in group])
+        runs, why = self._simulate(engine, look, [sample.variant for sample in group], starts)
+        for number, sample in enumerate(group):
+            block.status[sample.place], block.reasons[sample.place] = why[number]
+            block.times[sample.place] = runs.times[number]
+        good = np.array([number for number, (status, _) in enumerate(why) if status != FAILED], dtype=int)
+        if len(good) == 0:
+            return
+        chosen = [group[number].variant for number in good]
+        rows = np.array([group[number].place for number in good])
+        batch = Batch(
+            engine,
+            partial(_engine, chosen),
+            self._numbers(chosen),
+            starts[good],
+            _chosen(runs, good),
+            values[rows],
+            [item.name for item in self.plan.variables],
+            self._report_times,
+        )
+        for made in look.measures:
+            self._measure(made, batch, rows, block)
+
+    def _look(self, structure: bytes, engine: Any) -> _Look:
+        found = self._looks.get(structure)
+        if found is None:
+            if len(self._looks) >= MOST_KEPT:
+                self._looks = {}
+            found = self._looks[structure] = _Look(self.plan, engine)
+        return found
+
+    def _measure(self, made: Measure, batch: Batch, rows: Any, block: Block) -> None:
         """Fill in a measure of some runs; a function of a user may raise anything, which is told of."""
         try:
-            column[rows] = made.of(batch)
+            block.measures[made.name][rows] = made.of(batch)
         except Exception as error:
             if len(rows) > 1:
                 # One by one, to find which run it is.
                 for number, row in enumerate(rows):
-                    self._measure(made, _part(batch, number), np.array([row]), column, status, reasons)
+                    self._measure(made, _part(batch, number), np.array([row]), block)
             else:
-                status[rows[0]] = FAILED
-                reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
+                block.status[rows[0]] = FAILED
+                block.reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
 
     # --------------------------------------------------------------------------------------------- motions
-    def _simulate(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
+    def _simulate(self, engine: Any, look: _Look, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
         if self.plan.engine != "compiled":
             return self._one_by_one(engine, variants, starts)
         from osimlite.simulation.many import ENDINGS, run_many
@@ -153,38 +191,34 @@ class Runner:
             numbers=self._numbers(variants),
             accuracy=self.plan.accuracy,
             report_times=self._report_times.tolist(),
-            watches=self._watches,
-            most_events=self._most_events,
-            event_states=any(made.event_states for made in self.measures),
+            watches=look.watches,
+            most_events=look.most_events,
+            event_states=any(made.event_states for made in look.measures),
             most_tries=MOST_TRIES,
             threads=1,
         )
-        finite = [bool(np.isfinite(state).all()) for state in runs.states]
-        why = [
-            self._ending(ENDINGS[int(runs.endings[number])], runs, number, finite[number])
-            for number in range(len(starts))
-        ]
+        why: Endings = []
+        for number, (ending, state) in enumerate(zip(runs.endings.tolist(), runs.states, strict=True)):
+            words, t = ENDINGS[ending], runs.times[number]
+            if words == "done" and np.isfinite(state).all():
+                why.append((DONE, None))
+            elif words == "stopped":
+                why.append((STOPPED, self._what_stopped(engine, look, runs.events[number], state)))
+            elif words == "too many steps":
+                why.append((FAILED, f"{MOST_TRIES} steps came no further than t = {t:.9g} s; ask for less accuracy"))
+            else:
+                why.append((FAILED, f"the motion cannot be computed beyond t = {t:.9g} s; ask for more accuracy"))
         return runs, why
 
     def _numbers(self, variants: Sequence[Variant]) -> Floats | None:
         return None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
 
-    def _ending(self, ending: str, runs: Runs, number: int, is_finite: bool) -> tuple[str, str | None]:
-        t = runs.times[number]
-        if ending == "done" and is_finite:
-            return DONE, None
-        if ending == "stopped":
-            return STOPPED, self._what_stopped(runs.events[number], runs.states[number])
-        if ending == "too many steps":
-            return FAILED, f"{MOST_TRIES} steps came no further than t = {t:.9g} s; ask for less accuracy"
-        return FAILED, f"the motion cannot be computed beyond t = {t:.9g} s; ask for more accuracy"
-
-    def _what_stopped(self, events: Sequence[tuple[float, str, bool]], state: Floats) -> str:
+    def _what_stopped(self, engine: Any, look: _Look, events: Sequence[tuple[float, str, bool]], state: Floats) -> str:
         """The watch that ended a run: the last event, if there was room for it, or the level that the state is at."""
         last = events[-1][1] if events else ""
-        if any(watch.stops and watch.name == last for watch in self._watches):
+        if any(watch.stops and watch.name == last for watch in look.watches):
             return last
-        y = State(self.variants.given.engine, state)
+        y = State(engine, state)
         names = {stop.words: abs(y[stop.coordinate] - stop.level) for stop in self.plan.stops}
         return min(names, key=lambda name: names[name])
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import OsimliteError, SettingError
 from osimlite.schema.base import Component
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
@@ -23,6 +23,9 @@ from osimlite.simulation.run import Simulation
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.renewal import Renewal, Variant
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
+
+PRESSED = 1e-4
+"""So deep (m) in the ground is the foot of a walker that is planted: no doubt that it stands on it."""
 
 MOST_KEPT = 64
 """So many models are kept: a grid asks for the same ones again and again."""
@@ -80,12 +83,44 @@ class Variants:
         return found
 
     def start(self, variant: Variant, values: Sequence[float]) -> Floats:
-        """Initial state of a sample (2n,)."""
-        row, engine = variant.start.copy(), self.given.engine
+        """Initial state of a sample (2n,).
+
+        Raises:
+            OsimliteError: the model has no such coordinate, or holds it.
+        """
+        # An engine of its own is only made where the coordinates may be others.
+        row, engine = (
+            variant.start.copy(),
+            (self.given if variant.structure == self.given.structure else variant).engine,
+        )
         for place, target in self._starts:
-            number = engine.order.index(engine.mechanism.coordinate_index(target.coordinate))
+            coordinate = engine.mechanism.coordinate_index(target.coordinate)
+            if coordinate not in engine.order:
+                raise SettingError(f"'{target.coordinate}' is locked in this model, so that it has no start")
+            number = engine.order.index(coordinate)
             row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
         return row
+
+    def starts(self, variants: Sequence[Variant], values: Floats) -> Floats:
+        """Initial states (k, 2n) of samples (k, d), whose models have one structure.
+
+        Raises:
+            OsimliteError: a start cannot be planted, since the model has no feet.
+        """
+        rows = np.stack([self.start(variant, row) for variant, row in zip(variants, values, strict=True)])
+        if not self._plan.is_planted:
+            return rows
+        from osimlite.gait.footing import find_footing
+        from osimlite.gait.starts import planted, stood
+
+        engine = self.leading(variants[0]).engine
+        footing = find_footing(engine)
+        numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
+        return stood(engine, footing, planted(engine, footing, rows, numbers=numbers), PRESSED, -1, numbers=numbers)
+
+    def leading(self, variant: Variant) -> Variant:
+        """A variant of the same structure; any of them will do, and making an engine takes time."""
+        return self.given if variant.structure == self.given.structure else variant
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""
@@ -108,6 +143,12 @@ class Variants:
         for place, target in self._starts:
             name = "default_speed_value" if target.is_speed else "default_value"
             setattr(coordinates[target.coordinate], name, float(values[place]))
+        if self._plan.is_planted:
+            variant = self.variant(values)
+            engine, (row,) = variant.engine, self.starts([variant], np.array([values])).tolist()
+            for number, place in enumerate(engine.order):
+                coordinate = coordinates[engine.mechanism.coordinates[place].path]
+                coordinate.default_value, coordinate.default_speed_value = row[number], row[number + len(engine.order)]
 
     def put(self, values: Sequence[float]) -> None:
         """Make `model` that of a sample, but for its initial state.
@@ -149,7 +190,7 @@ class Variants:
         engine: Any = simulation.engine
         infos = engine.mechanism.coordinates
         start = simulation.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
-        kind = (len(infos), *engine.order, *engine.contacts)
+        kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
         return Variant(np.array(start), structure, getattr(engine, "numbers", np.zeros(0)), lambda: engine, simulation)
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from osimlite import Body, Coordinate, Model, PinJoint, SliderJoint
 from osimlite.errors import DoubtfulWarning, OsimliteError, SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
@@ -187,6 +188,57 @@ def test_stops(walker):
     for number, reason in enumerate(block.reasons):
         name, level = {"Pelvis_ty below 0.7": ("Pelvis_ty", 0.7), "Pelvis_tx above 0.1": ("Pelvis_tx", 0.1)}[reason]
         assert block.measures[f"{name}/value"][number] == pytest.approx(level, abs=1e-6)
+
+
+def chain(parameters):
+    """Pendulums on one another on a cart; their number is a parameter."""
+    model = Model(name="chain")
+    cart = model.add(Body(name="cart", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    first = SliderJoint(name="rail", coordinates=[Coordinate(name="x", default_speed_value=1.0)])
+    links = [model.ground, cart]
+    for number in range(int(parameters.get("links", 1.0))):
+        link = Body(name=f"link{number}", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=(0.1, 0.1, 0.1, 0, 0, 0))
+        links.append(model.add(link))
+        pin = PinJoint(name=f"pin{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)])
+        model.add(pin.between(links[-2], link))
+    model.add(first.between(model.ground, cart))
+    return model
+
+
+@pytest.mark.parametrize("engine", ["compiled", "bullet"])
+def test_models_of_another_structure_are_measured_as_they_are(engine):
+    if engine == "bullet":
+        pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    vary = {"links": (1.0, 3.0), "q0": (0.1, 0.5), "x/speed": (0.0, 2.0)}
+    measures = ("distance", "q0/value", "x/speed", "energy")
+    made = plan(chain, vary, parameters={"links": 1.0}, measures=measures, engine=engine, to=0.4)
+    rows = np.array([[1.0, 0.2, 0.5], [2.0, 0.2, 0.5], [3.0, 0.4, 1.0], [1.0, 0.4, 1.0]])
+    block = Runner(made).run(rows)
+    assert block.status == ["done"] * 4
+    for number, (links, swing, speed) in enumerate(rows):
+        with Simulation(chain({"links": links}), engine) as simulation:
+            found = simulation.run(0.4, initial={"q0": swing}, initial_speeds={"x": speed})
+        x, q = (found.coordinates.index(name) for name in ("x", "q0"))
+        assert block.measures["distance"][number] == found.values[-1, x]
+        assert block.measures["q0/value"][number] == found.values[-1, q]
+        assert block.measures["x/speed"][number] == found.speeds[-1, x]
+        assert abs(block.measures["energy"][number]) < 0.01
+
+
+def test_what_another_structure_lacks_is_a_reason():
+    vary = {"links": (1.0, 2.0)}
+    made = plan(chain, vary, parameters={"links": 2.0}, measures=("x/value",), to=0.2)
+    below = plan(
+        lambda given: chain({"links": 2.0, **given}), vary, parameters={"links": 2.0}, below={"q1": -1.0}, to=0.2
+    )
+    lacking = plan(
+        lambda given: chain({"links": 2.0, **given}), vary, parameters={"links": 2.0}, measures=("q1/value",), to=0.2
+    )
+    rows = np.array([[2.0], [1.0]])
+    assert Runner(made).run(rows).status == ["done", "done"]
+    for wrong in (below, lacking):
+        block = Runner(wrong).run(rows)
+        assert block.status == ["done", "failed"] and "q1" in str(block.reasons[1])
 
 
 def test_stops_may_carry_a_unit(walker):
