@@ -106,20 +106,3 @@ def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float)
     if t > 0.0:
         return K * (0.5 * delta * delta - t * t / 7.0)
     return K * 0.5 * delta * delta
-
-
-def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: float) -> float:
-    """Power that the damper takes out of the motion, D (su + sl) u^2, in W.
-
-    Args: as `limit_force`.
-    """
-    s = 0.0
-    if q > qu:
-        delta = q - qu
-        x = delta / t if delta < t else 1.0
-        s += x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    if q < ql:
-        delta = ql - q
-        x = delta / t if delta < t else 1.0
-        s += x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    return D * s * u * u

@@ -129,31 +129,18 @@ def ellipsoid_ellipsoid(
     nx = dx / distance
     ny = dy / distance
     nz = dz / distance
-    # The squares of the half axes, turned: s = sqrt(n B n), and B n / s leads to the point where the plane touches.
-    p, q, r = rx1 * rx1, ry1 * ry1, rz1 * rz1
-    bxx1 = p * xx1 * xx1 + q * xy1 * xy1 + r * xz1 * xz1
-    byy1 = p * yx1 * yx1 + q * yy1 * yy1 + r * yz1 * yz1
-    bzz1 = p * zx1 * zx1 + q * zy1 * zy1 + r * zz1 * zz1
-    bxy1 = p * xx1 * yx1 + q * xy1 * yy1 + r * xz1 * yz1
-    bxz1 = p * xx1 * zx1 + q * xy1 * zy1 + r * xz1 * zz1
-    byz1 = p * yx1 * zx1 + q * yy1 * zy1 + r * yz1 * zz1
-    p, q, r = rx2 * rx2, ry2 * ry2, rz2 * rz2
-    bxx2 = p * xx2 * xx2 + q * xy2 * xy2 + r * xz2 * xz2
-    byy2 = p * yx2 * yx2 + q * yy2 * yy2 + r * yz2 * yz2
-    bzz2 = p * zx2 * zx2 + q * zy2 * zy2 + r * zz2 * zz2
-    bxy2 = p * xx2 * yx2 + q * xy2 * yy2 + r * xz2 * yz2
-    bxz2 = p * xx2 * zx2 + q * xy2 * zy2 + r * xz2 * zz2
-    byz2 = p * yx2 * zx2 + q * yy2 * zy2 + r * yz2 * zz2
+    bxx1, byy1, bzz1, bxy1, bxz1, byz1 = _squares(
+        xx1, xy1, xz1, yx1, yy1, yz1, zx1, zy1, zz1, rx1 * rx1, ry1 * ry1, rz1 * rz1
+    )
+    bxx2, byy2, bzz2, bxy2, bxz2, byz2 = _squares(
+        xx2, xy2, xz2, yx2, yy2, yz2, zx2, zy2, zz2, rx2 * rx2, ry2 * ry2, rz2 * rz2
+    )
     tries = 0
     least = inf
     kx, ky, kz, sx, sy, sz = nx, ny, nz, 0.0, 0.0, 0.0
     while True:
-        gx1 = bxx1 * nx + bxy1 * ny + bxz1 * nz
-        gy1 = bxy1 * nx + byy1 * ny + byz1 * nz
-        gz1 = bxz1 * nx + byz1 * ny + bzz1 * nz
-        gx2 = bxx2 * nx + bxy2 * ny + bxz2 * nz
-        gy2 = bxy2 * nx + byy2 * ny + byz2 * nz
-        gz2 = bxz2 * nx + byz2 * ny + bzz2 * nz
+        gx1, gy1, gz1 = _times(bxx1, byy1, bzz1, bxy1, bxz1, byz1, nx, ny, nz)
+        gx2, gy2, gz2 = _times(bxx2, byy2, bzz2, bxy2, bxz2, byz2, nx, ny, nz)
         s1 = sqrt(gx1 * nx + gy1 * ny + gz1 * nz)
         s2 = sqrt(gx2 * nx + gy2 * ny + gz2 * nz)
         h = s1 + s2 - (nx * dx + ny * dy + nz * dz)
@@ -166,54 +153,19 @@ def ellipsoid_ellipsoid(
             sx *= 0.5
             sy *= 0.5
             sz *= 0.5
-            nx = kx + sx
-            ny = ky + sy
-            nz = kz + sz
-            size = sqrt(nx * nx + ny * ny + nz * nz)
-            nx /= size
-            ny /= size
-            nz /= size
+            nx, ny, nz = _unit(kx + sx, ky + sy, kz + sz)
             continue
         least = h
         kx, ky, kz = nx, ny, nz
-        gx1 /= s1
-        gy1 /= s1
-        gz1 /= s1
-        gx2 /= s2
-        gy2 /= s2
-        gz2 /= s2
-        # Directions u and v across n.
-        if abs(nx) < 0.6:
-            size = sqrt(ny * ny + nz * nz)
-            ux, uy, uz = 0.0, nz / size, -ny / size
-        else:
-            size = sqrt(nx * nx + nz * nz)
-            ux, uy, uz = -nz / size, 0.0, nx / size
-        vx = ny * uz - nz * uy
-        vy = nz * ux - nx * uz
-        vz = nx * uy - ny * ux
-        gu1 = gx1 * ux + gy1 * uy + gz1 * uz
-        gv1 = gx1 * vx + gy1 * vy + gz1 * vz
-        gu2 = gx2 * ux + gy2 * uy + gz2 * uz
-        gv2 = gx2 * vx + gy2 * vy + gz2 * vz
-        wx = bxx1 * ux + bxy1 * uy + bxz1 * uz
-        wy = bxy1 * ux + byy1 * uy + byz1 * uz
-        wz = bxz1 * ux + byz1 * uy + bzz1 * uz
-        huu1 = (wx * ux + wy * uy + wz * uz - gu1 * gu1) / s1
-        huv1 = (wx * vx + wy * vy + wz * vz - gu1 * gv1) / s1
-        wx = bxx1 * vx + bxy1 * vy + bxz1 * vz
-        wy = bxy1 * vx + byy1 * vy + byz1 * vz
-        wz = bxz1 * vx + byz1 * vy + bzz1 * vz
-        hvv1 = (wx * vx + wy * vy + wz * vz - gv1 * gv1) / s1
-        wx = bxx2 * ux + bxy2 * uy + bxz2 * uz
-        wy = bxy2 * ux + byy2 * uy + byz2 * uz
-        wz = bxz2 * ux + byz2 * uy + bzz2 * uz
-        huu2 = (wx * ux + wy * uy + wz * uz - gu2 * gu2) / s2
-        huv2 = (wx * vx + wy * vy + wz * vz - gu2 * gv2) / s2
-        wx = bxx2 * vx + bxy2 * vy + bxz2 * vz
-        wy = bxy2 * vx + byy2 * vy + byz2 * vz
-        wz = bxz2 * vx + byz2 * vy + bzz2 * vz
-        hvv2 = (wx * vx + wy * vy + wz * vz - gv2 * gv2) / s2
+        gx1, gy1, gz1 = gx1 / s1, gy1 / s1, gz1 / s1
+        gx2, gy2, gz2 = gx2 / s2, gy2 / s2, gz2 / s2
+        ux, uy, uz, vx, vy, vz = _across(nx, ny, nz)
+        gu1, gv1, huu1, huv1, hvv1 = _slopes(
+            bxx1, byy1, bzz1, bxy1, bxz1, byz1, gx1, gy1, gz1, s1, ux, uy, uz, vx, vy, vz
+        )
+        gu2, gv2, huu2, huv2, hvv2 = _slopes(
+            bxx2, byy2, bzz2, bxy2, bxz2, byz2, gx2, gy2, gz2, s2, ux, uy, uz, vx, vy, vz
+        )
         # How fast the overlap grows along u and v.
         fu = gu1 + gu2 - (dx * ux + dy * uy + dz * uz)
         fv = gv1 + gv2 - (dx * vx + dy * vy + dz * vz)
@@ -232,16 +184,107 @@ def ellipsoid_ellipsoid(
         sx = su * ux + sv * vx
         sy = su * uy + sv * vy
         sz = su * uz + sv * vz
-        nx = kx + sx
-        ny = ky + sy
-        nz = kz + sz
-        size = sqrt(nx * nx + ny * ny + nz * nz)
-        nx /= size
-        ny /= size
-        nz /= size
+        nx, ny, nz = _unit(kx + sx, ky + sy, kz + sz)
     one = huu1 * hvv1 - huv1 * huv1
     two = huu2 * hvv2 - huv2 * huv2
     huu = huu1 + huu2
     huv = huv1 + huv2
     R = sqrt(one * two / (huu * (hvv1 + hvv2) - huv * huv))
     return h, R, nx, ny, nz, x1 + gx1 - a * h * nx, y1 + gy1 - a * h * ny, z1 + gz1 - a * h * nz
+
+
+def _squares(
+    xx: float,
+    xy: float,
+    xz: float,
+    yx: float,
+    yy: float,
+    yz: float,
+    zx: float,
+    zy: float,
+    zz: float,
+    p: float,
+    q: float,
+    r: float,
+) -> tuple[float, float, float, float, float, float]:
+    """The squares of an ellipsoid's half axes as a matrix B: s = sqrt(n B n) is the way to the plane that touches it
+    across n, and B n / s leads to the point where that plane does.
+
+    Args:
+        xx: rotation matrix of the axes, by rows (xx, xy, xz), (yx, yy, yz), (zx, zy, zz).
+        p: squares (p, q, r) of the half axes, m^2.
+
+    Returns:
+        (bxx, byy, bzz, bxy, bxz, byz), m^2.
+    """
+    return (
+        p * xx * xx + q * xy * xy + r * xz * xz,
+        p * yx * yx + q * yy * yy + r * yz * yz,
+        p * zx * zx + q * zy * zy + r * zz * zz,
+        p * xx * yx + q * xy * yy + r * xz * yz,
+        p * xx * zx + q * xy * zy + r * xz * zz,
+        p * yx * zx + q * yy * zy + r * yz * zz,
+    )
+
+
+def _times(
+    bxx: float, byy: float, bzz: float, bxy: float, bxz: float, byz: float, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """A symmetric matrix times a vector (x, y, z)."""
+    return bxx * x + bxy * y + bxz * z, bxy * x + byy * y + byz * z, bxz * x + byz * y + bzz * z
+
+
+def _unit(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The unit vector along (x, y, z), which is not zero."""
+    size = sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size
+
+
+def _across(nx: float, ny: float, nz: float) -> tuple[float, float, float, float, float, float]:
+    """Unit vectors u and v across the unit vector n and each other, as (ux, uy, uz, vx, vy, vz)."""
+    if abs(nx) < 0.6:
+        size = sqrt(ny * ny + nz * nz)
+        ux, uy, uz = 0.0, nz / size, -ny / size
+    else:
+        size = sqrt(nx * nx + nz * nz)
+        ux, uy, uz = -nz / size, 0.0, nx / size
+    return ux, uy, uz, ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+
+
+def _slopes(
+    bxx: float,
+    byy: float,
+    bzz: float,
+    bxy: float,
+    bxz: float,
+    byz: float,
+    gx: float,
+    gy: float,
+    gz: float,
+    s: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    vx: float,
+    vy: float,
+    vz: float,
+) -> tuple[float, float, float, float, float]:
+    """First and second derivatives of s = sqrt(n B n) as n turns towards u and v.
+
+    Args:
+        bxx: the matrix B of `_squares`, m^2.
+        gx: the gradient (gx, gy, gz) of s, B n / s, m.
+        s: m.
+        ux: unit vectors u = (ux, uy, uz) and v = (vx, vy, vz) across n, 1.
+
+    Returns:
+        (gu, gv, huu, huv, hvv), m.
+    """
+    gu = gx * ux + gy * uy + gz * uz
+    gv = gx * vx + gy * vy + gz * vz
+    wx, wy, wz = _times(bxx, byy, bzz, bxy, bxz, byz, ux, uy, uz)
+    huu = (wx * ux + wy * uy + wz * uz - gu * gu) / s
+    huv = (wx * vx + wy * vy + wz * vz - gu * gv) / s
+    wx, wy, wz = _times(bxx, byy, bzz, bxy, bxz, byz, vx, vy, vz)
+    hvv = (wx * vx + wy * vy + wz * vz - gv * gv) / s
+    return gu, gv, huu, huv, hvv

@@ -221,39 +221,6 @@ def contact_energy(d: float, R: float, k: float) -> float:
     return (8.0 / 15.0) * k * d * d * sqrt(R * k * d)
 
 
-def dissipated_power(
-    d: float,
-    R: float,
-    k: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    vx: float,
-    vy: float,
-    vz: float,
-    fx: float,
-    fy: float,
-    fz: float,
-) -> float:
-    """Power that the contact takes out of the motion and does not store, in W; never negative (but for rounding).
-
-    F . v is what the bodies give, and the elastic force of Hertz times vn is what the elastic part stores of
-    it.
-
-    Args:
-        d: depth, m.
-        R: effective radius of curvature, m.
-        k: effective stiffness from `combine_materials`, Pa^(2/3).
-        nx: unit normal (nx, ny, nz) from surface 1 to surface 2, 1.
-        vx: velocity (vx, vy, vz) of surface 1 relative to surface 2 at the point of application, m/s.
-        fx: force (fx, fy, fz) on surface 2 as `contact_force` returns it, N.
-    """
-    if d <= 0.0:
-        return 0.0
-    stored = (4.0 / 3.0) * k * d * sqrt(R * k * d) * (vx * nx + vy * ny + vz * nz)
-    return fx * vx + fy * vy + fz * vz - stored
-
-
 def contact_forces(
     contacts: Iterable[Contact], vt: float, simbody_early_return: bool = False
 ) -> tuple[list[tuple[float, float, float]], float]:
