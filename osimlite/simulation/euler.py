@@ -7,14 +7,7 @@ from functools import partial
 from math import inf
 
 from osimlite.errors import SettingError
-from osimlite.simulation.integrators import (
-    Derivative,
-    IntegrationError,
-    Observer,
-    Projection,
-    Stepper,
-    straight_line,
-)
+from osimlite.simulation.stepper import Derivative, IntegrationError, Observer, Projection, Stepper, straight_line
 
 FIXED_STEP_TOLERANCE = 1e-9
 """What constraints may be off after a fixed step, before they are mended."""

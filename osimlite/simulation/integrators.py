@@ -1,43 +1,13 @@
-"""Time steppers, and the one that is usual: Runge-Kutta-Merson with Simbody's error control.
-
-A state is one list y = (q, u) or (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative
-comes from a function f(t, y) that returns (qdot, udot) or (qdot, udot, zdot) as a fresh sequence of Python floats
-and leaves y alone. Lists of floats are quicker than arrays here up to some 30 states.
-"""
+"""Runge-Kutta-Merson with Simbody's error control, the usual way to follow a motion."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import inf, isfinite, sqrt
-from typing import Any, Protocol
 
 from osimlite.errors import SettingError, SimulationError
-
-Derivative = Callable[[float, list[float]], Sequence[float]]
-Observer = Callable[[float, list[float]], object]
-
-
-class Projection(Protocol):
-    """Moves states to where constraints hold."""
-
-    def project(
-        self, t: float, y: list[float], errors: list[float] | None, tolerance: float, limit: float = inf
-    ) -> tuple[list[float], list[float] | None] | None:
-        """The nearest state that fulfils the constraints, if it is near.
-
-        Args:
-            t: time, s.
-            y: a state.
-            errors: how far off each entry of it may be, or None.
-            tolerance: what the constraints may be off.
-            limit: what they may be off at most in y.
-
-        Returns:
-            The state, and the errors without what lies across the constraints; None if no such state is near.
-        """
-
+from osimlite.simulation.stepper import Derivative, IntegrationError, Observer, Projection, Stepper
 
 DEFAULT_ACCURACY = 1e-3
 """What OpenSim's Manager uses where no accuracy was set."""
@@ -48,160 +18,12 @@ INITIAL_STEP = 0.01
 _ROUNDING = 2.0**-52
 
 
-class IntegrationError(SimulationError):
-    """The integrator cannot go on.
-
-    Attributes:
-        time: where, s.
-        index: the entry of the state that is to blame, if one is.
-    """
-
-    def __init__(self, message: str, time: float, index: int | None = None) -> None:
-        super().__init__(message)
-        self.time = time
-        self.index = index
-
-
-class Stepper(ABC):
-    """Common face of the steppers: a present state, steps, and states at times in between.
-
-    When `observe` is called for a step, the last call of f was the one at exactly that time and state; whatever f
-    kept of it (contact forces, say) belongs to the step. It is not called for the initial state.
-
-    Attributes:
-        time: s.
-        state: y at that time; a new list after every step, not changed later.
-        derivative: f(time, state).
-        evaluations: calls of f so far.
-        taken: steps taken so far.
-    """
-
-    def __init__(
-        self,
-        f: Derivative,
-        t: float,
-        y: Iterable[float],
-        observe: Observer | None,
-        names: Sequence[str] | None,
-    ) -> None:
-        self._f = f
-        self._observe = observe
-        self._names = names
-        self.time = t
-        self.state = list(y)
-        self.derivative = self._evaluate(t, self.state)
-        self.evaluations = 1
-        self.taken = 0
-        if len(self.derivative) != len(self.state):
-            raise ValueError(f"f gives {len(self.derivative)} derivatives of {len(self.state)} states")
-        self._previous = t, self.state, self.derivative
-
-    @property
-    def name(self) -> str:
-        """Of the method."""
-        return type(self).__name__
-
-    def catch_up(self) -> None:  # noqa: B027
-        """Make the calls of `observe` that were put off, as a stepper may that computes many steps at once."""
-
-    @abstractmethod
-    def step(self, limit: float = inf) -> None:
-        """Take one step, which ends at `limit` (s) at the latest.
-
-        Raises:
-            IntegrationError: a derivative is not a finite number, or no step is small enough.
-        """
-
-    @abstractmethod
-    def interpolant(self) -> Callable[[float], list[float]]:
-        """The function that gives the state at any time within the last step, s; it stays good for that step."""
-
-    def interpolate(self, t: float) -> list[float]:
-        """State at a time within the last step, s."""
-        return self.interpolant()(t)
-
-    def steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
-        """Yield (time, state) after each step; the last one ends at `until` (s), as with OpenSim's Manager."""
-        while self.time < until:
-            self.step(until)
-            yield self.time, self.state
-
-    def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
-        """Yield (time, state) at times that do not decrease, s.
-
-        They do not shorten the steps: within a step, the state is interpolated. The last step ends at the last
-        time, so that the steps are those of `steps` up to it.
-        """
-        for t in times:
-            while self.time < t:
-                self.step(times[-1])
-            yield t, self.at(t)
-
-    def table(self, times: Sequence[float], progress: Callable[[float], object] | None = None) -> Sequence[Any]:
-        """The states at times that do not decrease (s), one row for each; `progress` is called with every time."""
-        rows = []
-        for t, state in self.reports(times):
-            rows.append(state)
-            if progress is not None:
-                progress(t)
-        return rows
-
-    def at(self, t: float) -> list[float]:
-        """State at a time not before the start of the last step nor after its end, s."""
-        if t == self.time:
-            return self.state
-        start = self._previous[0]
-        if not start <= t < self.time:
-            raise ValueError(f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s")
-        return self.interpolate(t)
-
-    def _advance(self, t: float, y: list[float]) -> None:
-        """Make (t, y) the present state."""
-        self._previous = self.time, self.state, self.derivative
-        self.derivative = self._evaluate(t, y)
-        self.time = t
-        self.state = y
-        self.evaluations += 1
-        self.taken += 1
-        if self._observe is not None:
-            self._observe(t, y)
-
-    def _require_room(self, limit: float) -> None:
-        if not limit > self.time:
-            raise ValueError(f"the limit {limit:.9g} s of the step is not after the present {self.time:.9g} s")
-
-    def _evaluate(self, t: float, y: list[float]) -> Sequence[float]:
-        """The derivative at a state that is part of the motion, where it must exist."""
-        try:
-            derivative = self._f(t, y)
-        except ArithmeticError as failure:
-            raise IntegrationError(f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t) from failure
-        total = sum(derivative)
-        if total - total != 0.0:
-            self._refuse_non_finite(t, derivative)
-        return derivative
-
-    def _refuse_non_finite(self, t: float, derivative: Sequence[float]) -> None:
-        """Raise an error that names the first entry that is not finite, if there is one."""
-        for index, value in enumerate(derivative):
-            if not isfinite(value):
-                raise IntegrationError(
-                    f"The derivative of {self._name(index)} is {value} at t = {t:.9g} s; check the masses, "
-                    "inertias and force parameters that it depends on.",
-                    t,
-                    index,
-                )
-
-    def _name(self, index: int) -> str:
-        return f"state {index}" if self._names is None else self._names[index]
-
-
 class RungeKuttaMerson(Stepper):
     """Simbody's RungeKuttaMerson, the default integrator of OpenSim: `accuracy` means what it means there.
 
     Merson's method propagates a fourth-order solution and estimates its error from an embedded third-order one
     (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is taken
-    if the norm of the error, as `_error` forms it, is at most `accuracy`, and repeated smaller if not. With the
+    if the norm of the error, as `_norm` forms it, is at most `accuracy`, and repeated smaller if not. With the
     same f, the steps are OpenSim's to the last bit.
 
     Args:
@@ -264,11 +86,6 @@ class RungeKuttaMerson(Stepper):
         self._minimum_step = minimum_step
         self._next_step = min(max(INITIAL_STEP, minimum_step), maximum_step)
         self.attempted = 0
-
-    @property
-    def rejected(self) -> int:
-        """Steps tried and not taken."""
-        return self.attempted - self.taken
 
     def step(self, limit: float = inf) -> None:
         """Take one step of the size that the error allows, and choose the next one."""
@@ -404,12 +221,6 @@ def _cubic(
     c1 = c * s
     c0 = c1 - c
     return [b0 * y + b1 * z + c0 * f + c1 * g for y, z, f, g in zip(y0, y1, f0, f1, strict=True)]
-
-
-def straight_line(t0: float, y0: list[float], t1: float, y1: list[float], t: float) -> list[float]:
-    """State at time t on the straight line from y0 at t0 to y1 at t1."""
-    s = (t - t0) / (t1 - t0)
-    return [y + s * (z - y) for y, z in zip(y0, y1, strict=True)]
 
 
 def next_step_size(h: float, error: float, accuracy: float, cut: bool = False) -> float:

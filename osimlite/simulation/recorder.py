@@ -7,7 +7,7 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 from osimlite.simulation.engines.protocol import Engine
-from osimlite.simulation.integrators import Stepper
+from osimlite.simulation.stepper import Stepper
 
 TIME_OF_EVENT = 1e-9
 """How exactly the time of an event is found on the interpolated motion, s."""

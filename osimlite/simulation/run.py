@@ -20,9 +20,10 @@ from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson, Stepper
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import doubt_of, in_units_of
+from osimlite.simulation.stepper import Stepper
 from osimlite.simulation.trajectory import Report, Trajectory
 
 Progress = Callable[[float], object]

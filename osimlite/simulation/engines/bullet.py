@@ -27,9 +27,10 @@ from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.bullet_world import World, bullet
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.field import ForceField, own_coordinates
-from osimlite.simulation.integrators import Observer, Projection, RungeKuttaMerson, Stepper
+from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.solver import SingularMassError, tree_solver
 from osimlite.simulation.speeds import Speeds
+from osimlite.simulation.stepper import Observer, Projection, Stepper
 
 if TYPE_CHECKING:
     from osimlite.robot.visuals import Visuals

@@ -27,8 +27,8 @@ from osimlite.simulation.engines.bullet_file import excess
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.field import ForceField
-from osimlite.simulation.integrators import Observer, Stepper
 from osimlite.simulation.reduction import Reduction
+from osimlite.simulation.stepper import Observer, Stepper
 
 
 class ReducedBulletEngine(BulletEngine):

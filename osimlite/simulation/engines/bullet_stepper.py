@@ -8,7 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from osimlite.errors import SimulationError
-from osimlite.simulation.integrators import Observer, Stepper, straight_line
+from osimlite.simulation.stepper import Observer, Stepper, straight_line
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.bullet import BulletEngine

@@ -19,11 +19,12 @@ from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
 from osimlite.simulation.engines.protocol import FreeState, Settings
 from osimlite.simulation.euler import SemiImplicitEuler
-from osimlite.simulation.integrators import Observer, RungeKuttaMerson, Stepper
+from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.table import LAW_NUMBERS
+from osimlite.simulation.stepper import Observer, Stepper
 
 LOGGED_STEPS = 512
 """So many steps are taken in one call of a motion that is watched."""

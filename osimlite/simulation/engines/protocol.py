@@ -14,7 +14,8 @@ import numpy as np
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, Observer, Stepper
+from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
     from osimlite.robot.visuals import Visuals
