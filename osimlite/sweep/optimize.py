@@ -124,6 +124,10 @@ def optimize(
         raise SettingError("there is nothing to search: every variable has one value only")
     if budget < 1 or (popsize is not None and popsize < 2):
         raise SettingError("a search has a budget of at least one run, and a population of at least two")
+    if not 0 <= seed < 2**32:
+        raise SettingError(f"the seed is a whole number from 0 to {2**32 - 1}, not {seed}")
+    if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0.0):
+        raise SettingError(f"the tolerance is a number from 0 on, not {tolerance:g}")
     if not (isfinite(sigma) and sigma > 0.0):
         raise SettingError(f"the first search distance is positive, not {sigma:g}")
     names = [measure_name(spec) for spec in (objective.measure, *plan.measures)]
@@ -138,7 +142,9 @@ def optimize(
     where = make_folder(folder)
     with pool(plan, workers=workers, cluster=cluster) as workforce:
         evaluations = _Evaluations(plan, free, objective.sign, is_bounded, budget, workforce, progress)
-        partial = _open(where / HISTORY, schema(_columns(plan), wanted), resume, force, evaluations)
+        partial = _open(
+            where / HISTORY, schema(plan.columns("evaluation", "batch"), wanted), resume, force, evaluations
+        )
         evaluations.partial = partial
         try:
             ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
@@ -152,18 +158,6 @@ def optimize(
             partial.close()
         partial.finish()
     return _finish(where, plan, variants, evaluations, wanted, ended)
-
-
-def _columns(plan: Plan) -> dict[str, str]:
-    return {
-        "evaluation": "int64",
-        "batch": "int64",
-        **{item.name: "float64" for item in plan.variables},
-        "status": "string",
-        "reason": "string",
-        "time": "float64",
-        **{measure_name(spec): "float64" for spec in plan.measures},
-    }
 
 
 def _start(
@@ -237,11 +231,13 @@ class _Evaluations:
         columns = batch.to_pydict()
         values = [columns[item.name] for item in self.plan.variables]
         found = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
+        self.reasons += [word for word in columns["reason"] if word][: 10 - len(self.reasons)]
         self._history += [(list(row), status, value) for row, status, value in found]
 
     def ask(self, points: Floats) -> Floats:
-        """Costs (k,) of points (k, d) of the cube of the free variables."""
-        if self.count + len(points) > self.budget:
+        """Costs (k,) of points (k, d) of the cube of the free variables; of those that the budget allows at least."""
+        wanted, points = len(points), points[: self.budget - self.count]
+        if len(points) == 0:
             raise Enough
         values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
         for column, place in enumerate(self.free):
@@ -264,6 +260,8 @@ class _Evaluations:
         self.batches += 1
         if self.progress is not None:
             self.progress(self.count, self.budget)
+        if len(points) < wanted:
+            raise Enough
         return np.array(costs)
 
     def _cost(self, status: str, value: float) -> float:
@@ -303,8 +301,7 @@ def _finish(
     where: Path, plan: Plan, variants: Variants, evaluations: _Evaluations, wanted: dict[str, Any], ended: str
 ) -> Optimum:
     if evaluations.best is None:
-        first = evaluations.reasons[0] if evaluations.reasons else "the budget is smaller than one population"
-        raise SimulationError(f"no run came to its end: {first}")
+        raise SimulationError(f"no run came to its end: {evaluations.reasons[0]}")
     cost, number, row = evaluations.best
     variants.put(row)
     variants.set_start(row)

@@ -58,6 +58,7 @@ class Plan:
         engine: that computes it.
         accuracy: of the integrator.
         stops: what ends a run before.
+        is_planted: whether the walker is put on the ground with the deeper foot, at rest there, before each run.
         report_interval: time between the moments that a measure of one's own can look at (s), None for none.
         skip_unsupported: leave out forces that cannot be computed.
         make: makes the model from parameters, where some of them are varied.
@@ -71,6 +72,7 @@ class Plan:
     engine: str = "compiled"
     accuracy: float = DEFAULT_ACCURACY
     stops: tuple[Stop, ...] = ()
+    is_planted: bool = False
     report_interval: float | None = None
     skip_unsupported: bool = False
     make: Maker | None = None
@@ -100,6 +102,24 @@ class Plan:
         found: Plan = pickle.loads(zlib.decompress(data))
         return found
 
+    def columns(self, *first: str) -> dict[str, str]:
+        """Columns of a table of the runs, after some of whole numbers, and what they hold.
+
+        Raises:
+            SettingError: two of them have one name.
+        """
+        found = dict.fromkeys(first, "int64")
+        rest = [(item.name, "float64") for item in self.variables]
+        rest += [("status", "string"), ("reason", "string"), ("time", "float64")]
+        rest += [(measure_name(spec), "float64") for spec in dict.fromkeys(self.measures)]
+        for name, kind in rest:
+            if name in found:
+                raise SettingError(
+                    f"the results would have two columns '{name}'; call a coordinate by its path, a function otherwise"
+                )
+            found[name] = kind
+        return found
+
     def settings(self) -> dict[str, Any]:
         """All that the results depend on."""
         import hashlib
@@ -115,6 +135,7 @@ class Plan:
             "engine": self.engine,
             "accuracy": self.accuracy,
             "stops": [item.words for item in self.stops],
+            "planted": self.is_planted,
             "report_interval": self.report_interval,
             "skip_unsupported": self.skip_unsupported,
         }

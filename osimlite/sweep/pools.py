@@ -12,6 +12,7 @@ from multiprocessing import get_context
 from queue import SimpleQueue
 from typing import Any, Protocol
 
+import osimlite
 from osimlite._require import require
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.plan import Plan
@@ -160,6 +161,7 @@ class ClusterPool:
 
     def __init__(self, plan: Plan, address: str) -> None:
         distributed = require("distributed", extra="sweep", purpose="a sweep on a cluster")
+        _check_address(address)
         Runner(plan)
         self._packed, self._address = plan.packed(), address
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
@@ -192,7 +194,7 @@ class ClusterPool:
         self._submit(tag, values, 0)
 
     def _submit(self, tag: Any, values: Floats, losses: int) -> None:
-        future = self._client.submit(run_packed, self._packed, values, pure=False)
+        future = self._client.submit(run_packed, self._packed, values, osimlite.__version__, pure=False)
         self._tasks[future.key] = tag, values, losses, future
         future.add_done_callback(self._done.put)
 
@@ -213,10 +215,15 @@ class ClusterPool:
                 self._submit(tag, values, losses + 1)
             except (CancelledError, OSError, TimeoutError):
                 raise self._lost() from None
+            except OsimliteError:
+                raise
             except Exception as error:
                 if type(error).__name__ in ("FutureCancelledError", "CommClosedError"):
                     raise self._lost() from None
-                raise
+                raise OsimliteError(
+                    f"a worker cannot do its task ({type(error).__name__}: {error}); it needs the modules that are "
+                    "here, then go on with --resume"
+                ) from error
 
     def _lost(self) -> ClusterLostError:
         return ClusterLostError(f"the Dask scheduler at '{self._address}' has gone; go on with --resume")
@@ -226,6 +233,18 @@ class ClusterPool:
         # Futures that are let go are cancelled.
         self._tasks.clear()
         self._client.close()
+
+
+def _check_address(address: str) -> None:
+    """Stop before a client is made, which takes long to give up."""
+    core = require("distributed.core", extra="sweep", purpose="a sweep on a cluster")
+    comm = require("distributed.comm", extra="sweep", purpose="a sweep on a cluster")
+    try:
+        comm.get_address_host_port(core.coerce_to_address(address))
+    except ValueError as error:
+        raise SettingError(
+            f"'{address}' is no address of a Dask scheduler ({error}); give one such as tcp://127.0.0.1:8786"
+        ) from None
 
 
 def _next(queue: SimpleQueue[Any], timeout: float | None) -> Any:
@@ -248,8 +267,16 @@ def _thread_runner(plan: Plan) -> Runner:
     return kept
 
 
-def run_packed(packed: bytes, values: Floats) -> Block:
-    """Run samples of a packed plan; what a worker of a cluster does."""
+def run_packed(packed: bytes, values: Floats, version: str | None = None) -> Block:
+    """Run samples of a packed plan; what a worker of a cluster does.
+
+    Raises:
+        OsimliteError: this is not the version of osimlite that the plan was made by, or a sample cannot be run.
+    """
+    if version not in (None, osimlite.__version__):
+        raise OsimliteError(
+            f"a worker has osimlite {osimlite.__version__}, and the sweep was begun by {version}; install the same"
+        )
     if getattr(_local, "packed", None) != packed:
         _local.packed, _local.plan = packed, Plan.unpacked(packed)
     return _thread_runner(_local.plan).run(values)

@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -113,7 +113,7 @@ class Partial:
 
     Raises:
         SettingError: there is a partial file already, or one with other settings.
-        OsimliteError: it cannot be written.
+        OsimliteError: it cannot be written, or another program is writing it.
     """
 
     def __init__(self, path: Path, table: Any, *, resume: bool = False) -> None:
@@ -125,11 +125,17 @@ class Partial:
         if is_there and not resume:
             raise SettingError(f"an interrupted sweep is in '{self.partial}'; go on with --resume, or remove that file")
         try:
-            if is_there:
-                self._reopen()
-            else:
-                self.partial.write_bytes(table.serialize().to_pybytes())
             self._stream = self.partial.open("ab")
+            try:
+                _lock(self._stream, self.partial)
+                if is_there:
+                    self._reopen()
+                else:
+                    self._stream.write(table.serialize().to_pybytes())
+                    self._stream.flush()
+            except BaseException:
+                self._stream.close()
+                raise
         except OSError as error:
             raise OsimliteError(f"cannot write here: {error.strerror}", file=str(self.partial)) from None
 
@@ -141,8 +147,13 @@ class Partial:
         ]
         batch = pa.record_batch(arrays, schema=self.schema)
         with undisturbed():
-            self._stream.write(batch.serialize().to_pybytes())
-            self._stream.flush()
+            try:
+                self._stream.write(batch.serialize().to_pybytes())
+                self._stream.flush()
+            except OSError as error:
+                raise OsimliteError(
+                    f"cannot write here: {error.strerror}; make room, then go on with --resume", file=str(self.partial)
+                ) from None
             self.rows += batch.num_rows
 
     def read(self, take: Callable[[Any], object]) -> None:
@@ -187,7 +198,9 @@ class Partial:
 
     def close(self) -> None:
         """Let go of the file, and leave it as it is; one without rows is removed."""
-        self._stream.close()
+        with suppress(OSError):
+            # What was lost to a full disk has been told of.
+            self._stream.close()
         if self.rows == 0:
             self.partial.unlink(missing_ok=True)
 
@@ -214,6 +227,23 @@ class Partial:
 
     def _count(self, batch: Any) -> None:
         self.rows += batch.num_rows
+
+
+def _lock(stream: Any, path: Path) -> None:
+    """Keep other programs from writing a file until it is closed, where the system can."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise OsimliteError(
+            "this file is being written by another program; wait until it has ended", file=str(path)
+        ) from None
+    except OSError:
+        # Not every file system knows locks.
+        return
 
 
 def _batches(stream: Any, take: Callable[[Any], object]) -> int:

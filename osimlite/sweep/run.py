@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import Partial, partial_of, schema, spare, undisturbed
@@ -126,14 +125,7 @@ def sweep(
 
 def columns(plan: Plan) -> dict[str, str]:
     """The columns of the results, and what they hold."""
-    return {
-        "run": "int64",
-        **{item.name: "float64" for item in plan.variables},
-        "status": "string",
-        "reason": "string",
-        "time": "float64",
-        **{measure_name(spec): "float64" for spec in plan.measures},
-    }
+    return plan.columns("run")
 
 
 class _Work:

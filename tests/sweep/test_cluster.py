@@ -13,7 +13,7 @@ from contextlib import contextmanager
 import pytest
 
 import osimlite
-from osimlite.errors import OsimliteError
+from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.run import sweep
@@ -151,6 +151,12 @@ def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     chosen = samples(made.variables, "random", 10)
     with pytest.raises(OsimliteError, match=r"no Dask scheduler at 'tcp://127.0.0.1:1'.*dask scheduler"):
         sweep(made, chosen, tmp_path / "r.parquet", cluster="tcp://127.0.0.1:1")
+    for address, words in (
+        ("scheduler", "'scheduler' is no address .*missing port.*tcp://127.0.0.1:8786"),
+        ("http://127.0.0.1:8786", "unknown address scheme"),
+    ):
+        with pytest.raises(SettingError, match=words):
+            sweep(made, chosen, tmp_path / "r.parquet", cluster=address)
     with pytest.raises(OsimliteError, match="leave out --workers"):
         sweep(made, chosen, tmp_path / "r.parquet", cluster="tcp://127.0.0.1:1", workers=2)
     assert not list(tmp_path.iterdir())
@@ -172,3 +178,44 @@ def test_functions_that_cannot_travel_are_told(cluster, walker, tmp_path):
         sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
     # Threads of this process need to send nothing.
     assert sweep(made, chosen, tmp_path / "r.parquet").status == {"done": 10}
+
+
+def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, monkeypatch):
+    """A module that is on this machine's path only, and another version of osimlite."""
+    (tmp_path / "only_here.py").write_text("def one(run):\n    return 1.0\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    from only_here import one
+
+    chosen = samples(plan(walker, {"RHip_rz": (0.3, 0.7)}).variables, "random", 10)
+    for measure in (one, "only_here:one"):
+        made = plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=(measure,), to=0.1)
+        with pytest.raises(OsimliteError, match="only_here"):
+            sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
+    monkeypatch.setattr("osimlite.__version__", "0.0.1")
+    made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.1)
+    with pytest.raises(OsimliteError, match=r"a worker has osimlite .*, and the sweep was begun by 0\.0\.1"):
+        sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
+    assert not list(tmp_path.glob("*.parquet*"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="sends signals")
+def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(tmp_path_factory, walker, tmp_path, monkeypatch):
+    lost = Cluster(tmp_path_factory.mktemp("lost"))
+    try:
+        monkeypatch.syspath_prepend(str(lost.folder))
+        made = plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=("distance", "patience:ended"), to=0.3)
+        chosen = samples(made.variables, "random", 3000)
+
+        def end(done, of):
+            if done > 40:
+                lost.processes[0].kill()
+
+        monkeypatch.setattr("osimlite.sweep.pools.PATIENCE", 5)
+        with pytest.raises(OsimliteError, match="has gone; go on with --resume"):
+            sweep(made, chosen, tmp_path / "r.parquet", cluster=lost.address, progress=end)
+    finally:
+        lost.close()
+    few = sweep(made, chosen, tmp_path / "r.parquet", resume=True)
+    assert few.before > 0 and few.before + few.status["done"] == 3000
+    whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
+    assert (tmp_path / "r.parquet").read_bytes() == whole

@@ -120,6 +120,18 @@ def test_another_search_is_spared_unless_forced(made, tmp_path):
     assert pq.read_table(other.history).num_rows == 8
 
 
+@pytest.mark.parametrize("method", ["cma", "differential-evolution"])
+def test_every_run_that_is_allowed_is_made(made, tmp_path, method):
+    whole = optimize(made, DISTANCE, tmp_path / "whole", method=method, budget=20, popsize=8)
+    assert whole.evaluations == 20
+    few = optimize(made, DISTANCE, tmp_path / "two", method=method, budget=3, popsize=8)
+    table = pq.read_table(few.history).to_pydict()
+    assert few.evaluations == 3 and few.value == max(table["distance"]) and table["batch"] == [0, 0, 0]
+    optimize(made, DISTANCE, tmp_path / "two", method=method, budget=11, popsize=8, resume=True)
+    optimize(made, DISTANCE, tmp_path / "two", method=method, budget=20, popsize=8, resume=True)
+    assert (tmp_path / "two" / HISTORY).read_bytes() == (tmp_path / "whole" / HISTORY).read_bytes()
+
+
 def least_drop(run):
     """How far the pelvis comes down, m, and a penalty for starting fast."""
     return run.start["Pelvis_ty"] - run.end["Pelvis_ty"] + run.values["Pelvis_tx/speed"]
@@ -174,6 +186,9 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
         ("budget of at least one", {"budget": 0}),
         ("population of at least two", {"popsize": 1}),
         ("is positive", {"sigma": 0.0}),
+        ("seed is a whole number", {"seed": -1}),
+        ("tolerance is", {"tolerance": -1.0}),
+        ("tolerance is", {"tolerance": float("nan")}),
         ("outside 0.2 to 0.9", {"start": [5.0, 0.0, 1.0]}),
         ("one number for each of the 3", {"start": [5.0]}),
         ("stays within", {"method": "differential-evolution", "is_bounded": False}),

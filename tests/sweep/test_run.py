@@ -163,6 +163,43 @@ def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
     assert ranges(tmp_path / "one", ["x"])["x"] == (0.0, 0, 18.0, 36, 9.0)
 
 
+def test_a_column_has_a_name_of_its_own(walker, tmp_path):
+    made = plan(walker, {"RHip_rz/speed": (0.0, 1.0)}, measures=("RHip_rz/speed",), to=0.1)
+    with pytest.raises(SettingError, match="two columns 'RHip_rz/speed'"):
+        sweep(made, samples(made.variables, "random", 4), tmp_path / "r.parquet")
+    assert not list(tmp_path.iterdir())
+    path = "/jointset/RightThighToPelvis/RHip_rz/speed"
+    made = plan(walker, {"RHip_rz/speed": (0.0, 1.0)}, measures=(path,), to=0.1)
+    sweep(made, samples(made.variables, "random", 4), tmp_path / "r.parquet")
+    assert {"RHip_rz/speed", path} < set(pq.read_table(tmp_path / "r.parquet").column_names)
+
+
+def test_one_program_at_a_time_writes(made, tmp_path):
+    """Who goes on with a sweep that is still running would write rows twice."""
+    path, chosen = tmp_path / "r.parquet", samples(made.variables, "sobol", 40, 5)
+    told = []
+
+    def interfere(done, of):
+        if done and not told:
+            with pytest.raises(OsimliteError) as error:
+                sweep(made, chosen, path, resume=True)
+            told.append(error.value.message)
+
+    sweep(made, chosen, path, progress=interfere)
+    assert "is being written" in told[0] and pq.read_table(path)["run"].to_pylist() == list(range(40))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+def test_a_full_disk_is_told(tmp_path):
+    partial = Partial(tmp_path / "r", schema({"run": "int64"}, {}))
+    partial.add([[0, 1]])
+    partial._stream.close()
+    partial._stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
+    with pytest.raises(OsimliteError, match="No space left on device; make room, then go on with --resume"):
+        partial.add([[2, 3]])
+    partial.close()
+
+
 def test_differences_in_words():
     assert differences({"a": 1, "b": [1]}, {"a": 2, "b": [2], "c": 3}) == [
         "a (1 before, 2 now)",
