@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import osimlite
-
-
-def run(*arguments: str, folder: Path | None = None) -> tuple[int, str, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "osimlite", *arguments], capture_output=True, text=True, cwd=folder, check=False
-    )
-    assert "Traceback" not in done.stderr
-    return done.returncode, done.stdout, done.stderr
+from tests.cli.command import run
 
 
 def test_build_writes_the_walker(tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,17 +10,13 @@ import pytest
 from osimlite.document.reader import read
 from osimlite.errors import NotWellFormedError
 from osimlite.lint import validate
+from tests.cli.command import run
 
 WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 
 
-def run(*arguments):
-    command = [sys.executable, "-m", "osimlite", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120)
-
-
 def test_info_breaks_no_name_and_says_units():
-    lines = run("info", WALKER).stdout.splitlines()
+    lines = run("info", WALKER).out.splitlines()
     assert "  RightThighToPelvis (PinJoint)" in lines
     assert "    RHip_rz        0.5236 rad  -1.745 to 1.745 rad" in lines
     assert "    Pelvis_tx           0 m    0 to 10 m" in lines
@@ -33,12 +27,12 @@ def test_info_breaks_no_name_and_says_units():
 def test_format_says_when_there_is_nothing_to_do(tmp_path):
     path = tmp_path / "walker.osim"
     shutil.copy(WALKER, path)
-    assert run("format", path).stdout == f"reformatted {path}\n"
+    assert run("format", path).out == f"reformatted {path}\n"
     for option in ((), ("--check",), ("--diff",)):
         done = run("format", path, *option)
-        assert (done.returncode, done.stdout, done.stderr) == (0, "", "1 file is formatted already\n")
+        assert (done.code, done.out, done.err) == (0, "", "1 file is formatted already\n")
     done = run("format", path, path)
-    assert done.stderr == "2 files are formatted already\n"
+    assert done.err == "2 files are formatted already\n"
 
 
 @pytest.mark.parametrize(
@@ -51,5 +45,5 @@ def test_every_command_names_the_same_place_of_a_syntax_error(old, new, tmp_path
         read(path)
     finding = next(finding for finding in validate(path) if finding.code == "OSIM001")
     assert (finding.line, finding.column) == (caught.value.line, caught.value.column)
-    assert f"{path}:{finding.line}:{finding.column}: not well-formed XML" in run("info", path).stderr
+    assert f"{path}:{finding.line}:{finding.column}: not well-formed XML" in run("info", path).err
     assert "only tags and values above line" in finding.message

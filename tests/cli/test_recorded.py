@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from osimlite.simulation.storage import read_sto, write_sto
+from tests.cli.command import run
 
 pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
-
-
-def _run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "osimlite", *words], capture_output=True, text=True, cwd=folder, check=False
-    )
 
 
 def test_the_walker_in_a_recorded_motion(fixtures: Path, tmp_path: Path) -> None:
@@ -24,19 +17,19 @@ def test_the_walker_in_a_recorded_motion(fixtures: Path, tmp_path: Path) -> None
     times = [0.01 * k for k in range(20)]
     rows = [[0.1 * t, 30.0 * t * t, 2.0] for t in times]
     write_sto(tmp_path / "walk.mot", "walk", times, ("Pelvis_tx", "RKnee_rz", "emg"), rows, in_degrees=True)
-    done = _run(tmp_path, "kinematics", walker, "walk.mot", "-o", "out")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "columns that name no coordinate, ignored: emg" in done.stdout
+    done = run("kinematics", walker, "walk.mot", "-o", "out", folder=tmp_path)
+    assert (done.code, done.err) == (0, "")
+    assert "columns that name no coordinate, ignored: emg" in done.out
     bodies = read_sto(tmp_path / "out" / "bodies.sto")
     assert bodies.in_degrees
     assert bodies["RightShank_Oz"] - bodies["RightThigh_Oz"] == pytest.approx([row[1] for row in rows], abs=1e-9)
-    done = _run(tmp_path, "inverse-dynamics", walker, "walk.mot", "-o", "out")
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run("inverse-dynamics", walker, "walk.mot", "-o", "out", folder=tmp_path)
+    assert (done.code, done.err) == (0, "")
     forces = read_sto(tmp_path / "out" / "inverse_dynamics.sto")
     assert forces["Pelvis_ty_force"][0] == pytest.approx(5.0 * 9.80665, rel=0.2)
-    done = _run(tmp_path, "kinematics", walker, "nothing.mot")
-    assert done.returncode == 2
-    assert "nothing.mot: cannot read the file" in done.stderr
+    done = run("kinematics", walker, "nothing.mot", folder=tmp_path)
+    assert done.code == 2
+    assert "nothing.mot: cannot read the file" in done.err
 
 
 LOADS = """<OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects><ExternalForce name="push">
@@ -53,28 +46,28 @@ def test_measured_forces(fixtures: Path, tmp_path: Path) -> None:
     (tmp_path / "loads.xml").write_text(LOADS.format(body="Pelvis"))
     lifted = []
     for words in ((), ("--external-loads", "loads.xml")):
-        done = _run(tmp_path, "inverse-dynamics", walker, "still.mot", "-o", "out", *words)
-        assert (done.returncode, done.stderr) == (0, "")
+        done = run("inverse-dynamics", walker, "still.mot", "-o", "out", *words, folder=tmp_path)
+        assert (done.code, done.err) == (0, "")
         lifted.append(read_sto(tmp_path / "out" / "inverse_dynamics.sto")["Pelvis_ty_force"])
     # The platform is tilted by 10 degrees.
     assert lifted[0] - lifted[1] == pytest.approx(7.0 * 0.984807753, rel=1e-6)
-    done = _run(tmp_path, "simulate", walker, "--to", "0.01", "-o", "out", "--external-loads", "loads.xml")
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run("simulate", walker, "--to", "0.01", "-o", "out", "--external-loads", "loads.xml", folder=tmp_path)
+    assert (done.code, done.err) == (0, "")
     assert read_sto(tmp_path / "out" / "forces.sto")["Pelvis_push_Fy"] == pytest.approx(7.0)
     (tmp_path / "loads.xml").write_text(LOADS.format(body="Pelvic"))
     for command in (("simulate", walker), ("inverse-dynamics", walker, "still.mot")):
-        done = _run(tmp_path, *command, "-o", "out", "--external-loads", "loads.xml")
-        assert done.returncode == 1
-        assert "loads.xml: the applied_to_body of 'push' is 'Pelvic'" in done.stderr
-        assert "did you mean 'Pelvis'?" in done.stderr
+        done = run(*command, "-o", "out", "--external-loads", "loads.xml", folder=tmp_path)
+        assert done.code == 1
+        assert "loads.xml: the applied_to_body of 'push' is 'Pelvic'" in done.err
+        assert "did you mean 'Pelvis'?" in done.err
 
 
 def test_markers_as_trc(fixtures: Path, tmp_path: Path) -> None:
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
     write_sto(tmp_path / "still.mot", "still", [0.0, 0.5], ("Pelvis_tx",), [[0.1], [0.2]])
-    done = _run(tmp_path, "kinematics", str(walker), "still.mot", "-o", "out", "--trc")
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run("kinematics", str(walker), "still.mot", "-o", "out", "--trc", folder=tmp_path)
+    assert (done.code, done.err) == (0, "")
     lines = (tmp_path / "out" / "markers.trc").read_text().splitlines()
     assert lines[0] == "PathFileType\t4\t(X/Y/Z)\tmarkers.trc"
     assert lines[2].split("\t")[:4] == ["2", "2", "2", "0"]
-    assert "markers.trc" in done.stdout
+    assert "markers.trc" in done.out

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from osimlite.errors import OsimliteError
 from osimlite.simulation import read_sto
+from tests.cli.command import run
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 
@@ -20,23 +19,9 @@ def walker(fixtures: Path) -> str:
     return str(fixtures / "walker" / "DynamicWalkerModel.osim")
 
 
-def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "osimlite", "simulate", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        check=False,
-        env={"PATH": "", "COLUMNS": "80", "PYTHONPATH": str(Path(__file__).parents[2])},
-    )
-    assert "Traceback" not in done.stderr
-    return done.returncode, done.stdout, done.stderr
-
-
 def test_files_and_table(walker, tmp_path):
-    code, out, err = run(
-        walker, "--to", "0.5", "--set", "RHip_rz=40deg", "--set-speed", "LKnee_rz=-1.5", "-o", "r", folder=tmp_path
-    )
+    start = "--set", "RHip_rz=40deg", "--set-speed", "LKnee_rz=-1.5"
+    code, out, err = run("simulate", walker, "--to", "0.5", *start, "-o", "r", folder=tmp_path)
     assert (code, err) == (0, "")
     assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["forces.sto", "states.sto", "summary.json"]
     states = read_sto(tmp_path / "r" / "states.sto")
@@ -48,7 +33,9 @@ def test_files_and_table(walker, tmp_path):
 
 
 def test_fixed_step(walker, tmp_path):
-    code, out, _ = run(walker, "--to", "0.1", "--fixed-step", "1e-3", "--report-interval", "0.05", folder=tmp_path)
+    code, out, _ = run(
+        "simulate", walker, "--to", "0.1", "--fixed-step", "1e-3", "--report-interval", "0.05", folder=tmp_path
+    )
     assert code == 0 and "100 of 100" in out
     assert len(read_sto(tmp_path / "states.sto").times) == 3
 
@@ -70,7 +57,7 @@ def test_fixed_step(walker, tmp_path):
     ],
 )
 def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, arguments, code, words):
-    found, out, err = run(walker, *arguments, "-o", "r", folder=tmp_path)
+    found, out, err = run("simulate", walker, *arguments, "-o", "r", folder=tmp_path)
     assert found == code and out == ""
     assert len(err.splitlines()) == 1 and words in err
     assert list(tmp_path.iterdir()) == []
@@ -81,9 +68,9 @@ def test_unsupported_force(walker, tmp_path):
     motor = '<ActivationCoordinateActuator name="motor"><coordinate>RHip_rz</coordinate></ActivationCoordinateActuator>'
     place = text.index("<objects>", text.index("<ForceSet")) + len("<objects>")
     (tmp_path / "m.osim").write_text(text[:place] + motor + text[place:])
-    code, _, err = run("m.osim", folder=tmp_path)
+    code, _, err = run("simulate", "m.osim", folder=tmp_path)
     assert code == 1 and "/forceset/motor" in err and "--skip-unsupported" in err
-    code, out, _ = run("m.osim", "--skip-unsupported", "--to", "0.1", folder=tmp_path)
+    code, out, _ = run("simulate", "m.osim", "--skip-unsupported", "--to", "0.1", folder=tmp_path)
     assert code == 0 and "left out" in out
 
 
@@ -102,12 +89,12 @@ def test_pictures_fail_as_a_whole(walker, tmp_path, monkeypatch):
 
 
 def test_degrees_taken_for_radians_are_warned_of(walker, tmp_path):
-    code, _, err = run(walker, "--to", "0.01", "--set", "RHip_rz=400", folder=tmp_path)
+    code, _, err = run("simulate", walker, "--to", "0.01", "--set", "RHip_rz=400", folder=tmp_path)
     assert code == 0
     assert err == (
         "osimlite: warning: RHip_rz = 400 is in rad, and outside its range of -1.75 to 1.75 rad; did you mean 400deg?\n"
     )
     for value in ("40deg", "500deg"):
         words = ("--set", f"RHip_rz={value}", "--set-speed", "RHip_rz=7")
-        code, _, err = run(walker, "--to", "0.01", *words, folder=tmp_path)
+        code, _, err = run("simulate", walker, "--to", "0.01", *words, folder=tmp_path)
         assert (code, err) == (0, "")

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,23 +11,7 @@ import pytest
 import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.geometry import Mesh
-
-
-def run(*arguments: str, folder: Path) -> tuple[int, str, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "osimlite", "translate", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        check=False,
-        env={
-            "PATH": "",
-            "PYTHONPATH": str(Path(osimlite.__file__).parents[1]),
-            "OSIMLITE_GEOMETRY": os.environ.get("OSIMLITE_GEOMETRY", ""),
-        },
-    )
-    assert "Traceback" not in done.stderr
-    return done.returncode, done.stdout, done.stderr
+from tests.cli.command import run
 
 
 def urdf_records(folder: Path) -> str:
@@ -46,7 +27,7 @@ def walker(tmp_path: Path) -> Path:
 
 
 def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
-    code, out, _ = run("walker.osim", "--to", "urdf", "-o", "robot", folder=walker)
+    code, out, _ = run("translate", "walker.osim", "--to", "urdf", "-o", "robot", folder=walker)
     assert code == 0
     assert (walker / "robot/DynamicWalkerModel.urdf").read_text().startswith("<?xml")
     assert (walker / "robot/meshes/ellipsoid.obj").exists()
@@ -60,13 +41,13 @@ def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
 
 
 def test_translate_takes_options(walker: Path) -> None:
-    code, out, _ = run("walker.osim", "--limits", "range", "--merge", folder=walker)
+    code, out, _ = run("translate", "walker.osim", "--limits", "range", "--merge", folder=walker)
     assert code == 0 and "8 links, 7 joints of which 7 move" in out
     assert '<joint name="RKnee_rz" type="revolute">' in (walker / "DynamicWalkerModel.urdf").read_text()
 
 
 def test_translate_writes_collision_shapes_and_limits(walker: Path) -> None:
-    code, _, _ = run("walker.osim", "--collision", "--effort", "50", "--velocity", "7", folder=walker)
+    code, _, _ = run("translate", "walker.osim", "--collision", "--effort", "50", "--velocity", "7", folder=walker)
     text = (walker / "DynamicWalkerModel.urdf").read_text()
     assert code == 0 and "collision box of 1 x 200 x 200 m" in urdf_records(walker)
     assert "<collision " in text and 'effort="50" velocity="7"' in text
@@ -85,7 +66,7 @@ def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
     osimlite.write(model, tmp_path / "bones.osim")
     monkeypatch.setenv("OSIMLITE_GEOMETRY", "nowhere:strips")
     (tmp_path / "osimlite.toml").write_text('mesh-paths = ["binary"]\n')
-    code, out, _ = run("bones.osim", "--geometry", "ascii", "-o", "robot", folder=tmp_path)
+    code, out, _ = run("translate", "bones.osim", "--geometry", "ascii", "-o", "robot", folder=tmp_path)
     assert code == 0 and "VTK's format" in out
     assert sorted(path.name for path in (tmp_path / "robot/meshes").iterdir()) == [
         "ascii.obj",
@@ -106,7 +87,7 @@ def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(walker: Path, arguments: tuple[str, ...], said: str) -> None:
-    code, out, error = run(*arguments, folder=walker)
+    code, out, error = run("translate", *arguments, folder=walker)
     assert code == 2 and out == ""
     assert said in error and len(error.splitlines()) == 1
 
@@ -116,6 +97,6 @@ def test_a_model_that_is_no_mechanism_is_refused(walker: Path) -> None:
     (walker / "loose.osim").write_text(
         text.replace("/bodyset/RightShank</socket_parent>", "/bodyset/RightShnk</socket_parent>")
     )
-    code, _, error = run("loose.osim", "-o", "robot", folder=walker)
+    code, _, error = run("translate", "loose.osim", "-o", "robot", folder=walker)
     assert code == 1 and "did you mean '/bodyset/RightShank'" in error
     assert not (walker / "robot").exists()

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from osimlite.lint.engine import all_rules
+from tests.cli.command import run
 
 WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
-
-
-def run(*arguments, text=""):
-    command = [sys.executable, "-m", "osimlite", *map(str, arguments)]
-    return subprocess.run(command, input=text, capture_output=True, text=True, encoding="utf-8", timeout=120)
 
 
 @pytest.fixture
@@ -28,28 +22,28 @@ def faulty(tmp_path):
 
 def test_a_sound_model_is_exit_0():
     done = run("validate", WALKER, "--format", "concise")
-    assert done.returncode == 0 and done.stderr == ""
-    assert done.stdout.endswith(" info in 1 model.\n")
+    assert done.code == 0 and done.err == ""
+    assert done.out.endswith(" info in 1 model.\n")
 
 
 def test_an_error_is_exit_1(faulty):
     done = run("validate", faulty)
-    assert done.returncode == 1
-    assert "OSIM301" in done.stdout and "did you mean 'RFootContact'?" in done.stdout
-    assert "^^^^^^^^^^^" in done.stdout and "\033" not in done.stdout
+    assert done.code == 1
+    assert "OSIM301" in done.out and "did you mean 'RFootContact'?" in done.out
+    assert "^^^^^^^^^^^" in done.out and "\033" not in done.out
 
 
 def test_fail_on_and_select_and_ignore(faulty):
-    assert run("validate", WALKER, "--fail-on", "info").returncode == 1
-    assert run("validate", WALKER, "--fail-on", "warning").returncode == 0
-    assert run("validate", faulty, "--ignore", "OSIM3").returncode == 0
-    assert run("validate", faulty, "--select", "OSIM1,physics").returncode == 0
+    assert run("validate", WALKER, "--fail-on", "info").code == 1
+    assert run("validate", WALKER, "--fail-on", "warning").code == 0
+    assert run("validate", faulty, "--ignore", "OSIM3").code == 0
+    assert run("validate", faulty, "--select", "OSIM1,physics").code == 0
 
 
 def test_json_from_standard_input(faulty):
     done = run("validate", "-", "--format", "json", text=faulty.read_text())
-    findings = json.loads(done.stdout)
-    assert done.returncode == 1
+    findings = json.loads(done.out)
+    assert done.code == 1
     assert {finding["code"] for finding in findings} == {"OSIM301", "OSIM508"}
     assert {finding["file"] for finding in findings} == {"<stdin>"}
 
@@ -58,10 +52,10 @@ def test_a_folder_is_every_model_below(faulty):
     (faulty.parent / "sub").mkdir()
     (faulty.parent / "sub" / "other.osim").write_text("<OpenSimDocument/>")
     done = run("validate", faulty.parent, "--statistics")
-    assert done.returncode == 1
-    assert "1  OSIM301  unresolved-reference" in done.stdout
-    assert "1  OSIM004  document-version" in done.stdout
-    assert done.stdout.endswith("in 2 models.\n")
+    assert done.code == 1
+    assert "1  OSIM301  unresolved-reference" in done.out
+    assert "1  OSIM004  document-version" in done.out
+    assert done.out.endswith("in 2 models.\n")
 
 
 @pytest.mark.parametrize(
@@ -76,21 +70,21 @@ def test_a_folder_is_every_model_below(faulty):
 )
 def test_what_cannot_be_carried_out_is_exit_2_and_one_sentence(arguments, words):
     done = run(*arguments)
-    assert done.returncode == 2
-    assert words in done.stderr and "Traceback" not in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+    assert done.code == 2
+    assert words in done.err and "Traceback" not in done.err
+    assert len(done.err.strip().splitlines()) == 1
 
 
 def test_the_table_and_the_page_of_a_rule():
-    table = run("rule").stdout
+    table = run("rule").out
     assert "OSIM301  unresolved-reference" in table
-    page = run("rule", "osim301").stdout
+    page = run("rule", "osim301").out
     assert page.startswith("# unresolved-reference (OSIM301)\n\nSeverity: error\nFix: sometimes")
     assert "## Use instead" in page
 
 
 def test_the_table_of_rules_fits_a_terminal():
-    lines = run("rule").stdout.splitlines()
+    lines = run("rule").out.splitlines()
     assert max(map(len, lines)) <= 80
     assert sum(line.startswith("OSIM") for line in lines) == len(all_rules())
 
@@ -99,13 +93,13 @@ def test_what_is_no_certain_mend_is_named(tmp_path):
     path = tmp_path / "walker.osim"
     path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "RFotContact PlatformContact"))
     shown = run("validate", path, "--fix", "--diff")
-    assert shown.returncode == 0 and not shown.stdout
-    assert shown.stderr == f"{path}: nothing can be mended with certainty; --unsafe-fixes would mend 1 place.\n"
+    assert shown.code == 0 and not shown.out
+    assert shown.err == f"{path}: nothing can be mended with certainty; --unsafe-fixes would mend 1 place.\n"
     mended = run("validate", path, "--fix")
-    assert mended.stderr == "Mended 0 places; --unsafe-fixes would mend 1 place more.\n"
-    assert "1 more by --unsafe-fixes" in mended.stdout or "1 is mended by --unsafe-fixes" in mended.stdout
+    assert mended.err == "Mended 0 places; --unsafe-fixes would mend 1 place more.\n"
+    assert "1 more by --unsafe-fixes" in mended.out or "1 is mended by --unsafe-fixes" in mended.out
     clean = run("validate", WALKER, "--diff")
-    assert clean.returncode == 0 and clean.stderr == f"{WALKER}: nothing to mend.\n"
+    assert clean.code == 0 and clean.err == f"{WALKER}: nothing to mend.\n"
 
 
 def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):
@@ -113,31 +107,31 @@ def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):
     path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "rfootcontact PlatformContact"))
     before = path.read_text()
     shown = run("validate", path, "--diff")
-    assert shown.returncode == 1 and path.read_text() == before
-    assert "+++" in shown.stdout and "RFootContact PlatformContact" in shown.stdout
+    assert shown.code == 1 and path.read_text() == before
+    assert "+++" in shown.out and "RFootContact PlatformContact" in shown.out
     done = run("validate", path, "--fix")
-    assert done.returncode == 0 and "Mended 1 place." in done.stderr
+    assert done.code == 0 and "Mended 1 place." in done.err
     assert path.read_text() == WALKER.read_text()
 
 
 def test_unsafe_fixes_must_be_asked_for(faulty):
     before = faulty.read_text()
-    assert run("validate", faulty, "--fix").returncode == 1
+    assert run("validate", faulty, "--fix").code == 1
     assert faulty.read_text() == before
-    assert run("validate", faulty, "--unsafe-fixes").returncode == 0
+    assert run("validate", faulty, "--unsafe-fixes").code == 0
     assert faulty.read_text() == WALKER.read_text()
 
 
 def test_a_baseline_lets_an_old_repository_begin(faulty):
     baseline = faulty.parent / "baseline.json"
-    assert run("validate", faulty, "--write-baseline", baseline).returncode == 0
+    assert run("validate", faulty, "--write-baseline", baseline).code == 0
     done = run("validate", faulty, "--baseline", baseline)
-    assert done.returncode == 0 and done.stdout == "Nothing found in 1 model.\n"
+    assert done.code == 0 and done.out == "Nothing found in 1 model.\n"
 
 
 def test_settings_of_the_project_hold(faulty):
     (faulty.parent / "pyproject.toml").write_text('[tool.osimlite]\nignore = ["OSIM3", "OSIM5"]\nfail-on = "info"\n')
-    assert run("validate", faulty).returncode == 0
+    assert run("validate", faulty).code == 0
     (faulty.parent / "pyproject.toml").write_text("[tool.osimlite]\nignores = []\n")
     done = run("validate", faulty)
-    assert done.returncode == 2 and "did you mean 'ignore'?" in done.stderr
+    assert done.code == 2 and "did you mean 'ignore'?" in done.err
