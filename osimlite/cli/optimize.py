@@ -27,13 +27,17 @@ def optimize(
     ],
     vary: sweeping.Vary = None,
     budget: Annotated[int, typer.Option(metavar="N", help="How many runs are allowed.")] = 1000,
-    method: Annotated[str, typer.Option(help="cma, differential-evolution or nelder-mead.")] = "cma",
+    method: Annotated[str, typer.Option(help="sobol-cma, cma, differential-evolution or nelder-mead.")] = "sobol-cma",
     popsize: Annotated[
         int | None, typer.Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
     ] = None,
     sigma: Annotated[
-        float, typer.Option(help="How far from the start to look at first, as a fraction of the ranges.")
-    ] = 0.25,
+        float | None,
+        typer.Option(
+            help="How far from where it begins the method looks at first, as a fraction of the ranges.",
+            show_default="0.15 for sobol-cma, else 0.25",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
     maximize: Annotated[
         bool | None, typer.Option("--maximize/--minimize", help="What is better.", show_default="see --objective")

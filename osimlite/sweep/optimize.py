@@ -21,7 +21,7 @@ from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.runner import FAILED, Block
-from osimlite.sweep.search import Enough, Search, method_named
+from osimlite.sweep.search import FIRST_REACH, Enough, Search, method_named
 from osimlite.sweep.variables import Floats
 from osimlite.sweep.variants import Variants
 
@@ -79,11 +79,11 @@ def optimize(
     objective: Objective,
     folder: str | Path,
     *,
-    method: str = "cma",
+    method: str = "sobol-cma",
     budget: int = 1000,
     popsize: int | None = None,
     seed: int = 0,
-    sigma: float = 0.25,
+    sigma: float | None = None,
     tolerance: float | None = None,
     is_bounded: bool = True,
     start: Sequence[float] | None = None,
@@ -99,11 +99,12 @@ def optimize(
         plan: what is run; its measures are kept in the history too.
         objective: what is wanted.
         folder: where `history.parquet`, `best.osim` and `summary.json` are written.
-        method: one of `METHODS`.
+        method: one of `METHODS` in :mod:`osimlite.sweep.search`.
         budget: runs that are allowed.
         popsize: runs between two decisions of the method.
         seed: what makes the search the same again.
-        sigma: how far from the start to look at first, as a fraction of the ranges.
+        sigma: how far from where it begins the method looks at first, as a fraction of the ranges; by default 0.15
+            for `sobol-cma`, which has looked around before, and 0.25 for others.
         tolerance: of the cost and of the points (as fractions of the ranges), at which the search ends.
         is_bounded: whether the ranges are bounds, or say only where to begin.
         start: values to begin at; by default those of the model where they are within the ranges, else the middle.
@@ -119,6 +120,7 @@ def optimize(
         OsimliteError: as of a sweep.
     """
     look = method_named(method)
+    sigma = FIRST_REACH.get(method, 0.25) if sigma is None else sigma
     free = [place for place, item in enumerate(plan.variables) if not item.is_fixed]
     if not free:
         raise SettingError("there is nothing to search: every variable has one value only")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 import time
@@ -162,6 +163,8 @@ class ClusterPool:
     def __init__(self, plan: Plan, address: str) -> None:
         distributed = require("distributed", extra="sweep", purpose="a sweep on a cluster")
         _check_address(address)
+        # It has pages to say of a scheduler that has gone, which is one sentence here.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         Runner(plan)
         self._packed, self._address = plan.packed(), address
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()

@@ -58,7 +58,7 @@ class Samples:
         if self.sampler == "grid":
             return self._grid(first, last, varied)
         if self.sampler == "sobol":
-            return self._sobol(first, last, len(varied))
+            return sobol(self.seed, first, last, len(varied))
         numbers = _uniform(self.seed, first, last, len(varied))
         if self.sampler == "random":
             return numbers
@@ -71,17 +71,6 @@ class Samples:
         counts = [self.variables[place].count or 1 for place in varied]
         places = np.unravel_index(np.arange(first, last), counts)
         return np.stack([place / (count - 1) for place, count in zip(places, counts, strict=True)], axis=1)
-
-    def _sobol(self, first: int, last: int, width: int) -> Floats:
-        qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
-        points = qmc.Sobol(width, scramble=True, rng=np.random.default_rng(self.seed))
-        # scipy counts on from the first point; asked for all at once, it warns of numbers that are no power of two.
-        start: Floats = points.random(1)
-        if first == 0:
-            return np.concatenate((start, points.random(last - 1)))
-        points.fast_forward(first - 1)
-        found: Floats = points.random(last - first)
-        return found
 
 
 def samples(
@@ -120,6 +109,19 @@ def samples(
     if sampler == "sobol" and count > MOST_SOBOL:
         raise SettingError(f"Sobol's sequence has {MOST_SOBOL} points; take --sampler random for more")
     return Samples(tuple(variables), sampler, count, seed)
+
+
+def sobol(seed: int, first: int, last: int, width: int) -> Floats:
+    """Points first ... last - 1 of Sobol's sequence in the cube of so many dimensions, scrambled by a seed."""
+    qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
+    points = qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed))
+    # scipy counts on from the first point; asked for all at once, it warns of numbers that are no power of two.
+    start: Floats = points.random(1)
+    if first == 0:
+        return np.concatenate((start, points.random(last - 1)))
+    points.fast_forward(first - 1)
+    found: Floats = points.random(last - first)
+    return found
 
 
 def _uniform(seed: int, first: int, last: int, width: int) -> Floats:

@@ -204,7 +204,7 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(tmp_path_factory, wal
     try:
         monkeypatch.syspath_prepend(str(lost.folder))
         made = plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=("distance", "patience:ended"), to=0.3)
-        chosen = samples(made.variables, "random", 3000)
+        chosen = samples(made.variables, "random", 900)
 
         def end(done, of):
             if done > 40:
@@ -216,6 +216,6 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(tmp_path_factory, wal
     finally:
         lost.close()
     few = sweep(made, chosen, tmp_path / "r.parquet", resume=True)
-    assert few.before > 0 and few.before + few.status["done"] == 3000
+    assert few.before > 0 and few.before + few.status["done"] == 900
     whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
     assert (tmp_path / "r.parquet").read_bytes() == whole

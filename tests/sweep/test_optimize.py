@@ -71,9 +71,24 @@ def test_the_best_model_does_what_was_found(made, tmp_path):
 
 
 def test_it_begins_where_the_model_is(made, tmp_path):
-    found = optimize(made, DISTANCE, tmp_path, budget=20, popsize=20, sigma=1e-9)
+    found = optimize(made, DISTANCE, tmp_path, method="cma", budget=20, popsize=20, sigma=1e-9)
     start = {"RHip_rz": np.radians(30.0), "Pelvis_tx/speed": 0.0, "/bodyset/Pelvis/mass": 1.0}
     assert found.values == pytest.approx(start, abs=1e-6)
+
+
+def test_it_looks_around_from_where_the_model_is(made, tmp_path):
+    """The model as it is comes first, then points all over the ranges; what follows begins at the best of them."""
+    found = optimize(made, DISTANCE, tmp_path, budget=40, popsize=8, sigma=1e-6, seed=3)
+    table = pq.read_table(found.history).to_pydict()
+    rows = np.array([table[name] for name in VARY]).T
+    assert rows[0] == pytest.approx([np.radians(30.0), 0.0, 1.0])
+    low, high = np.array(list(VARY.values())).T
+    places = (rows - low) / (high - low)
+    assert (places[:16].min(axis=0) < 0.2).all() and (places[:16].max(axis=0) > 0.8).all()
+    best = int(np.argmax(table["distance"][:16]))
+    assert best > 0
+    assert places[16:] == pytest.approx(np.tile(places[best], (24, 1)), abs=1e-4)
+    assert rows[16] == pytest.approx(rows[best], rel=1e-12)
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
@@ -120,7 +135,7 @@ def test_another_search_is_spared_unless_forced(made, tmp_path):
     assert pq.read_table(other.history).num_rows == 8
 
 
-@pytest.mark.parametrize("method", ["cma", "differential-evolution"])
+@pytest.mark.parametrize("method", ["sobol-cma", "cma", "differential-evolution"])
 def test_every_run_that_is_allowed_is_made(made, tmp_path, method):
     whole = optimize(made, DISTANCE, tmp_path / "whole", method=method, budget=20, popsize=8)
     assert whole.evaluations == 20
@@ -159,7 +174,7 @@ def test_parameters_begin_at_their_defaults(tmp_path):
 
     vary = {"slope": (5.0, 15.0), "thigh_length": (0.3, 0.6)}
     made = plan(make, vary, parameters={"slope": 10.0, "thigh_length": 0.4}, to=0.3)
-    found = optimize(made, DISTANCE, tmp_path, budget=6, popsize=6, sigma=1e-6)
+    found = optimize(made, DISTANCE, tmp_path, method="cma", budget=6, popsize=6, sigma=1e-6)
     assert found.values == pytest.approx({"slope": 10.0, "thigh_length": 0.4}, abs=1e-3)
     assert osimlite.to_text(dynamic_walker(**found.values)) == found.model.read_text()
 
