@@ -202,7 +202,7 @@ class ObjectReader:
         self, element: etree._Element, cls: type[Object], step: Step, values: Mapping[str, Any]
     ) -> tuple[Any, list[_Late]]:
         """Read the element of a property that holds objects: its value, and what is noted of it."""
-        spec = step.spec
+        spec, number = step.spec, self.count
         if step.action == _ONE:
             return self._owned(element, spec.accepts), []
         members, late = self._members(element, spec)
@@ -212,7 +212,10 @@ class ObjectReader:
         if isinstance(spec.kind, Held) and spec.kind.form == "optional":
             return (members[0] if members else None), late
         if not members:
-            return getattr(cls, "in_place_of_none", _factory_of)(spec, values), late
+            made = getattr(cls, "in_place_of_none", None)
+            if made is None:
+                late.append(("empty", number, "", spec, None))
+            return (made or _factory_of)(spec, values), late
         # The object of a property is called as the property is, also in the long form.
         members[0].__dict__["name"] = spec.tag
         members[0].model_fields_set.add("name")

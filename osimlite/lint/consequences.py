@@ -13,6 +13,7 @@ from osimlite.schema.base import Object
 REFUSED: Final = "OpenSim refuses the model"
 TOUCHING: Final = "forces and motion become NaN as soon as the surfaces touch"
 NAN: Final = "accelerations become NaN, without a message"
+STOPS: Final = "OpenSim cannot take one step"
 STUCK: Final = "OpenSim finds no equilibrium for the muscle and fails when it computes accelerations"
 
 _REFUSED_OUTSIDE: Final = {
@@ -20,6 +21,7 @@ _REFUSED_OUTSIDE: Final = {
     "shallow_ascending_slope minimum_value",
     "Body": "mass",
     "BushingForce": "rotational_stiffness translational_stiffness rotational_damping translational_damping",
+    "ClutchedPathSpring": "stiffness dissipation relaxation_time_constant initial_stretch",
     "ConstantDistanceConstraint": "constant_distance",
     "DeGrooteFregly2016Muscle": "pennation_angle_at_optimal activation_time_constant deactivation_time_constant "
     "default_activation default_normalized_tendon_force fiber_damping passive_fiber_strain_at_one_norm_force "
@@ -41,6 +43,13 @@ _REFUSED_OUTSIDE: Final = {
     "WrapTorus": "inner_radius outer_radius",
 }
 
+_COMPUTED_WITH_ZERO: Final = {
+    "ActiveForceLengthCurve": "min_norm_active_fiber_length",
+    "WrapCylinder": "radius length",
+    "WrapSphere": "radius",
+}
+"""Of what else is refused outside its domain."""
+
 _REFUSED_AT_ZERO: Final = {"CoordinateLimitForce": "transition"}
 
 _NAN_OUTSIDE: Final = {
@@ -58,15 +67,33 @@ _NAN_AT_ZERO: Final = {
     "Thelen2003Muscle": "tendon_slack_length",
 }
 
+_STOPS_AT_ZERO: Final = {
+    "ActivationCoordinateActuator": "activation_time_constant",
+    "ClutchedPathSpring": "relaxation_time_constant",
+}
+
+_NAN_IF_MISSING: Final = {"EllipsoidJoint": "radii_x_y_z", "ScapulothoracicJoint": "thoracic_ellipsoid_radii_x_y_z"}
+
 _STUCK_AT_ZERO: Final = {"Millard2012EquilibriumMuscle": "tendon_slack_length"}
+
+_PUSHING: Final = (
+    "ActivationCoordinateActuator CoordinateActuator PathActuator PointActuator PointToPointActuator TorqueActuator"
+)
+"""Actuators whose force is their control times their optimal force."""
 
 _DOUBTS: Final = {
     ("CoordinateLimitForce", "damping"): "the limit adds energy",
     ("ContactSphere", "radius"): "it touches nothing",
+    ("EllipsoidJoint", "radii_x_y_z"): "OpenSim computes with it, on a flat or mirrored surface",
     ("HuntCrossleyContactParameters", "dissipation"): "each impact adds energy",
     ("HuntCrossleyForce", "transition_velocity"): "friction no longer passes from rest to sliding",
     ("Millard2012EquilibriumMuscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
+    (
+        "ScapulothoracicJoint",
+        "thoracic_ellipsoid_radii_x_y_z",
+    ): "OpenSim computes with it, on a flat or mirrored surface",
     ("Thelen2003Muscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
+    **{(name, "optimal_force"): "the actuator does nothing, whatever its control" for name in _PUSHING.split()},
 }
 
 STRICTER: Final = {
@@ -78,7 +105,9 @@ STRICTER: Final = {
     ("DeGrooteFregly2016Muscle", "default_activation"): "> 0",
     ("ForceVelocityCurve", "concentric_slope_near_vmax"): "> 1.49e-8",
     ("ForceVelocityCurve", "eccentric_slope_near_vmax"): "> 1.49e-8",
+    ("ClutchedPathSpring", "initial_stretch"): ">= 0",
     ("Ligament", "resting_length"): "> 0",
+    **{(name, "optimal_force"): "!= 0" for name in _PUSHING.split()},
     ("Thelen2003Muscle", "minimum_activation"): "0.01 to 1",
 }
 """Domains that are narrower for one class than for others that share the property, or than its declaration says."""
@@ -91,6 +120,12 @@ def consequence(cls: type[Object], name: str, number: float, *, rigid_tendon: bo
     """
     for base in cls.__mro__:
         known = base.__name__
+        if number != number and name in _NAN_IF_MISSING.get(known, "").split():
+            return NAN, True
+        if number == 0 and name in _COMPUTED_WITH_ZERO.get(known, "").split():
+            return "", False
+        if number == 0 and name in _STOPS_AT_ZERO.get(known, "").split():
+            return STOPS, True
         if name in _REFUSED_OUTSIDE.get(known, "").split() or (
             number == 0 and name in _REFUSED_AT_ZERO.get(known, "").split()
         ):

@@ -43,6 +43,7 @@ _MODULES = (
     "leftovers",
     "values",
     "domains",
+    "relations",
     "references",
     "names",
     "contact",

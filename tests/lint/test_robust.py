@@ -10,6 +10,9 @@ import pytest
 from osimlite.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.reporters import render
+from osimlite.schema.fields import Held
+from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import field_specs
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [
@@ -125,3 +128,23 @@ def test_what_opensim_leaves_out_has_findings_too(scrap):
     assert validate(Source(text.encode())).errors
     text = TEXTS[0].replace("</Model>", f'<defaults><Coordinate name="default">{scrap}</Coordinate></defaults></Model>')
     assert validate(Source(text.encode())).findings
+
+
+SLOTS = [
+    (tag, spec.tag)
+    for tag in sorted(tags())
+    for spec in field_specs(class_for(tag)).values()
+    if tag != "Model" and isinstance(spec.kind, Held) and spec.kind.form in ("single", "optional")
+]
+
+
+@pytest.mark.parametrize("inside", ["", "<PlugIn/>", "<objects/>", "<PlugIn name='a'/><PlugIn name='a'/>", "<Body/>"])
+def test_whatever_stands_in_the_place_of_an_object(inside):
+    members = "".join(f"<{tag} name='{tag}_{slot}'><{slot}>{inside}</{slot}></{tag}>\n" for tag, slot in SLOTS)
+    text = TEXTS[0].replace("</Model>", f"<ComponentSet>\n<objects>\n{members}</objects></ComponentSet>\n</Model>")
+    first = text[: text.index("<ComponentSet>")].count("\n") + 3
+    report = validate(Source(text.encode()), select="OSIM1,OSIM204")
+    lines = {finding.line for finding in report if finding.code in ("OSIM102", "OSIM103", "OSIM107", "OSIM204")}
+    assert render(validate(Source(text.encode())))
+    if inside == "<PlugIn/>":
+        assert lines >= {first + number for number in range(len(SLOTS))}

@@ -9,7 +9,7 @@ from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, Object
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.fields import Reference
 from osimlite.schema.forces import Force
@@ -172,7 +172,8 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
     for force in subject.each(Force):
         if "contact_parameters" in defaults(type(force))[1]:
             parameters: Any = force
-            forces[id(force)] = (force, list(parameters.contact_parameters.objects), [])
+            if not isinstance(parameters.contact_parameters, Unknown):
+                forces[id(force)] = (force, list(parameters.contact_parameters.objects), [])
     if not forces:
         return
     for use in subject.uses:

@@ -187,6 +187,11 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                 if value is None or (value.__class__ is float and inside(value)):
                     continue
                 wrong = [number for number in _numbers(value) if not inside(number) and math.isfinite(number)]
+                if not wrong and _is_missing(item, spec, value):
+                    fate, fails = consequence(cls, spec.name, math.nan)
+                    if fails:
+                        yield item, spec, value, Verdict(math.nan, "", fate, fails)
+                    continue
                 if not wrong or (subject.noted(item, spec) and wrong == list(_numbers(spec.default))):
                     continue
                 fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=_is_rigid(item))
@@ -194,11 +199,24 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                 yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
 
 
+def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
+    """Whether a file does not give what has no default. The mass of a body has a rule of its own."""
+    return spec.tag != "mass" and spec.name not in item.model_fields_set and _has_nan(value)
+
+
 def _report_domain(subject: Subject, found: Found, item: Object, spec: FieldSpec, value: Any, verdict: Verdict) -> None:
     given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
+    if verdict.number != verdict.number:
+        found(f"{subject.titled(item, spec)} is not given and has no default: {verdict.fate}", item, tag=spec.tag)
+        return
     size = quantity(value, spec.kind.unit) if given else f"not given, so {quantity(value, spec.kind.unit)}"
-    wanted = verdict.domain.replace(">= 0", "0 or more").replace("> 0", "more than 0").replace("> 1", "more than 1")
+    wanted = (
+        verdict.domain.replace(">= 0", "0 or more")
+        .replace("> 0", "more than 0")
+        .replace("> 1", "more than 1")
+        .replace("!=", "other than")
+    )
     fate = f": {verdict.fate}" if verdict.fate else ""
     found(
         f"{subject.titled(item, spec)} is {size}, it should be {wanted}{fate}",
@@ -237,6 +255,7 @@ def _test(domain: str) -> Callable[[float], bool]:
         ">=": lambda value: value >= limit,
         "<": lambda value: value < limit,
         "<=": lambda value: value <= limit,
+        "!=": lambda value: value != limit,
     }[sign]
 
 

@@ -19,7 +19,7 @@ def short_path(subject: Subject, found: Found) -> None:
     """A path has fewer than two points.
 
     ## What it does
-    Reports geometry paths with no point, or with one.
+    Reports geometry paths with no point, or with one, and muscles and springs without a path.
 
     ## Why is this bad
     OpenSim refuses the model.
@@ -55,9 +55,17 @@ def short_path(subject: Subject, found: Found) -> None:
     """
     for path in subject.each(GeometryPath):
         points = path.path_point_set.objects
-        if len(points) < 2 and path._index is not None:
-            owner = subject.tree.parent_of(path)
-            found(f"the path of {called(owner or path)} has {times(len(points), 'point')} and needs two", path)
+        owner = subject.tree.parent_of(path)
+        if len(points) > 1 or owner is None:
+            continue
+        if path._index is not None or subject.source is None:
+            found(f"the path of {called(owner)} has {times(len(points), 'point')} and needs two", path)
+        elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
+            found(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
+
+
+_NOT_READ = frozenset(("unknown-tag", "wrong-name", "wrong-class", "unknown-class", "empty"))
+"""What is reported of an element that may have been meant for the path."""
 
 
 DISTANCE = Threshold("path-point-distance", 0.0, "m", "points of a path this near to each other count as one")

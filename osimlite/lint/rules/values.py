@@ -10,7 +10,7 @@ from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import shown
+from osimlite.lint.words import called, shown
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
 from osimlite.schema.specs import FieldSpec, field_specs
@@ -126,10 +126,12 @@ def empty_value(subject: Subject, found: Found) -> None:
     """An element that should hold a value is empty.
 
     ## What it does
-    Reports empty numbers, vectors and switches. Properties that may be left out may also be empty.
+    Reports empty numbers, vectors and switches, and elements in which an object should stand. Properties that may be
+    left out may also be empty.
 
     ## Why is this bad
-    OpenSim writes a line to its log and keeps the default. The mass of a body has none: OpenSim refuses the model.
+    OpenSim writes a line to its log and keeps the default. The mass of a body has none: OpenSim refuses the model. And
+    where an object should stand OpenSim then has none, and fails as soon as it needs one.
 
     ## Example
     ```xml
@@ -146,6 +148,15 @@ def empty_value(subject: Subject, found: Found) -> None:
             found(
                 f"{subject.titled(owner, spec)} is empty, not {kind.words()}: {_kept(note, owner, spec, kind)}",
                 owner,
+                number=note.number,
+            )
+    for note in subject.notes:
+        held = note.spec
+        if note.kind == "empty" and note.owner is not None and held is not None and held.accepts is not None:
+            found(
+                f"<{held.tag}> of {called(note.owner)} is empty: OpenSim then has no {held.accepts.tag} there, not "
+                "even the default, and fails where it needs one; leave the element out",
+                note.owner,
                 number=note.number,
             )
 

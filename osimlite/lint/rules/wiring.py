@@ -50,6 +50,8 @@ def control_function_count(subject: Subject, found: Found) -> None:
     ```
     """
     for controller in subject.named("PrescribedController"):
+        if isinstance(controller.ControlFunctions, Unknown):
+            continue
         functions, actuators = len(controller.ControlFunctions.objects), len(controller.socket_actuators)
         if controller.controls_file is None and functions != actuators:
             found(
