@@ -116,6 +116,9 @@ class _Builder:
         index = {body.path: place for place, body in enumerate(bodies)} | {ground: GROUND}
         self._constrain(index)
         placed = self.placements
+        for path, (base, _) in placed.found.items():
+            if base not in index:
+                raise UnsupportedError(f"the frame '{path}' is no body of the model, nor fixed to one; take it out")
         frames = {path: FramePlacement(index[base], matrix) for path, (base, matrix) in placed.found.items()}
         stations = {}
         for component in self.tree.components:

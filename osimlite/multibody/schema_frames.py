@@ -71,7 +71,11 @@ class Placements:
         bases, points = [], []
         for socket in ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"):
             target = self.tree.target(frame, socket, getattr(frame, socket))
-            assert isinstance(target, Station)
+            if not isinstance(target, Station):
+                raise ModelError(
+                    f"the frame '{path}': {socket} names '{self.path(target)}', a {type(target).__name__}; "
+                    "name a Station"
+                )
             base, point = self.station(target, followed)
             bases.append(base)
             points.append(point)

@@ -286,6 +286,11 @@ class Unknown(ModelComponent, abstract=True):
     class_name: str = ""
     content: str = ""
 
+    @property
+    def objects(self) -> ObjectList[Any]:
+        """The members, where it stands in the place of a set: none that anybody knows."""
+        return ObjectList()
+
 
 # Pydantic evaluates the annotations of all bases for every class; evaluated here once, they cost it nothing.
 for _base in (Object, Component):
