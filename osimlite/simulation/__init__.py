@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
     from osimlite.simulation.run import Simulation as Simulation
@@ -14,18 +15,15 @@ if TYPE_CHECKING:
     from osimlite.simulation.table_stream import stream_table as stream_table
     from osimlite.simulation.trajectory import Trajectory as Trajectory
 
-_PUBLIC = {
-    "Simulation": "run",
-    "simulate": "run",
-    "StoTable": "storage",
-    "read_sto": "storage",
-    "write_sto": "storage",
-    "stream_table": "table_stream",
-    "Trajectory": "trajectory",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'osimlite.simulation' has no attribute '{name}'")
-    return getattr(import_module(f"osimlite.simulation.{_PUBLIC[name]}"), name)
+__getattr__ = imported_when_used(
+    __name__,
+    {
+        "Simulation": "osimlite.simulation.run",
+        "StoTable": "osimlite.simulation.storage",
+        "Trajectory": "osimlite.simulation.trajectory",
+        "read_sto": "osimlite.simulation.storage",
+        "simulate": "osimlite.simulation.run",
+        "stream_table": "osimlite.simulation.table_stream",
+        "write_sto": "osimlite.simulation.storage",
+    },
+)

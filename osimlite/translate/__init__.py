@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
     from osimlite.robot.build import build_robot as build_robot
@@ -12,16 +13,13 @@ if TYPE_CHECKING:
     from osimlite.translate.export import to_urdf as to_urdf
     from osimlite.translate.fidelity import Fidelity as Fidelity
 
-_PUBLIC = {
-    "Urdf": "translate.export",
-    "to_urdf": "translate.export",
-    "Fidelity": "translate.fidelity",
-    "Robot": "robot.robot",
-    "build_robot": "robot.build",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'osimlite.translate' has no attribute '{name}'")
-    return getattr(import_module(f"osimlite.{_PUBLIC[name]}"), name)
+__getattr__ = imported_when_used(
+    __name__,
+    {
+        "Fidelity": "osimlite.translate.fidelity",
+        "Robot": "osimlite.robot.robot",
+        "Urdf": "osimlite.translate.export",
+        "build_robot": "osimlite.robot.build",
+        "to_urdf": "osimlite.translate.export",
+    },
+)

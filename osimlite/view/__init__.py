@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate
     from osimlite.view.plots import plot_simulation as plot_simulation
     from osimlite.view.shown import Shown as Shown
 
-_PUBLIC = {"animate": "animation", "plot_simulation": "plots", "Shown": "shown"}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'osimlite.view' has no attribute '{name}'")
-    return getattr(import_module(f"osimlite.view.{_PUBLIC[name]}"), name)
+__getattr__ = imported_when_used(
+    __name__,
+    {
+        "Shown": "osimlite.view.shown",
+        "animate": "osimlite.view.animation",
+        "plot_simulation": "osimlite.view.plots",
+    },
+)
