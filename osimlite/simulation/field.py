@@ -34,18 +34,20 @@ from osimlite.simulation.contact_elements import PairContact
 from osimlite.simulation.elements import ForceElement, Triple
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
 
+_MODULES = (
+    bushing,
+    coordinate_limit,
+    ellipsoid_contact,
+    formulas,
+    hunt_crossley,
+    smooth_contact,
+    springs,
+    station_contact,
+)
+
 LAWS: dict[str, Callable[..., Any]] = {
     name: law
-    for module in (
-        bushing,
-        coordinate_limit,
-        ellipsoid_contact,
-        formulas,
-        hunt_crossley,
-        smooth_contact,
-        springs,
-        station_contact,
-    )
+    for module in _MODULES
     for name, law in vars(module).items()
     if isinstance(law, FunctionType) and law.__module__ == module.__name__
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from math import floor, isfinite
@@ -20,10 +19,11 @@ from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, RungeKuttaMerson
+from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import doubt_of, in_units_of
 from osimlite.simulation.stepper import Stepper
+from osimlite.simulation.summary import course, outcome, versions
 from osimlite.simulation.trajectory import Report, Trajectory
 
 Progress = Callable[[float], object]
@@ -264,39 +264,16 @@ class Simulation:
     ) -> Trajectory:
         engine = self.engine
 
-        def energies(t: float, y: list[float]) -> dict[str, float]:
-            kinetic, gravity, stored = engine.energies(t, y)
-            return {
-                "kinetic": kinetic,
-                "potential": gravity + stored,
-                "gravity": gravity,
-                "stored": stored,
-                "total": kinetic + gravity + stored,
-            }
-
         def summary() -> dict[str, Any]:
-            attempted = stepper.attempted if isinstance(stepper, RungeKuttaMerson) else stepper.taken
             return {
                 "model": self.mechanism.name,
                 "engine": engine.name,
                 "route": engine.route,
-                "integrator": stepper.name,
-                "settings": settings,
-                "steps": stepper.taken,
-                "attempted_steps": attempted,
-                "evaluations": stepper.evaluations,
-                "wall_time_s": wall,
-                "energy_J": {"start": energies(times[0], states[0]), "end": energies(times[-1], states[-1])},
-                "contact_events": [
-                    {"time_s": event.time, "contact": event.contact, "event": "begin" if event.begins else "end"}
-                    for event in recorder.events()
-                ],
-                "largest_contact_forces": {
-                    name: {"force_N": size, "time_s": t} for name, (size, t) in recorder.largest_forces().items()
-                },
+                **course(stepper, settings, wall),
+                **outcome(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
                 "skipped_forces": list(self.forces.skipped),
                 "constraints": self._constraints,
-                "versions": _versions(engine),
+                "versions": versions(engine),
             }
 
         report = Report(
@@ -346,9 +323,3 @@ def report_times(to: float, interval: float) -> list[float]:
     if to - times[-1] <= 1e-9 * interval:
         times.pop()
     return [*times, to]
-
-
-def _versions(engine: Engine) -> dict[str, str]:
-    from osimlite import __version__
-
-    return {"osimlite": __version__, "engine": engine.version, "python": sys.version.split()[0]}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
 from typing import Any
 
 from osimlite.multibody.functions import IDENTITY
@@ -26,54 +25,10 @@ def coordinates_json(robot: Robot, file: str) -> str:
         robot: as it was written, with its final names.
         file: name of the robot's file.
     """
-    paths = [info.path for info in robot.mechanism.coordinates]
-    drives: dict[int, list[str]] = {}
-    for joint in robot.moving:
-        for place in joint.coordinates:
-            drives.setdefault(place, []).append(joint.name)
-    following = mimics(robot)
-    sections: Mapping[str, Iterable[Mapping[str, Any]]] = {
-        "coordinates": [
-            {
-                "path": info.path,
-                "name": info.name,
-                "unit": {"rotational": "rad", "translational": "m"}.get(info.motion_type),
-                "joint": robot.joint_of[place].name if place in robot.joint_of else None,
-                "drives": drives.get(place, []),
-                "default_value": info.default_value,
-                "default_speed": info.default_speed,
-                "range": info.range,
-                "clamped": info.clamped,
-                "locked": info.locked,
-                "prescribed": None if info.prescribed is None else as_data(info.prescribed),
-            }
-            for place, info in enumerate(robot.mechanism.coordinates)
-        ],
-        "joints": [
-            {
-                "name": joint.name,
-                "of": joint.source,
-                "kind": joint.kind,
-                "coordinates": [paths[place] for place in joint.coordinates],
-                "function": as_data(joint.function),
-                **({"identity": True} if joint.function == IDENTITY else {}),
-                **(
-                    {"mimics": mimic.leader, "multiplier": mimic.line.slope, "offset": mimic.line.start}
-                    if (mimic := following.get(joint.name))
-                    else {}
-                ),
-            }
-            for joint in robot.moving
-        ],
-        "couplers": [
-            {
-                "path": coupler.name,
-                "dependent": paths[coupler.dependent],
-                "independent": [paths[place] for place in coupler.independent],
-                "function": as_data(coupler.function),
-            }
-            for coupler in couplers(robot)
-        ],
+    sections = {
+        "coordinates": _coordinates(robot),
+        "joints": _joints(robot),
+        "couplers": _couplers(robot),
         "bodies": [
             {"path": path, "link": link.name, "frame": frame.tolist()} for path, (link, frame) in robot.link_of.items()
         ],
@@ -91,6 +46,61 @@ def coordinates_json(robot: Robot, file: str) -> str:
         rows = ",\n".join(f"    {_text(item)}" for item in items)
         lines.append(f'  "{name}": [\n{rows}\n  ]' if rows else f'  "{name}": []')
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _coordinates(robot: Robot) -> list[dict[str, Any]]:
+    drives: dict[int, list[str]] = {}
+    for joint in robot.moving:
+        for place in joint.coordinates:
+            drives.setdefault(place, []).append(joint.name)
+    return [
+        {
+            "path": info.path,
+            "name": info.name,
+            "unit": {"rotational": "rad", "translational": "m"}.get(info.motion_type),
+            "joint": robot.joint_of[place].name if place in robot.joint_of else None,
+            "drives": drives.get(place, []),
+            "default_value": info.default_value,
+            "default_speed": info.default_speed,
+            "range": info.range,
+            "clamped": info.clamped,
+            "locked": info.locked,
+            "prescribed": None if info.prescribed is None else as_data(info.prescribed),
+        }
+        for place, info in enumerate(robot.mechanism.coordinates)
+    ]
+
+
+def _joints(robot: Robot) -> list[dict[str, Any]]:
+    following, coordinates = mimics(robot), robot.mechanism.coordinates
+    found: list[dict[str, Any]] = []
+    for joint in robot.moving:
+        said: dict[str, Any] = {
+            "name": joint.name,
+            "of": joint.source,
+            "kind": joint.kind,
+            "coordinates": [coordinates[place].path for place in joint.coordinates],
+            "function": as_data(joint.function),
+        }
+        if joint.function == IDENTITY:
+            said["identity"] = True
+        if (mimic := following.get(joint.name)) is not None:
+            said |= {"mimics": mimic.leader, "multiplier": mimic.line.slope, "offset": mimic.line.start}
+        found.append(said)
+    return found
+
+
+def _couplers(robot: Robot) -> list[dict[str, Any]]:
+    coordinates = robot.mechanism.coordinates
+    return [
+        {
+            "path": coupler.name,
+            "dependent": coordinates[coupler.dependent].path,
+            "independent": [coordinates[place].path for place in coupler.independent],
+            "function": as_data(coupler.function),
+        }
+        for coupler in couplers(robot)
+    ]
 
 
 def _text(value: Any) -> str:

@@ -7,7 +7,7 @@ from functools import cached_property
 from osimlite.multibody.functions import IDENTITY
 from osimlite.robot.mimics import Mimic, couplers, mimics
 from osimlite.robot.principal_axes import breaks_triangle_rule, principal_axes
-from osimlite.robot.robot import Robot
+from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.schema.base import Component
 from osimlite.schema.constraints import Constraint
 from osimlite.schema.contact import ContactGeometry
@@ -162,9 +162,18 @@ class _Survey:
         self.fidelity.translated[path] = f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
         if joint is not None and joint.name != path.rsplit("/", 1)[1]:
             self._renamed(path, f"joint {joint.name}")
+        self._range(coordinate, path, unit, hard=joint is not None and joint.limits is not None)
+        if coordinate.locked:
+            self.note("locked", path, "that a joint is locked", "a joint that moves: hold it in your program")
+        if coordinate.prescribed and coordinate.prescribed_function is not None:
+            done = "a joint that moves: drive it in your program"
+            self.note("prescribed", path, "that a coordinate follows a function of time", done)
+        self._start(coordinate, path, unit)
+        self._functions(driven, path)
+
+    def _range(self, coordinate: Coordinate, path: str, unit: str, *, hard: bool) -> None:
         low, high = coordinate.range
         text = f"{low:g} to {high:g} {unit}"
-        hard = joint is not None and joint.limits is not None
         self.note(
             "coordinate-range",
             path,
@@ -174,11 +183,8 @@ class _Survey:
         )
         if coordinate.clamped:
             self.note("clamped", path, "that a user interface must not leave the range", "left out", text)
-        if coordinate.locked:
-            self.note("locked", path, "that a joint is locked", "a joint that moves: hold it in your program")
-        if coordinate.prescribed and coordinate.prescribed_function is not None:
-            done = "a joint that moves: drive it in your program"
-            self.note("prescribed", path, "that a coordinate follows a function of time", done)
+
+    def _start(self, coordinate: Coordinate, path: str, unit: str) -> None:
         if coordinate.default_value != 0.0:
             self.note(
                 "default-pose",
@@ -195,6 +201,8 @@ class _Survey:
                 "left out: set it in your program",
                 f"{coordinate.default_speed_value:g} {unit}/s",
             )
+
+    def _functions(self, driven: list[RobotJoint], path: str) -> None:
         for part in driven:
             if part.function == IDENTITY:
                 continue
