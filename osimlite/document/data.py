@@ -53,7 +53,13 @@ def read_data(path: str | Path) -> Model:
 
 
 def write_data(model: Model, path: str | Path) -> None:
-    """Write a model as YAML or JSON, by the suffix of `path`; the file appears whole or not at all."""
+    """Write a model as JSON if the suffix of `path` is ``.json``, else as YAML; it appears whole or not at all.
+
+    Raises:
+        ModelError: a reference leads to a component outside the model.
+        MissingDependency: the file is YAML and PyYAML is not installed.
+        OsimliteError: the file cannot be written.
+    """
     as_json = Path(path).suffix == ".json"
     write_atomically(path, to_json(model) if as_json else to_yaml(model))
 

@@ -13,7 +13,7 @@ SLICES, STACKS = 32, 16
 
 
 def ellipsoid(radii: Sequence[float]) -> str:
-    """A closed ellipsoid about the origin with half axes `radii` along X, Y, Z."""
+    """OBJ text of a closed ellipsoid about the origin with half axes `radii` (3,) along X, Y, Z, m."""
     poles_apart = [pi * stack / STACKS for stack in range(1, STACKS)]
     around = [2.0 * pi * slice_ / SLICES for slice_ in range(SLICES)]
     rings = [(sin(a) * cos(b), cos(a), -sin(a) * sin(b)) for a in poles_apart for b in around]
@@ -33,7 +33,12 @@ def ellipsoid(radii: Sequence[float]) -> str:
 
 
 def elliptic_cylinder(radii: Sequence[float], length: float) -> str:
-    """A closed cylinder about the origin along Z whose cross-section has half axes `radii` along X and Y."""
+    """OBJ text of a closed cylinder about the origin along Z.
+
+    Args:
+        radii: half axes (2,) of its cross-section along X and Y, m.
+        length: along Z, m.
+    """
     a, b = radii
     around = [2.0 * pi * slice_ / SLICES for slice_ in range(SLICES)]
     points = [(a * cos(t), b * sin(t), end * length / 2.0) for end in (-1.0, 1.0) for t in around]

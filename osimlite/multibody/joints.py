@@ -196,7 +196,7 @@ class Mobilizer:
         return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
 
     def rate_matrix(self, q: Array) -> Array:
-        """N (k, k) with qdot = N u."""
+        """N (k, k) with qdot = N u; SimulationError, which names the joint, where N is singular."""
         matrix = np.eye(len(q))
         with _named(self.joint):
             for motion in self.motions:

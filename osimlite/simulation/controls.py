@@ -55,7 +55,7 @@ class Control:
         return cls(actuator.optimal_force, tuple(functions))
 
     def write(self, writer: Writer) -> Scalar:
-        """The force or torque."""
+        """The force (N) or torque (N·m)."""
         script = writer.script
         return script.sum(*((self.optimal_force, writer.evaluate(item, TIME)) for item in self.functions))
 

@@ -245,7 +245,7 @@ def functions_of(times: Array, columns: Array) -> list[Function]:
 
 
 def natural_cubics(times: Array, columns: Array) -> list[Function]:
-    """The natural cubic splines through columns (n, k), n > 2, straight before and after."""
+    """The k natural cubic splines through columns (n, k) over times (n,), n > 2, straight before and after."""
     widths = np.diff(times)[:, None]
     slopes = np.diff(columns, axis=0) / widths
     # The second derivatives, which vanish at both ends, solve a tridiagonal system: forwards and back.

@@ -221,7 +221,8 @@ class Simulation:
 
         Raises:
             ModelError: there is no such coordinate.
-            SimulationError: a coordinate is locked, or a number is not finite.
+            SimulationError: a coordinate is locked or prescribed, a number is not finite, or no pose or speeds fulfil
+                the constraints.
         """
         infos = self.mechanism.coordinates
         q, u = [info.default_value for info in infos], [info.default_speed for info in infos]

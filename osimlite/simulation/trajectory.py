@@ -97,7 +97,9 @@ class Trajectory:
         write_atomically(path, self.states_text())
 
     def to_frame(self) -> Any:
-        """All values, speeds and forces as a pandas DataFrame over time; speeds are called ``<coordinate>/speed``.
+        """All values, speeds and forces as a pandas DataFrame over time (s); units are SI and radians.
+
+        Columns are called ``<coordinate>``, ``<coordinate>/speed``, and as in `forces`.
 
         Raises:
             MissingDependency: pandas is not installed.

@@ -24,6 +24,9 @@ def coordinates_json(robot: Robot, file: str) -> str:
     Args:
         robot: as it was written, with its final names.
         file: name of the robot's file.
+
+    Raises:
+        UnsupportedError: a function of the mechanism is of a class that the format does not have.
     """
     sections = {
         "coordinates": _coordinates(robot),

@@ -119,7 +119,7 @@ def draw(
 
     Raises:
         MissingDependency: pillow is not installed.
-        OsimliteError: the picture has no size.
+        OsimliteError: the picture is not 16 to 8000 pixels wide and high.
     """
     image = require("PIL.Image", extra="view", purpose="a picture")
     if min(size) < 16 or max(size) > 8000:

@@ -74,7 +74,7 @@ class Shown:
             file: that the model was read from, so that findings know their lines; None: the model itself is checked.
             motion: how it moves, or the file (.sto, .mot) that says so.
             forces: a file with contact forces, for a motion from a file.
-            values: of coordinates by name; over a motion from a file they stay so.
+            values: of coordinates by name (rad, m); over a motion from a file they stay so.
 
         Raises:
             OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
