@@ -32,12 +32,9 @@ def optimize(
         int | None, typer.Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
     ] = None,
     sigma: Annotated[
-        float | None,
-        typer.Option(
-            help="How far from where it begins the method looks at first, as a fraction of the ranges.",
-            show_default="0.15 for sobol-cma, else 0.25",
-        ),
-    ] = None,
+        float,
+        typer.Option(help="How far from where it begins the method looks at first, as a fraction of the ranges."),
+    ] = 0.25,
     seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
     maximize: Annotated[
         bool | None, typer.Option("--maximize/--minimize", help="What is better.", show_default="see --objective")

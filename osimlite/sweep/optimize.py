@@ -21,7 +21,7 @@ from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.runner import FAILED, Block
-from osimlite.sweep.search import FIRST_REACH, Enough, Search, method_named
+from osimlite.sweep.search import Enough, Search, method_named
 from osimlite.sweep.variables import Floats
 from osimlite.sweep.variants import Variants
 
@@ -83,7 +83,7 @@ def optimize(
     budget: int = 1000,
     popsize: int | None = None,
     seed: int = 0,
-    sigma: float | None = None,
+    sigma: float = 0.25,
     tolerance: float | None = None,
     is_bounded: bool = True,
     start: Sequence[float] | None = None,
@@ -103,8 +103,8 @@ def optimize(
         budget: runs that are allowed.
         popsize: runs between two decisions of the method.
         seed: what makes the search the same again.
-        sigma: how far from where it begins the method looks at first, as a fraction of the ranges; by default 0.15
-            for `sobol-cma`, which has looked around before, and 0.25 for others.
+        sigma: how far from where it begins the method looks at first, as a fraction of the ranges; `sobol-cma` has
+            looked all over them before.
         tolerance: of the cost and of the points (as fractions of the ranges), at which the search ends.
         is_bounded: whether the ranges are bounds, or say only where to begin.
         start: values to begin at; by default those of the model where they are within the ranges, else the middle.
@@ -120,7 +120,6 @@ def optimize(
         OsimliteError: as of a sweep.
     """
     look = method_named(method)
-    sigma = FIRST_REACH.get(method, 0.25) if sigma is None else sigma
     free = [place for place, item in enumerate(plan.variables) if not item.is_fixed]
     if not free:
         raise SettingError("there is nothing to search: every variable has one value only")

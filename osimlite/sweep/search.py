@@ -139,9 +139,6 @@ METHODS: dict[str, Callable[[Ask, Search], str]] = {
 }
 
 
-FIRST_REACH = {"sobol-cma": 0.15}
-"""How far a method looks at first unless it is told, as a fraction of the ranges; others a quarter of them."""
-
 LOOKS = 2
 """Populations of points spread over the ranges, before cma begins."""
 
