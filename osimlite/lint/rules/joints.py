@@ -58,7 +58,8 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     of their axes uses, and (as a warning) joints with none at all.
 
     ## Why is this bad
-    OpenSim refuses the model. Without any it makes coordinates up, with a name such as `_coord_0` and the value 0.
+    OpenSim refuses the model. Where `<coordinates>` is left out it makes coordinates up, with a name such as `_coord_0`
+    and the value 0.
 
     ## Example
     ```xml
@@ -95,8 +96,9 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     for joint in subject.each(Joint):
         if joint.motion_types is None:
             continue
-        wanted, given = len(joint.motion_types), len(joint.coordinates)
-        declared = "coordinates" in joint.model_fields_set and given > 0
+        wanted = len(joint.motion_types)
+        given = sum(isinstance(coordinate, Coordinate) for coordinate in joint.coordinates)
+        declared = "coordinates" in joint.model_fields_set and (given > 0 or _says_none(subject, joint))
         if not declared and wanted and subject.source is not None:
             found(
                 f"{called(joint)} gives no coordinates; OpenSim makes {wanted} up, called '_coord_0'"
@@ -111,6 +113,12 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
                 joint,
                 number=subject.element_of(joint, "coordinates"),
             )
+
+
+def _says_none(subject: Subject, joint: Joint) -> bool:
+    """Whether a text has an element for the coordinates of a joint; an empty one of an older format says nothing."""
+    number = subject.element_of(joint, "coordinates")
+    return number is not None and subject.source is not None and subject.source.spans[number].tag == "coordinates"
 
 
 @rule("OSIM406", "shared-coordinate-name", severity=ERROR)

@@ -92,16 +92,14 @@ def illegal_name(subject: Subject, found: Found) -> None:
         if _ILLEGAL.isdisjoint(component.name):
             continue
         bad = [character for character in dict.fromkeys(component.name) if character in ILLEGAL_CHARACTERS]
-        if not isinstance(component, ModelComponentSet):
-            shown = listed(["white space" if character.isspace() else f"'{character}'" for character in bad])
-            better = "".join("_" if character in bad else character for character in component.name)
-            found(
-                f"the name of {called(component)} has {shown} in it: OpenSim refuses to load the file",
-                component,
-                attribute="name",
-                suggestion=better,
-                severity=ERROR,
-            )
+        shown = listed(["white space" if character.isspace() else f"'{character}'" for character in bad])
+        found(
+            f"the name of {called(component)} has {shown} in it: OpenSim refuses to load the file",
+            component,
+            attribute="name",
+            suggestion="".join("_" if character in bad else character for character in component.name),
+            severity=ERROR,
+        )
     # In a file this old OpenSim mends the name, but not what names it.
     for change in subject.changes:
         if change.step == "names" and subject.source is not None:

@@ -149,7 +149,7 @@ def wrong_class(subject: Subject, found: Found) -> None:
         where = f"; it belongs in the {home}" if home else ""
         holder = f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
         found(
-            f"{holder} takes {a(kinds)}, not {a(note.word)}: {_fate(owner, note.spec).removeprefix('it ')}{where}",
+            f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(owner, note.spec)}{where}",
             owner,
             number=note.number,
         )
