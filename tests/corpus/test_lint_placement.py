@@ -24,9 +24,11 @@ def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
         pytest.skip("OpenSim assembles this model, which moves it")
     truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))["default_pose"]["body_xform"]
     poses = default_poses(subject)
-    for body in subject.each(Body):
-        if id(body) in poses and subject.path(body) in truth:
-            pose = poses[id(body)]
-            position, rotation = truth[subject.path(body)]
-            assert pose.position == pytest.approx(position, abs=1e-8), body.name
-            assert [number for row in pose.rotation for number in row] == pytest.approx(rotation, abs=1e-8), body.name
+    placed = [body for body in subject.each(Body) if id(body) in poses and subject.path(body) in truth]
+    if not placed:
+        pytest.skip("no body is placed by joints that can be followed without arrays")
+    for body in placed:
+        pose = poses[id(body)]
+        position, rotation = truth[subject.path(body)]
+        assert pose.position == pytest.approx(position, abs=1e-8), body.name
+        assert [number for row in pose.rotation for number in row] == pytest.approx(rotation, abs=1e-8), body.name

@@ -58,10 +58,11 @@ def test_a_file_upgraded_is_read_again_equal(corpus_model: CorpusModel) -> None:
 
 
 def test_references_lead_where_opensim_finds_them(corpus_model: CorpusModel) -> None:
-    """Of the files OpenSim connects no reference is broken, and of those it cannot connect none by the upgrade."""
+    """An upgrade breaks none; in files that need next to none, those that OpenSim connects have none broken."""
     document = old(corpus_model)
     truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))
     tree = document.model.tree()
     broken = [use for use in tree.uses() if tree.resolve(use).failure and use.spec.name != "members"]
-    if document.version < 40000 or str(truth["load"]["stage"]).startswith("ok"):
-        assert [(use.holder.name, use.spec.name, use.value) for use in broken] == []
+    if document.version >= 40000 and not str(truth["load"]["stage"]).startswith("ok"):
+        pytest.skip("OpenSim cannot connect this file either")
+    assert [(use.holder.name, use.spec.name, use.value) for use in broken] == []

@@ -163,10 +163,12 @@ def test_one_foreign_byte_spoils_nothing_else() -> None:
     assert "1 \u2013 2" in source.text
 
 
-def test_half_a_character_of_two_bytes() -> None:
+def test_half_a_character_at_the_end_stands_for_one_that_is_missing() -> None:
     data = TEXT.encode("utf-16")
-    for cut in (data[:-1], data[:101], b"\xff\xfe", b"\xfe\xff\x00", b"\xff\xfe\x00\x00\x00"):
-        Source(cut)
+    assert Source(data[:-1]).text == TEXT[:-1] + "\ufffd"
+    assert Source(data[:101]).text == TEXT[:49] + "\ufffd"
+    assert Source(b"\xff\xfe").text == ""
+    assert Source(b"\xfe\xff\x00").text == Source(b"\xff\xfe\x00\x00\x00").text == "\ufffd"
 
 
 @pytest.mark.parametrize("cut", range(0, len(TEXT), 7))

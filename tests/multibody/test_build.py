@@ -176,8 +176,8 @@ def test_coordinates_left_out_are_opensims():
     model = Model(name="m")
     # As a file has it; Model.add would name them after their joint.
     model.joint_set.objects.append(FreeJoint(name="free").between(model.ground, _body(model, "b")))
-    for index, info in enumerate(build_mechanism(model).coordinates):
-        listed = load("joint_defaults.json")["FreeJoint"]["coordinates"][index]
+    coordinates = load("joint_defaults.json")["FreeJoint"]["coordinates"]
+    for info, listed in zip(build_mechanism(model).coordinates, coordinates, strict=True):
         assert (info.name, info.default_value, info.default_speed) == (
             listed["name"],
             listed["default_value"],

@@ -122,10 +122,11 @@ def test_links_between_joints_are_massless_and_no_leaf_is_made_massless():
     for mechanism in (walker(), mixed_tree()):
         robot = build_robot(mechanism)
         carriers = {joint.parent for joint in robot.joints}
-        for link in robot.links:
-            if not link.bodies:
-                assert link.mass == 0.0 and not link.inertia.any()
-                assert link.name in carriers
+        between = [link for link in robot.links if not link.bodies]
+        assert between
+        for link in between:
+            assert link.mass == 0.0 and not link.inertia.any()
+            assert link.name in carriers
 
 
 def test_planar_joint_translates_in_the_parent_before_it_turns():

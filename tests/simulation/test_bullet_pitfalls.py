@@ -39,26 +39,26 @@ def error(mechanism, route="articulated-body", *, q=Q, u=U):
         return np.abs(np.subtract(engine.acceleration(0.0, q, u), expected)).max() / np.abs(expected).max()
 
 
-def test_1_damping(mechanism, monkeypatch):
+def test_nothing_is_damped(mechanism, monkeypatch):
     assert error(mechanism) < 1e-12
     monkeypatch.setattr(World, "DAMPING", 0.04)
     assert error(mechanism) > 1e-3
 
 
-def test_2_motors(mechanism, monkeypatch):
+def test_no_motor_brakes(mechanism, monkeypatch):
     assert error(mechanism) < 1e-12
     monkeypatch.setattr(World, "_switch_motors_off", lambda self: None)
     assert error(mechanism) > 1e-3
 
 
 @pytest.mark.parametrize("route", ROUTES)
-def test_3_inertia_from_the_file(mechanism, monkeypatch, route):
+def test_inertia_is_that_of_the_file(mechanism, monkeypatch, route):
     assert error(mechanism, route) < 1e-12
     monkeypatch.setattr(World, "FLAGS", 0)
     assert error(mechanism, route) > 1e-3
 
 
-def test_5_ranges_are_no_limits(walker):
+def test_ranges_are_no_limits(walker):
     """The knee leaves its range in OpenSim, and here."""
     knee = next(item for item in walker.components(Coordinate) if item.name == "RKnee_rz")
     trajectory = osimlite.simulate(walker, fixed_step=1e-3)
@@ -76,7 +76,7 @@ def spinning(speed):
     return model
 
 
-def test_7_fast_joints_are_not_clipped(monkeypatch):
+def test_fast_joints_are_not_clipped(monkeypatch):
     assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01).speeds[-1, 0] == pytest.approx(150.0)
     monkeypatch.setattr(World, "FASTEST", 100.0)
     with pytest.raises(OsimliteError, match="bursts"):
@@ -95,7 +95,7 @@ def impossible_inertia():
     return build_mechanism(model)
 
 
-def test_11_inertia_that_no_body_has(monkeypatch, capfd):
+def test_an_inertia_that_no_body_has_is_kept(monkeypatch, capfd):
     mechanism = impossible_inertia()
     state = {"q": [0.1, 0.2, 0.3, -0.4, 0.5, 0.6], "u": [1.0, -1.0, 0.5, 2.0, 1.0, -0.5]}
     assert error(mechanism, "auto", **state) < 1e-10
@@ -126,7 +126,7 @@ def steps(walker, h=1e-3, to=0.3):
         return np.array([state for _, state in own.steps(to)]), np.array(expected)
 
 
-def test_13_to_16_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
+def test_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
     """A step is exactly semi-implicit Euler with the forces at its start: no stale places, no force twice."""
     ours, expected = steps(walker)
     assert ours == pytest.approx(expected, abs=1e-9)
@@ -141,7 +141,7 @@ def test_13_to_16_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
     assert np.abs(ours - expected).max() > 1e-3
 
 
-def test_13_stale_places_would_show(walker, monkeypatch):
+def test_stale_places_would_show(walker, monkeypatch):
     """With forces one step old, as Bullet's own link positions are, the motion differs."""
     plain = World.step
     held = []
@@ -159,12 +159,12 @@ def parameters(client):
     return bullet.getPhysicsEngineParameters(client)
 
 
-def test_17_no_sub_steps(mechanism):
+def test_no_sub_steps(mechanism):
     with BulletEngine(mechanism, Forces(())) as engine:
         assert parameters(engine._body.client)["numSubSteps"] == 0
 
 
-def test_18_slow_motion_does_not_fall_asleep(monkeypatch):
+def test_slow_motion_does_not_fall_asleep(monkeypatch):
     def far():
         return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01).values[-1, 0]
 
@@ -173,14 +173,14 @@ def test_18_slow_motion_does_not_fall_asleep(monkeypatch):
     assert far() < 0.2
 
 
-def test_20_joints_are_matched_by_name(mechanism, monkeypatch):
+def test_joints_are_matched_by_name(mechanism, monkeypatch):
     assert error(mechanism, "mass-matrix") < 1e-12
     assert error(mechanism) < 1e-12
     monkeypatch.setattr(World, "_by_name", staticmethod(lambda robot, infos: list(robot.moving)))
     assert error(mechanism) > 1e-3
 
 
-def test_21_worlds_do_not_disturb_each_other(mechanism):
+def test_worlds_do_not_disturb_each_other(mechanism):
     with BulletEngine(mechanism, Forces(())) as first, BulletEngine(mechanism, Forces(())) as second:
         assert first._body.client != second._body.client
         ours = first.acceleration(0.0, Q, U)
@@ -188,7 +188,7 @@ def test_21_worlds_do_not_disturb_each_other(mechanism):
         assert first.acceleration(0.0, Q, U) == ours
 
 
-def test_25_nothing_collides(mechanism):
+def test_nothing_collides(mechanism):
     with BulletEngine(mechanism, Forces(())) as engine:
         body = engine._body
         for link in range(-1, bullet.getNumJoints(body.id, body.client)):

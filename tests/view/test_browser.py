@@ -185,7 +185,7 @@ def test_a_click_shows_properties(fixtures, open_page, tmp_path):
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.page.locator("#tree .node .name", has_text="Pelvis").first.click()
     selected = page.run("v.selected")
-    assert selected.endswith("Pelvis") or "Pelvis" in selected
+    assert "Pelvis" in selected
     page.run("v.select('/bodyset/Pelvis')")
     words = page.page.locator("#details").inner_text()
     assert "mass_center" in words and "/bodyset/Pelvis" in words
@@ -209,8 +209,9 @@ def test_what_a_finding_concerns_glows(fixtures, open_page, tmp_path):
     assert page.page.locator(f'#overlay .pin[title*="{bad}"]').is_visible()
     page.page.locator("#findings .finding").first.click()
     assert page.run("v.selected") == view.findings[0].component
+    page.run("v.select('/')")
     page.run("v.stage.showMarks(false)")
-    assert bad not in page.run(glowing) or page.run("v.selected") == bad
+    assert bad not in page.run(glowing)
 
 
 def test_layers_can_be_hidden(file_of, open_page, tmp_path):

@@ -72,12 +72,13 @@ def test_many_coordinates_are_shared_out_to_panels():
 
 
 def test_no_legend_covers_data_and_all_is_on_the_sheet():
-    motion = stroll()
+    motion, legends = stroll(), 0
     for _, figure in _figures(motion, walker()):
         sheet = laid_out(figure).bbox
         for panel in figure.axes:
             legend = panel.get_legend()
             if legend is not None:
+                legends += 1
                 box = legend.get_window_extent()
                 assert not box.overlaps(panel.get_window_extent())
                 assert box.x1 <= sheet.x1 + 1
@@ -85,6 +86,7 @@ def test_no_legend_covers_data_and_all_is_on_the_sheet():
                 if text.get_text():
                     box = text.get_window_extent()
                     assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= sheet.x1
+    assert legends
 
 
 def test_contact_forces_are_sizes_of_what_acts():
