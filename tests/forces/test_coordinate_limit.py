@@ -15,7 +15,7 @@ from osimlite.forces.coordinate_limit import limit_constants, limit_energy, limi
 PROPERTIES = "upper_stiffness", "upper_limit", "lower_stiffness", "lower_limit", "damping", "transition"
 
 
-def test_table(fixtures):
+def test_every_row_of_opensims_table(fixtures):
     """Force to 1e-9 of the sum of the magnitudes of its terms (springs, damper), energy to 1e-9 of itself.
 
     That sum is the force itself where the terms do not cancel; in four rows they cancel to rounding. OpenSim

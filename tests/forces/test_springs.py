@@ -8,6 +8,7 @@ from osimlite.forces.springs import (
     blankevoort_energy,
     blankevoort_tension,
     coordinate_spring_force,
+    mckibben_tension,
     path_spring_energy,
     path_spring_tension,
     point_spring_tension,
@@ -45,7 +46,7 @@ def test_damping_of_a_ligament():
         assert blankevoort_tension(length, 0.5, *constants) - still == pytest.approx(8.0 * 0.25 * part, abs=1e-12)
 
 
-def test_numbers():
+def test_values_worked_out_by_hand():
     assert coordinate_spring_force(1.0, 2.0, 3.0, 0.5, 0.25) == -2.0
     assert path_spring_tension(2.0, 0.5, 1.5, 10.0, 0.2) == pytest.approx(5.5)
     assert path_spring_tension(1.4, 0.5, 1.5, 10.0, 0.2) == 0.0
@@ -53,3 +54,9 @@ def test_numbers():
     assert path_spring_tension(2.0, -10.0, 1.5, 10.0, 0.2) == pytest.approx(-5.0)
     assert [stretch(1.0, 1.5, clamped) for clamped in (True, False)] == [0.0, -0.5]
     assert blankevoort_tension(2.2, 0.0, 2.0, 100.0, 0.06, 8.0) == pytest.approx(7.0)
+
+
+def test_pneumatic_muscle():
+    # It does not pull at the length B / sqrt(3).
+    assert mckibben_tension(0.1 + 0.6 / 3**0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(0.0, abs=1e-9)
+    assert mckibben_tension(0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(1e5 * 0.12 / (9.0 * 3.141592653589793))

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.forces.springs import mckibben_tension
 from osimlite.forces.station_contact import station_contact_force
 
 CONSTANTS = 1e4, 0.01, 0.0, 0.5, 0.2, 0.05
@@ -17,9 +16,3 @@ def test_station_contact():
     assert (rising, falling) == (pytest.approx(0.99 * still[1]), pytest.approx(1.01 * still[1]))
     fx, fy, fz = station_contact_force(-0.02, 3.0, 0.0, -4.0, *CONSTANTS)
     assert (fx, fz) == (pytest.approx(-0.6 * 1.5 * fy, rel=1e-4), pytest.approx(0.8 * 1.5 * fy, rel=1e-4))
-
-
-def test_pneumatic_muscle():
-    # It does not pull at the length B / sqrt(3).
-    assert mckibben_tension(0.1 + 0.6 / 3**0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(0.0, abs=1e-9)
-    assert mckibben_tension(0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(1e5 * 0.12 / (9.0 * 3.141592653589793))

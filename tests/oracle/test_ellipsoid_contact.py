@@ -15,7 +15,7 @@ opensim = pytest.importorskip("opensim", reason="needs the opensim package (extr
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
-from tests.oracle.test_forces import JOINTS, STATES, carrier, compare  # noqa: E402
+from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402
 
 MATERIAL = {
     "Stiffness": 1e6,

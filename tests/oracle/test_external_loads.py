@@ -20,8 +20,8 @@ opensim = pytest.importorskip("opensim", reason="needs the opensim package (extr
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
+from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402
 from tests.oracle.opensim_runs import inverse_dynamics  # noqa: E402
-from tests.oracle.test_forces import JOINTS, carrier  # noqa: E402
 
 LABELS = [f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"]
 

@@ -14,7 +14,7 @@ pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle'
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
-from tests.oracle.test_forces import JOINTS, STATES, carrier, compare  # noqa: E402
+from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402
 
 MATERIAL = {"dissipation": 0.3, "static_friction": 0.8, "dynamic_friction": 0.4, "viscous_friction": 0.2}
 

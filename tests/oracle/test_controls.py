@@ -1,4 +1,4 @@
-"""Actuators on paths, contact of stations, and controls from files against a live OpenSim 4.6."""
+"""Controls from files against a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import pytest
 
 from osimlite.errors import ModelError
 from osimlite.multibody import build_mechanism
-from osimlite.schema.actuators import CoordinateActuator
-from osimlite.schema.contact_forces import MeyerFregly2016Force
+from osimlite.schema.actuators import (
+    CoordinateActuator,
+)
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.functions import Constant
-from osimlite.schema.markers import Station
-from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
 
@@ -20,43 +19,13 @@ pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle'
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
-from tests.oracle.test_forces import JOINTS, along, carrier, compare, drive  # noqa: E402
+from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402
 
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
 def model(request, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return carrier(request.param)
-
-
-def test_actuators_along_paths(model, tmp_path):
-    model.add(*along(PathActuator, optimal_force=30.0))
-    drive(model, "along0", "along1")
-    assert compare(model, tmp_path) > 0
-
-
-def test_pneumatic_muscles(model, tmp_path):
-    model.add(*along(McKibbenActuator, optimal_force=30.0, number_of_turns=2.5, thread_length=0.7, cord_length=0.2))
-    drive(model, "along0", "along1")
-    assert compare(model, tmp_path) > 0
-
-
-def test_stations_on_the_floor(model, tmp_path):
-    for number, frame in enumerate(("/bodyset/b0", "/bodyset/b1/f1", "/bodyset/b2", "/ground")):
-        station = Station(name=f"s{number}", socket_parent_frame=frame, location=(0.1, -0.2 * number, 0.3))
-        model.subcomponents.append(station)
-        model.add(
-            MeyerFregly2016Force(
-                name=f"contact{number}",
-                socket_station=f"/s{number}",
-                stiffness=2000.0,
-                dissipation=0.3,
-                dynamic_friction=0.6,
-                viscous_friction=0.4,
-                spring_resting_length=0.02,
-            )
-        )
-    assert compare(model, tmp_path) > 0
 
 
 @pytest.mark.parametrize("method", [None, 0, 1, 3, 5])

@@ -1,0 +1,156 @@
+"""A model that carries any force, and the comparison of what OpenSim 4.6 computes for it live."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import Body, Model
+from osimlite.multibody import build_mechanism
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.frames import PhysicalOffsetFrame
+from osimlite.schema.functions import Constant, Sine
+from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.simulation.elements import force_elements
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+
+TIME = 0.37
+STATES = 4
+JOINTS = {
+    "free, ball, pin": ("FreeJoint", "BallJoint", "PinJoint"),
+    "pin, slider, universal": ("PinJoint", "SliderJoint", "UniversalJoint"),
+}
+
+
+def carrier(kinds) -> Model:
+    """Three bodies in a row, each on a joint of another kind and with a frame of its own."""
+    model = Model(name="carrier")
+    below = model.ground
+    for number, kind in enumerate(kinds):
+        body = model.add(
+            Body(
+                name=f"b{number}",
+                mass=1.0 + number,
+                mass_center=(0.05, -0.1, 0.02),
+                inertia=(0.2, 0.3, 0.25, 0.01, -0.02, 0.03),
+            )
+        )
+        body.subcomponents.append(
+            PhysicalOffsetFrame(
+                name=f"f{number}",
+                socket_parent="..",
+                translation=(0.1, -0.05, 0.2),
+                orientation=(0.3, -0.4, 0.2 + number),
+            )
+        )
+        joint = getattr(osimlite, kind)(name=f"j{number}")
+        for place, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{place}"
+        at, turned = (0.1, 0.2 * number, -0.05), (0.3, -0.2, 0.1)
+        model.add(joint.between(below, body, at=at, turned=turned, child_at=(0, 0.1, 0.03), child_turned=(0.1, 0, 1)))
+        below = body
+    return model
+
+
+def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
+    """Accelerations, records with their labels, and energy at some states.
+
+    `counted` says how often OpenSim counts the energy of the forces; None if it has an energy of its own. Returns how
+    many numbers of the records differ from zero.
+    """
+    busy = 0
+    from osimlite.simulation.engines.bullet import BulletEngine
+
+    opensim.Logger.setLevelString("off")
+    osimlite.write(model, tmp_path / "model.osim")
+    theirs = opensim.Model(str(tmp_path / "model.osim"))
+    state = theirs.initSystem()
+    mechanism = build_mechanism(model)
+    names = mechanism.coordinate_names
+    rng = np.random.default_rng(7)
+    with BulletEngine(mechanism, force_elements(model, mechanism)) as engine:
+        for _ in range(STATES):
+            q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
+            for place, info in enumerate(mechanism.coordinates):
+                if info.locked:
+                    q[place], u[place] = info.default_value, 0.0
+            for name, value, speed in zip(names, q, u, strict=True):
+                coordinate = theirs.updCoordinateSet().get(name)
+                if not coordinate.getLocked(state):
+                    coordinate.setValue(state, value, False)
+                    coordinate.setSpeedValue(state, speed)
+            state.setTime(TIME)
+            theirs.realizeAcceleration(state)
+            expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]
+            ours = engine.acceleration(TIME, q.tolist(), u.tolist())
+            scale = max(1.0, np.abs(expected).max())
+            assert np.abs(np.subtract(ours, expected)).max() <= tolerance * scale
+            labels, values = [], []
+            forces = theirs.getForceSet()
+            for number in range(forces.getSize()):
+                found, row = forces.get(number).getRecordLabels(), forces.get(number).getRecordValues(state)
+                labels += [found.get(place) for place in range(found.getSize())]
+                values += [row.get(place) for place in range(found.getSize())]
+            busy += np.count_nonzero(values)
+            y = engine.state.pack(q, u)
+            assert list(engine.columns) == labels
+            recorded = engine.force_records(TIME, y)
+            assert recorded == pytest.approx(values, rel=tolerance, abs=tolerance * max(1.0, *map(abs, [0, *values])))
+            if counted is not None:
+                kinetic, gravity, stored = engine.energies(TIME, y)
+                assert kinetic == pytest.approx(theirs.calcKineticEnergy(state), rel=1e-10)
+                total = theirs.calcPotentialEnergy(state)
+                assert gravity + counted * stored == pytest.approx(total, rel=1e-9, abs=1e-9)
+    return busy
+
+
+PAIRS = (("/ground", "/bodyset/b2/f2"), ("/bodyset/b1/f1", "/bodyset/b0"), ("/bodyset/b0/f0", "/bodyset/b1/f1"))
+DAMPING = {"rotational_damping": (0.3, 0.2, 0.1), "translational_damping": (2.0, 1.0, 3.0)}
+
+
+def between(kind, **more):
+    return [
+        kind(name=f"bushing{number}", socket_frame1=one, socket_frame2=two, **more)
+        for number, (one, two) in enumerate(PAIRS)
+    ]
+
+
+ROUTES = (
+    (("/ground", (1.0, 0.5, 0.2)), ("/bodyset/b2", (0.1, 0.2, 0.3))),
+    (
+        ("/bodyset/b1/f1", (0.1, 0.0, 0.2)),
+        ("/bodyset/b1", (0.3, 0.2, 0.0)),
+        ("/bodyset/b0", (0.0, 0.4, 0.1)),
+        ("/ground", (-0.5, 0.1, 0.0)),
+        ("/bodyset/b2/f2", (0.2, 0.1, 0.0)),
+    ),
+)
+
+
+def along(kind, **more):
+    found = []
+    for number, route in enumerate(ROUTES):
+        force = kind(name=f"along{number}", **more)
+        path = GeometryPath(name="path")
+        for place, (frame, at) in enumerate(route):
+            path.path_point_set.objects.append(PathPoint(name=f"p{place}", socket_parent_frame=frame, location=at))
+        force.geometry_path = path
+        found.append(force)
+    return found
+
+
+def drive(model, *names):
+    """Controls by functions of time: one for each actuator, and one more for the first."""
+    functions = [Sine(amplitude=0.5, omega=3.0, phase=0.1, offset=1.0), Constant(value=-2.0)]
+    paths = [f"/forceset/{name}" for name in names]
+    for number, function in enumerate(functions):
+        controller = PrescribedController(name=f"c{number}", socket_actuators=tuple(paths))
+        controller.ControlFunctions.objects += [function.model_copy() for _ in paths]
+        model.add(controller)
+        paths = paths[:1]
+    off = PrescribedController(name="off", socket_actuators=tuple(paths), enabled=False)
+    off.ControlFunctions.objects.append(Constant(value=100.0))
+    model.add(off)
