@@ -15,16 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import opensim
 from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _opensim_walks import Order, opensim_walks
 from osimlite.gait.basin import perturbed, walks_from
 from osimlite.gait.cycle import find_cycle
-from osimlite.gait.footing import find_footing
 from osimlite.gait.stepmap import StepMap
-from osimlite.gait.steps import Walk, along_slope, follow, walk_many
+from osimlite.gait.steps import Walk, walk_many
 from osimlite.models.source import make_model
 from osimlite.simulation import Simulation
 
@@ -46,23 +45,27 @@ FINEST = 2e-3
 def main() -> None:
     console = Console()
     names = sys.argv[1:] or list(CONFIRMED)
-    for part in (near, margins, confirmation):
-        console.print(part(names))
+    for part in (near, margins):
+        console.print(part([name for name in names if name in CHANGED]))
+    console.print(confirmation(names))
 
 
 def confirmation(names: list[str]) -> Table:
     table = Table(title=f"Walking for {TO:g} s")
     for heading in ("model", "accuracy", "program", "steps", "scuffs", "way (m)", "ends", "time taken (s)"):
         table.add_column(heading, justify="left" if heading in ("model", "program", "ends") else "right")
+    with tempfile.TemporaryDirectory() as folder:
+        orders = {name: Order(Path(folder) / f"{name}.osim", TO, CONFIRMED[name]) for name in names}
+        for name, order in orders.items():
+            osimlite.write(make_model(name), order.path)
+        theirs = opensim_walks(orders)
     for name in names:
-        accuracy = CONFIRMED[name]
-        for program, run in (("OpenSim", opensim_walk), ("osimlite", our_walk)):
-            began = time.process_time()
-            walk = run(make_model(name), TO, accuracy)
-            taken = time.process_time() - began
+        began = time.process_time()
+        ours = our_walk(make_model(name), TO, CONFIRMED[name]), time.process_time() - began
+        for program, (walk, taken) in (("OpenSim", theirs[name]), ("osimlite", ours)):
             ends = walk.ending if walk.walks else f"fell on {walk.fell_on} at {walk.end:.2f} s"
-            numbers = f"{len(walk.steps)}", f"{len(walk.scuffs)}", f"{walk.distance:.4f}"
-            table.add_row(name, f"{accuracy:g}", program, *numbers, ends, f"{taken:.2f}")
+            numbers = f"{len(walk.steps)}", f"{len(walk.scuffs)}", f"{walk.distance:.6f}"
+            table.add_row(name, f"{CONFIRMED[name]:g}", program, *numbers, ends, f"{taken:.2f}")
     return table
 
 
@@ -71,57 +74,6 @@ def our_walk(model: osimlite.Model, to: float, accuracy: float) -> Walk:
         engine: Any = simulation.engine
         (walk,) = walk_many(engine, [simulation.initial_state({}, {})], to, accuracy=accuracy)
         return walk
-
-
-def opensim_walk(model: osimlite.Model, to: float, accuracy: float) -> Walk:
-    """What OpenSim makes of the model's file; steps and scuffs by the rules of osimlite, from OpenSim's forces."""
-    opensim.Logger.setLevelString("off")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "walker.osim"
-        osimlite.write(model, path)
-        theirs = opensim.Model(str(path))
-    reporter = opensim.ForceReporter(theirs)
-    theirs.addAnalysis(reporter)
-    state = theirs.initSystem()
-    manager = opensim.Manager(theirs)
-    manager.setIntegratorAccuracy(accuracy)
-    manager.initialize(state)
-    manager.integrate(to)
-    with Simulation(model, "compiled") as simulation:
-        return _read_off(simulation.engine, reporter.getForcesTable(), manager.getStatesTable())
-
-
-def _read_off(engine: Any, forces: Any, states: Any) -> Walk:
-    """Touch-downs from OpenSim's forces, and where the feet are at OpenSim's states."""
-    footing = find_footing(engine)
-    times, matrix = np.array(forces.getIndependentColumn()), forces.getMatrix().to_numpy()
-    labels = list(forces.getColumnLabels())
-    touching = []
-    for contact in engine.contacts:
-        own = [k for k, label in enumerate(labels) if label.startswith(f"{contact}.") and ".force." in label]
-        touching.append(np.abs(matrix[:, own]).max(axis=1) > 0.0)
-    changes = [
-        (k, contact, bool(pushes[k]))
-        for contact, pushes in zip(engine.contacts, touching, strict=True)
-        for k in (np.flatnonzero(np.diff(pushes)) + 1).tolist()
-    ]
-    changes.sort(key=lambda change: change[0])
-    columns = list(states.getColumnLabels())
-    paths = [engine.mechanism.coordinates[place].path for place in engine.order]
-    order = [columns.index(f"{path}/{kind}") for kind in ("value", "speed") for path in paths]
-    rows = np.searchsorted(states.getIndependentColumn(), [times[k] - 1e-12 for k, _, _ in changes])
-    moments = states.getMatrix().to_numpy()[:, order][rows]
-    walk = follow(
-        footing,
-        engine.contacts,
-        [(float(times[k]), contact, begins) for k, contact, begins in changes],
-        moments,
-        along_slope(engine, moments)[0],
-        np.array([pushes[0] for pushes in touching]),
-    )
-    if walk.walks:
-        walk.end = float(times[-1])
-    return walk
 
 
 def near(names: list[str]) -> Table:
@@ -153,7 +105,7 @@ def margins(names: list[str]) -> Table:
     for heading in ("model", "property", "least", "value", "most"):
         table.add_column(heading, justify="left" if heading in ("model", "property") else "right")
     for name in names:
-        for parameter, value in CHANGED.get(name, {}).items():
+        for parameter, value in CHANGED[name].items():
 
             def walks(number: float, name: str = name, parameter: str = parameter) -> bool:
                 return len(our_walk(make_model(name, {parameter: repr(number)}), TO, 1e-6).steps) >= MANY

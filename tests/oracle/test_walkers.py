@@ -1,0 +1,61 @@
+"""OpenSim 4.6 itself walks with the walkers that are shipped.
+
+Foot strikes are counted from OpenSim's own contact forces: a step is the other foot touching down at least 5 cm ahead
+along the slope after at least 0.05 s in the air, any other touch-down is a scuff, and a hip or a knee on the slope ends
+the walk.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import osimlite
+from osimlite.simulation import Simulation
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+from benchmarks._opensim_walks import Order, opensim_walks
+from osimlite.gait.steps import walk_many
+
+pytestmark = [pytest.mark.oracle, pytest.mark.timeout(900)]
+
+LONG = {"steady-walker": 60.0, "human-walker": 60.0}
+ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6}
+"""The human walker's knees stop so hard that OpenSim takes long at a finer one."""
+
+
+@pytest.fixture(scope="module")
+def walks(fixtures):
+    """By name, OpenSim's walk and ours, from the same file."""
+    orders = {
+        name: Order(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy) for name, accuracy in ACCURACY.items()
+    }
+    theirs = opensim_walks(orders)
+    found = {}
+    for name, order in orders.items():
+        with Simulation(osimlite.read(order.path), "compiled") as simulation:
+            start = simulation.initial_state({}, {})
+            (ours,) = walk_many(simulation.engine, [start], order.to, accuracy=order.accuracy)
+        found[name] = theirs[name][0], ours
+    return found
+
+
+@pytest.mark.parametrize("name", ["steady-walker", "human-walker"])
+def test_it_walks_on(walks, name):
+    theirs, _ = walks[name]
+    assert theirs.walks and theirs.end == 60.0 and theirs.scuffs == []
+    assert len(theirs.steps) >= 50
+    assert [step.foot for step in theirs.steps[:3]] in ([0, 1, 0], [1, 0, 1])
+
+
+@pytest.mark.parametrize("name", list(LONG))
+def test_ours_is_the_same_walk(walks, name):
+    """Steps at the same times, to what OpenSim's integrator goes on between the moments that it reports."""
+    theirs, ours = walks[name]
+    assert (theirs.ending, theirs.fell_on, len(theirs.scuffs)) == (ours.ending, ours.fell_on, len(ours.scuffs))
+    assert theirs.end == pytest.approx(ours.end, abs=1e-3)
+    assert [step.foot for step in theirs.steps] == [step.foot for step in ours.steps]
+    for field in ("time", "air", "length"):
+        found = [getattr(step, field) for step in theirs.steps]
+        assert found == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), field
+    assert theirs.distance == pytest.approx(ours.distance, rel=5e-6)
