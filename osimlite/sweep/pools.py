@@ -126,8 +126,17 @@ class ThreadPool(_LocalPool):
     """Threads: the compiled engine lets them run side by side."""
 
     def __init__(self, plan: Plan, count: int) -> None:
-        _thread_runner(plan)
-        super().__init__(ThreadPoolExecutor(count), lambda values: _thread_runner(plan).run(values), count)
+        # What tells of a plan that cannot be run serves the first thread.
+        spare = [Runner(plan)]
+
+        def begin() -> None:
+            try:
+                _local.runner = spare.pop()
+            except IndexError:
+                _local.runner = Runner(plan)
+
+        executor = ThreadPoolExecutor(count, initializer=begin)
+        super().__init__(executor, lambda values: _thread_runner(plan).run(values), count)
 
 
 class ProcessPool(_LocalPool):

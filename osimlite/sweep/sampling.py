@@ -7,7 +7,7 @@ where it was interrupted.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import prod
 from typing import Any
 
@@ -37,12 +37,14 @@ class Samples:
         sampler: one of `SAMPLERS`.
         count: N runs.
         seed: what makes random samples the same again.
+        memory: of the last block, from which the next one goes on; for one thread at a time.
     """
 
     variables: tuple[Variable, ...]
     sampler: str
     count: int
     seed: int = 0
+    memory: dict[str, Sobol] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def block(self, first: int, count: int) -> Floats:
         """Rows from `first` on, as many as `count` and as there are (k, d), in the units of the variables."""
@@ -58,7 +60,7 @@ class Samples:
         if self.sampler == "grid":
             return self._grid(first, last, varied)
         if self.sampler == "sobol":
-            return sobol(self.seed, first, last, len(varied))
+            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).points(first, last)
         numbers = _uniform(self.seed, first, last, len(varied))
         if self.sampler == "random":
             return numbers
@@ -111,17 +113,32 @@ def samples(
     return Samples(tuple(variables), sampler, count, seed)
 
 
-def sobol(seed: int, first: int, last: int, width: int) -> Floats:
-    """Points first ... last - 1 of Sobol's sequence in the cube of so many dimensions, scrambled by a seed."""
-    qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
-    points = qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed))
-    # scipy counts on from the first point; asked for all at once, it warns of numbers that are no power of two.
-    start: Floats = points.random(1)
-    if first == 0:
-        return np.concatenate((start, points.random(last - 1)))
-    points.fast_forward(first - 1)
-    found: Floats = points.random(last - first)
-    return found
+class Sobol:
+    """Sobol's sequence in the cube of so many dimensions, scrambled by a seed.
+
+    Points that follow on the last ones cost little; for others, the sequence is begun again.
+    """
+
+    def __init__(self, seed: int, width: int) -> None:
+        self._seed, self._width = seed, width
+        self._points: Any = None
+        self._next = 0
+
+    def points(self, first: int, last: int) -> Floats:
+        """Points first ... last - 1."""
+        head = np.zeros((0, self._width))
+        if self._points is None or first < self._next:
+            qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
+            self._points = qmc.Sobol(self._width, scramble=True, rng=np.random.default_rng(self._seed))
+            # Asked for more than one at first, scipy warns of numbers that are no power of two.
+            start, self._next = self._points.random(1), 1
+            head = start if first == 0 else head
+        first = max(first, 1) if len(head) else first
+        if first > self._next:
+            self._points.fast_forward(first - self._next)
+        found: Floats = np.concatenate((head, self._points.random(last - first)))
+        self._next = last
+        return found
 
 
 def _uniform(seed: int, first: int, last: int, width: int) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import SettingError
-from osimlite.sweep.sampling import sobol
+from osimlite.sweep.sampling import Sobol
 from osimlite.sweep.variables import Floats
 from osimlite.text import or_known
 
@@ -85,7 +85,7 @@ def sobol_cma(ask: Ask, search: Search) -> str:
     on with a larger one.
     """
     size = search.popsize or 4 + int(3.0 * np.log(len(search.start)))
-    points = sobol(search.seed, 0, LOOKS * size, len(search.start))
+    points = Sobol(search.seed, len(search.start)).points(0, LOOKS * size)
     points[0] = search.start
     costs = np.concatenate([ask(points[first : first + size]) for first in range(0, len(points), size)])
     best = points[int(np.argmin(costs))]

@@ -34,6 +34,14 @@ def test_any_pieces_make_the_whole(sampler, count, seed, cuts):
     assert (whole >= [item.low for item in THREE]).all() and (whole <= [item.high for item in THREE]).all()
 
 
+@given(st.sampled_from(SAMPLERS), st.lists(st.tuples(st.integers(0, 100), st.integers(1, 100)), max_size=6))
+def test_pieces_come_in_any_order(sampler, pieces):
+    found = Samples(THREE, sampler, 12 if sampler == "grid" else 150, 1)
+    whole = Samples(THREE, sampler, found.count, 1).block(0, found.count)
+    for first, count in pieces:
+        assert np.array_equal(found.block(first, count), whole[first : first + count])
+
+
 def test_grid_has_every_combination_and_both_ends():
     found = samples(THREE)
     assert found.sampler == "grid" and found.count == 12
