@@ -3,9 +3,10 @@
 Both simulate two seconds at accuracy 1e-3 from the same starts, and keep the distance. OpenSim's model and state are
 made once, and each walker has a manager of its own, as in OpenSim's examples. osimlite's time is that of the whole
 sweep: samples, simulations, measures and the file. Times of processors are compared, per walker, since other programs
-may run beside; the walkers per second of one and of two workers are by the clock, in turn.
+may run beside; the walkers per second of one and of two workers are by the clock, in turn, beside those of one and of
+two processes that share nothing: what more the machine does with two at a time.
 
-With `--many`, a hundred thousand walkers, and the memory that this takes.
+With `--workers`, only that. With `--many`, a hundred thousand walkers, and the memory that this takes.
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ import resource
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -34,7 +38,7 @@ MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "Dynami
 VARY = {"RHip_rz": "20deg:40deg", "LHip_rz": "-20deg:0deg", "Pelvis_tx/speed": "0:1"}
 STIFFNESS = {**VARY, "/forceset/*Foot*/contact_parameters/stiffness": "1e5:1e7:log"}
 MASS = {**VARY, "/bodyset/Pelvis/mass": "1:3"}
-TO, WALKERS, ROUNDS, BY_BULLET, MANY = 2.0, 1000, 2, 30, 100_000
+TO, WALKERS, TURNS, ROUNDS, BY_BULLET, MANY = 2.0, 1000, 9, 2, 30, 100_000
 
 
 def main() -> None:
@@ -48,6 +52,8 @@ def main() -> None:
         # What is made once, and what of machine code is not in the cache yet.
         Runner(starts).run(samples(starts.variables, "sobol", 8).block(0, 8))
         console.print(workers(starts, path))
+        if "--workers" in sys.argv:
+            return
         import opensim
 
         opensim.Logger.setLevelString("off")
@@ -95,20 +101,64 @@ def run_opensim(opensim: Any, rows: Any) -> Callable[[], list[float]]:
 
 
 def workers(made: Plan, path: Path) -> Table:
-    """Walkers per second by the clock, one worker and two in turn."""
+    """Walkers per second by the clock, one worker and two in turn, and what the machine itself allows."""
     table = Table(title=f"{WALKERS} walkers", caption="median of the rounds; speed-up within each round")
-    for heading in ("workers", "walkers/s", "speed-up"):
-        table.add_column(heading, justify="right")
-    times: dict[int, list[float]] = {1: [], 2: []}
-    for _ in range(5):
-        for count, seconds in times.items():
-            started = time.perf_counter()
-            by_sweep(made, path, workers=count)()
-            seconds.append(time.perf_counter() - started)
-    gains = [one / two for one, two in zip(times[1], times[2], strict=True)]
-    table.add_row("1", f"{WALKERS / median(times[1]):.0f}", "")
-    table.add_row("2", f"{WALKERS / median(times[2]):.0f}", f"{median(gains):.2f}")
+    for heading in ("", "one", "two", "speed-up", "least", "most"):
+        table.add_column(heading, justify="right" if heading else "left")
+    alone, swept = [], []
+    with separate_processes(made) as together:
+        for _ in range(TURNS):
+            alone.append([together(count) for count in (1, 2)])
+            swept.append([WALKERS / elapsed(by_sweep(made, path, workers=count)) for count in (1, 2)])
+    for name, rows in (("workers of a sweep", swept), ("separate processes, the machine's bound", alone)):
+        one, two = zip(*rows, strict=True)
+        gains = [b / a for a, b in rows]
+        speed = (f"{walkers:.0f}/s" for walkers in (median(one), median(two)))
+        table.add_row(name, *speed, *(f"{gain:.2f}" for gain in (median(gains), min(gains), max(gains))))
     return table
+
+
+def elapsed(work: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+@contextmanager
+def separate_processes(made: Plan) -> Iterator[Callable[[int], float]]:
+    """What makes one process or two, which share nothing, walk all walkers each; how many walk per second together."""
+    context = get_context("spawn")
+    ends = [context.Pipe() for _ in range(2)]
+    others = [context.Process(target=walk_when_told, args=(made.packed(), end), daemon=True) for _, end in ends]
+
+    def together(count: int) -> float:
+        told = [end for end, _ in ends[:count]]
+        for end in told:
+            end.send(WALKERS)
+        return count * WALKERS / max(end.recv() for end in told)
+
+    for process in others:
+        process.start()
+    try:
+        for end, _ in ends:
+            end.recv()
+        yield together
+    finally:
+        for end, _ in ends:
+            end.send(0)
+        for process in others:
+            process.join()
+
+
+def walk_when_told(packed: bytes, end: Any) -> None:
+    """In a process of its own: walk as many as it is told, and tell the time that this took, until it is told none."""
+    made = Plan.unpacked(packed)
+    runner = Runner(made)
+    runner.run(samples(made.variables, "sobol", 8).block(0, 8))
+    end.send(0.0)
+    while count := end.recv():
+        rows = samples(made.variables, "sobol", count).block(0, count)
+        end.send(elapsed(partial(runner.run, rows)))
 
 
 def kinds(path: Path) -> Table:
