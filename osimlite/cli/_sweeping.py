@@ -35,6 +35,10 @@ Above = Annotated[
         "--stop-above", metavar="NAME=VALUE", help="End a run when a coordinate rises above.", show_default=False
     ),
 ]
+Planted = Annotated[
+    bool,
+    typer.Option("--planted", help="Put the walker on the ground with the deeper foot, at rest there, at each start."),
+]
 Workers = Annotated[
     int | None,
     typer.Option(

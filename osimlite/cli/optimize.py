@@ -20,8 +20,8 @@ def optimize(
         str,
         typer.Option(
             metavar="NAME",
-            help="What is wanted: distance, steps, time_to_fall (the more, the better), largest_force, scuffs, energy "
-            "or module:function (the less, the better).",
+            help="What is wanted: distance, steps, progress, time_to_fall (the more, the better), largest_force, "
+            "scuffs, energy or module:function (the less, the better).",
             show_default=False,
         ),
     ],
@@ -54,6 +54,7 @@ def optimize(
     accuracy: options.Accuracy = None,
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
+    planted: sweeping.Planted = False,
     parameter: options.Parameters = None,
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
@@ -76,7 +77,8 @@ def optimize(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, skip_unsupported=skip_unsupported,
+        accuracy=accuracy, is_planted=planted,
+        skip_unsupported=skip_unsupported,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
         found = search(

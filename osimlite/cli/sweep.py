@@ -33,7 +33,7 @@ def sweep(
         typer.Option(
             "--measure",
             metavar="NAME",
-            help="What to keep of a run: distance, energy, largest_force, steps, scuffs, time_to_fall, "
+            help="What to keep of a run: distance, energy, largest_force, steps, scuffs, progress, time_to_fall, "
             "COORDINATE/value, COORDINATE/speed, or module:function.",
             show_default="distance and largest_force",
         ),
@@ -43,6 +43,7 @@ def sweep(
     accuracy: options.Accuracy = None,
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
+    planted: sweeping.Planted = False,
     report_interval: Annotated[
         float | None,
         typer.Option(
@@ -73,7 +74,8 @@ def sweep(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure) if measure else None, to=to,
-        engine=engine, accuracy=accuracy, report_interval=report_interval, skip_unsupported=skip_unsupported,
+        engine=engine, accuracy=accuracy, report_interval=report_interval, is_planted=planted,
+        skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)
     with progress_bar("sweeping", chosen.count) as progress:

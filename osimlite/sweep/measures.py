@@ -30,11 +30,12 @@ BUILT_IN = {
     "largest_force": "osimlite.sweep.measures:largest_force",
     "steps": "osimlite.sweep.walking:steps",
     "scuffs": "osimlite.sweep.walking:scuffs",
+    "progress": "osimlite.sweep.walking:progress",
     "time_to_fall": "osimlite.sweep.walking:time_to_fall",
 }
 """Measures by name, and the function of an engine that makes each."""
 
-LARGER_IS_BETTER = ("distance", "steps", "time_to_fall")
+LARGER_IS_BETTER = ("distance", "steps", "progress", "time_to_fall")
 
 
 @dataclass(frozen=True)

@@ -134,8 +134,9 @@ class Runner:
         given, first = self.variants.given, group[0].variant
         engine = (given if first.structure == given.structure else first).engine
         look = self._look(first.structure, engine)
-        starts = np.stack([sample.start for sample in group])
-        runs, why = self._simulate(engine, look, [sample.variant for sample in group], starts)
+        variants = [sample.variant for sample in group]
+        starts = self.variants.placed(engine, variants, np.stack([sample.start for sample in group]))
+        runs, why = self._simulate(engine, look, variants, starts)
         for number, sample in enumerate(group):
             block.status[sample.place], block.reasons[sample.place] = why[number]
             block.times[sample.place] = runs.times[number]

@@ -101,26 +101,25 @@ class Variants:
             row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
         return row
 
-    def starts(self, variants: Sequence[Variant], values: Floats) -> Floats:
-        """Initial states (k, 2n) of samples (k, d), whose models have one structure.
+    def placed(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
+        """Initial states (k, 2n), put on their feet if the plan says so.
+
+        Args:
+            engine: of any model of the structure that these have.
+            variants: the models (k).
+            starts: where they start (k, 2n).
 
         Raises:
-            OsimliteError: a start cannot be planted, since the model has no feet.
+            OsimliteError: the model has no two feet.
         """
-        rows = np.stack([self.start(variant, row) for variant, row in zip(variants, values, strict=True)])
         if not self._plan.is_planted:
-            return rows
+            return starts
         from osimlite.gait.footing import find_footing
         from osimlite.gait.starts import planted, stood
 
-        engine = self.leading(variants[0]).engine
         footing = find_footing(engine)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
-        return stood(engine, footing, planted(engine, footing, rows, numbers=numbers), PRESSED, -1, numbers=numbers)
-
-    def leading(self, variant: Variant) -> Variant:
-        """A variant of the same structure; any of them will do, and making an engine takes time."""
-        return self.given if variant.structure == self.given.structure else variant
+        return stood(engine, footing, planted(engine, footing, starts, numbers=numbers), PRESSED, -1, numbers=numbers)
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""
@@ -145,7 +144,8 @@ class Variants:
             setattr(coordinates[target.coordinate], name, float(values[place]))
         if self._plan.is_planted:
             variant = self.variant(values)
-            engine, (row,) = variant.engine, self.starts([variant], np.array([values])).tolist()
+            engine = variant.engine
+            (row,) = self.placed(engine, [variant], self.start(variant, values)[None]).tolist()
             for number, place in enumerate(engine.order):
                 coordinate = coordinates[engine.mechanism.coordinates[place].path]
                 coordinate.default_value, coordinate.default_speed_value = row[number], row[number + len(engine.order)]

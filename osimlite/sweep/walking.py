@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from osimlite.errors import SettingError
 from osimlite.gait.footing import Footing, find_footing
-from osimlite.gait.steps import Walk, falls, room_for, walks_of
+from osimlite.gait.steps import SHORTEST, Walk, along_slope, falls, room_for, walks_of
 from osimlite.sweep.measures import Batch, Measure
 from osimlite.sweep.variables import Floats
 
@@ -30,16 +29,54 @@ def time_to_fall(engine: Any) -> Measure:
     return _measure("time_to_fall", engine, lambda walk: walk.end)
 
 
+def progress(engine: Any) -> Measure:
+    """How many steps were made before the first scuff, and how near the next one was: what a search can climb.
+
+    The part after the point is the mean of two numbers below one. One is how near the foot came to where its step would
+    have counted, when it scuffed or the run ended: 1/2 if it lacked as much again as the shortest step. The other is
+    how long it had gone on by then: 1/2 for a second.
+    """
+    footing = _footing("progress", engine)
+    feet = [[engine.contacts.index(name) for name in foot] for foot in footing.feet]
+
+    def numbers(batch: Batch) -> Floats:
+        rows = None if batch.numbers is None else np.arange(len(batch.starts))
+        along = along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
+        places = np.stack([along[:, foot].max(axis=1) for foot in feet], axis=1)
+        found = zip(_walks(footing, batch), places.tolist(), strict=True)
+        return np.array([_progress(walk, ends) for walk, ends in found])
+
+    return _made("progress", footing, numbers)
+
+
+def _progress(walk: Walk, places: Sequence[float]) -> float:
+    if walk.scuffs:
+        until, lead = walk.scuffs[0].time, walk.scuffs[0].length
+    else:
+        until, last = walk.end, walk.steps[-1].foot if walk.steps else int(np.argmax(places))
+        lead = max(place for foot, place in enumerate(places) if foot != last) - places[last]
+    near = SHORTEST / (SHORTEST + max(SHORTEST - lead, 0.0))
+    return walk.clean_steps + 0.5 * (near + until / (until + 1.0))
+
+
 def _measure(name: str, engine: Any, number: Callable[[Walk], float]) -> Measure:
+    footing = _footing(name, engine)
+    return _made(name, footing, lambda batch: np.array([number(walk) for walk in _walks(footing, batch)], float))
+
+
+def _footing(name: str, engine: Any) -> Footing:
     if engine.name != "compiled":
         raise SettingError(f"the measure '{name}' needs --engine compiled")
-    footing = find_footing(engine)
-    return Measure(name, partial(_of, footing, number), tuple(falls(footing)), room_for, True)
+    return find_footing(engine)
 
 
-def _of(footing: Footing, number: Callable[[Walk], float], batch: Batch) -> Floats:
-    walks = batch.memory.get("walks")
+def _made(name: str, footing: Footing, numbers: Callable[[Batch], Floats]) -> Measure:
+    return Measure(name, numbers, tuple(falls(footing)), room_for, True)
+
+
+def _walks(footing: Footing, batch: Batch) -> list[Walk]:
+    walks: list[Walk] | None = batch.memory.get("walks")
     if walks is None:
         walks = walks_of(batch.engine, batch.starts, batch.runs, footing, numbers=batch.numbers)
         batch.memory["walks"] = walks
-    return np.array([number(walk) for walk in walks], dtype=float)
+    return walks
