@@ -11,8 +11,9 @@ from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array
 
 _TERMS = np.arange(16)
-_SINE = (-1.0) ** _TERMS / np.array([math.factorial(2 * n + 1) for n in _TERMS.tolist()], dtype=float)
-_COSINE = (-1.0) ** _TERMS / np.array([math.factorial(2 * n + 2) for n in _TERMS.tolist()], dtype=float)
+SINE_TERMS = (-1.0) ** _TERMS / np.array([math.factorial(2 * n + 1) for n in _TERMS.tolist()], dtype=float)
+COSINE_TERMS = (-1.0) ** _TERMS / np.array([math.factorial(2 * n + 2) for n in _TERMS.tolist()], dtype=float)
+"""Coefficients of the powers of θ² in (sin θ) / θ and (1 - cos θ) / θ²."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def _series(cosine: float) -> tuple[tuple[float, float, float], tuple[float, flo
     square = math.acos(max(-1.0, min(1.0, cosine))) ** 2
     powers = square**_TERMS
     both = []
-    for terms in (_SINE, _COSINE):
+    for terms in (SINE_TERMS, COSINE_TERMS):
         once, twice = _TERMS[1:] * terms[1:], (_TERMS[2:] * _TERMS[1:-1]) * terms[2:]
         both.append((float(terms @ powers), float(once @ powers[:-1]), float(twice @ powers[:-2])))
     return both[0], both[1]

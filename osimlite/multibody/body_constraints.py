@@ -145,10 +145,13 @@ class PointOnLineConstraint(Holonomic):
     def bond(self, state: Kinematics) -> Bond:
         """Two directions across the line see no distance of the station from it."""
         arm = station(state, self.follower).minus(station(state, self.line))
+        return joined(*(product(direction(state, self.line.body, axis), arm) for axis in self.across()))
+
+    def across(self) -> list[Array]:
+        """Two unit directions (3,) across the line, in the frame of its body."""
         start = np.eye(3)[int(np.argmin(np.abs(self.along)))]
         across = cross(self.along, start)
-        other = cross(self.along, across)
-        return joined(*(product(direction(state, self.line.body, axis), arm) for axis in _units(across, other)))
+        return _units(across, cross(self.along, across))
 
 
 @dataclass(frozen=True, eq=False)

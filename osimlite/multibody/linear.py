@@ -8,10 +8,10 @@ import numpy as np
 
 from osimlite.multibody.spatial import Array
 
-_REDUNDANT = 1e-9
+REDUNDANT = 1e-9
 """An equation that differs from what others say by less than this part of itself says nothing new."""
-_ROUNDING = 1e-13
-"""What is shorter than this part of the longest equation is rounding error."""
+ROUNDING = 1e-13
+"""What is shorter than this part of the longest equation, or than this at all, is rounding error: in m and rad."""
 NEGLIGIBLE = 1e-7
 """In an assembled pose, an equation shorter than this part of the longest comes from the errors of the pose."""
 
@@ -21,7 +21,7 @@ def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
 
 
-def solutions(rows: Array, values: Array, negligible: float = _ROUNDING) -> tuple[Array, Array]:
+def solutions(rows: Array, values: Array, negligible: float = ROUNDING) -> tuple[Array, Array]:
     """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
 
     Where equations contradict each other, the solution has the least squares of their errors, each equation counted
@@ -32,15 +32,15 @@ def solutions(rows: Array, values: Array, negligible: float = _ROUNDING) -> tupl
     if not (count and size):
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths <= negligible * lengths.max()] = max(1.0, lengths.max())
+    lengths[lengths <= max(negligible * lengths.max(), ROUNDING)] = max(1.0, lengths.max())
     rows, values = rows / lengths[:, None], values / lengths
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")
         triangle = triangle[:count]
-        if np.abs(triangle.diagonal()).min() > _REDUNDANT:
+        if np.abs(triangle.diagonal()).min() > REDUNDANT:
             return basis[:, :count] @ np.linalg.solve(triangle.T, values), basis[:, count:]
     left, strengths, right = np.linalg.svd(rows)
-    rank = int(np.sum(strengths > _REDUNDANT * strengths[0]))
+    rank = int(np.sum(strengths > REDUNDANT * max(strengths[0], 1.0)))
     return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T
 
 

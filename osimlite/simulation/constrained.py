@@ -19,15 +19,21 @@ from osimlite.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.multibody.dynamics import constrained_accelerations
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.kinematics import Kinematics, kinematics
-from osimlite.multibody.linear import NEGLIGIBLE, shortest, stacked
+from osimlite.multibody.linear import NEGLIGIBLE, ROUNDING, shortest, stacked
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
 
-_OVERSHOOT = 0.1
-_FINEST = 2.0 ** (-52.0 * 7.0 / 8.0)
+OVERSHOOT = 0.1
+"""The part of the tolerance that a projection aims at."""
+FINEST = 2.0 ** (-52.0 * 7.0 / 8.0)
 """What counts as exact."""
-_REDUNDANT = 2.0**-26
+REDUNDANT = 2.0**-26
 """Times the number of equations: how nearly one must follow from others to be dropped."""
+ITERATIONS = 20
+"""Newton's steps of a projection."""
+SAFE_MASS, SAFE_COUPLING = 1e-10, 1e-4
+"""What each speed must move, as part of its inertia, for multipliers to be safe, and how far each equation must be from
+following from others."""
 
 
 def free_coordinates(mechanism: Mechanism) -> list[int]:
@@ -61,6 +67,8 @@ class Constrained:
 
     Attributes:
         bodies: indices of the bodies that constraints look at.
+        constraints: on coordinates of the state.
+        locks: how many coordinates are locked besides.
     """
 
     def __init__(self, mechanism: Mechanism, order: Sequence[int], states: States | None = None) -> None:
@@ -69,17 +77,17 @@ class Constrained:
         self.order = tuple(order)
         self._order = np.array(order, dtype=int)
         self._q = np.array([info.default_value for info in mechanism.coordinates])
-        self._constraints: list[Constraint] = []
+        self.constraints: list[Constraint] = []
         # Simbody's mean is over the equations of locks too, which have no errors.
-        self._locks = 0
+        self.locks = 0
         for item in mechanism.constraints:
             if not isinstance(item, Lock):
-                self._constraints.append(item)
+                self.constraints.append(item)
             elif item.coordinate in order:
-                self._constraints.append(Prescribed(item.coordinate, Constant(self._q[item.coordinate]), item.name))
+                self.constraints.append(Prescribed(item.coordinate, Constant(self._q[item.coordinate]), item.name))
             else:
-                self._locks += 1
-        self.bodies = sorted({body for item in self._constraints for body in item.bodies} - {GROUND})
+                self.locks += 1
+        self.bodies = sorted({body for item in self.constraints for body in item.bodies} - {GROUND})
         needed: set[int] = set()
         for body in self.bodies:
             while body != GROUND and body not in needed:
@@ -90,7 +98,7 @@ class Constrained:
     @property
     def names(self) -> list[str]:
         """Of what is kept up, apart from coordinates at rest."""
-        return [item.name for item in self._constraints]
+        return [item.name for item in self.constraints]
 
     def accelerations(
         self, t: float, x: Array, u: Array, matrix: Array, right: Array, state: Kinematics | None = None
@@ -108,10 +116,10 @@ class Constrained:
         Raises:
             SimulationError: a motion that nothing forbids moves no mass.
         """
-        if not self._constraints:
+        if not self.constraints:
             return constrained_accelerations(self.mechanism, matrix, right, None, self.order)
         state = self._state(t, x, u) if state is None else state
-        rows, values = stacked([item.acceleration_equations(state) for item in self._constraints])
+        rows, values = stacked([item.acceleration_equations(state) for item in self.constraints])
         rows = rows[:, self._order]
         udot = by_multipliers(matrix, right, rows, values)
         if udot is None:
@@ -123,7 +131,7 @@ class Constrained:
         self, t: float, y: list[float], errors: list[float] | None, tolerance: float, limit: float = inf
     ) -> tuple[list[float], list[float] | None] | None:
         """The nearest state where the constraints hold, see :class:`osimlite.simulation.integrators.Projection`."""
-        if not self._constraints:
+        if not self.constraints:
             return y, errors
         size = len(self._order)
         x, u = np.array(y[:size]), np.array(y[size:])
@@ -142,7 +150,7 @@ class Constrained:
 
         def errors_at(x: Array) -> tuple[Kinematics, Array]:
             state = self._state(t, x, still)
-            return state, np.concatenate([item.position_errors(state) for item in self._constraints])
+            return state, np.concatenate([item.position_errors(state) for item in self.constraints])
 
         state, errors = errors_at(x)
         norm = self._norm(errors)
@@ -151,27 +159,27 @@ class Constrained:
         if not norm <= limit:
             return False
         rows = np.zeros((0, len(x)))
-        for iteration in range(20):
+        for iteration in range(ITERATIONS):
             rows = self._rows_by_values(state)
-            step = shortest(rows, errors, _REDUNDANT * len(errors))
+            step = shortest(rows, errors, REDUNDANT * len(errors))
             state, errors = errors_at(x - step)
             before, norm = norm, self._norm(errors)
             if iteration > 0 and not norm <= before:
                 norm = before
                 break
             x -= step
-            if norm <= max(_OVERSHOOT * tolerance, _FINEST):
+            if norm <= max(OVERSHOOT * tolerance, FINEST):
                 break
         if not norm <= tolerance:
             return False
         if off is not None:
-            off -= shortest(rows, rows @ off, _REDUNDANT * len(errors))
+            off -= shortest(rows, rows @ off, REDUNDANT * len(errors))
         return True
 
     def _project_speeds(self, t: float, x: Array, u: Array, off: Array | None, tolerance: float, limit: float) -> bool:
         """Change u, and the errors with it; tell whether that worked."""
         state = self._state(t, x, u)
-        all_rows, wanted = stacked([item.velocity_equations(state) for item in self._constraints])
+        all_rows, wanted = stacked([item.velocity_equations(state) for item in self.constraints])
         rows = all_rows[:, self._order]
         errors = rows @ u - wanted
         norm = self._norm(errors)
@@ -180,13 +188,13 @@ class Constrained:
         if not norm <= limit:
             return False
         scales = np.maximum(np.abs(u), 1.0)
-        rank = _REDUNDANT * len(errors)
+        rank = REDUNDANT * len(errors)
         # The rows do not depend on the speeds: one step does, a second one mends its rounding.
         for _ in range(2):
             u -= scales * shortest(rows * scales, errors, rank)
             errors = rows @ u - wanted
             norm = self._norm(errors)
-            if norm <= max(_OVERSHOOT * tolerance, _FINEST):
+            if norm <= max(OVERSHOOT * tolerance, FINEST):
                 break
         if not norm <= tolerance:
             return False
@@ -208,7 +216,7 @@ class Constrained:
     def _rows_by_values(self, state: Kinematics) -> Array:
         """Derivatives (p, n) of the errors of the positions by the coordinates."""
         rows = []
-        for item in self._constraints:
+        for item in self.constraints:
             count = len(item.position_errors(state))
             rows.append(item.velocity_equations(state)[0][:count])
         by_speeds = np.concatenate(rows)
@@ -218,7 +226,7 @@ class Constrained:
 
     def _norm(self, errors: Array) -> float:
         """Root mean square over all equations, those of locked coordinates included."""
-        return sqrt(float(errors @ errors) / max(len(errors) + self._locks, 1))
+        return sqrt(float(errors @ errors) / max(len(errors) + self.locks, 1))
 
 
 def by_multipliers(matrix: Array, right: Array, rows: Array, values: Array) -> Array | None:
@@ -227,8 +235,10 @@ def by_multipliers(matrix: Array, right: Array, rows: Array, values: Array) -> A
     It is safe where M alone is well conditioned, and no equation all but follows from others.
     """
     try:
+        if not np.min(np.abs(rows).max(axis=1)) > ROUNDING:
+            return None
         pivots = np.linalg.cholesky(matrix).diagonal() ** 2
-        if not np.min(pivots / matrix.diagonal()) > 1e-10:
+        if not np.min(pivots / matrix.diagonal()) > SAFE_MASS:
             return None
         solved = np.linalg.solve(matrix, np.column_stack((right, rows.T)))
         coupling = rows @ solved[:, 1:]
@@ -236,12 +246,15 @@ def by_multipliers(matrix: Array, right: Array, rows: Array, values: Array) -> A
             return None
         scales = 1.0 / np.sqrt(coupling.diagonal())
         scaled = coupling * np.outer(scales, scales)
-        if not np.min(np.linalg.cholesky(scaled).diagonal()) > 1e-4:
+        if not np.min(np.linalg.cholesky(scaled).diagonal()) > SAFE_COUPLING:
             return None
-        multipliers = scales * np.linalg.solve(scaled, scales * (rows @ solved[:, 0] - values))
+        udot: Array = np.asarray(solved[:, 0], dtype=np.float64)
+        # The second time mends the rounding of the first.
+        for _ in range(2):
+            multipliers = scales * np.linalg.solve(scaled, scales * (rows @ udot - values))
+            udot = udot - solved[:, 1:] @ multipliers
     except np.linalg.LinAlgError:
         return None
-    udot: Array = solved[:, 0] - solved[:, 1:] @ multipliers
     return udot
 
 

@@ -18,8 +18,16 @@ from osimlite.simulation.element_makers import MAKERS
 from tests.oracle.test_constraints import CASES, _chain
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
+
+NEEDS = {"bullet": "pybullet", "compiled": "numba"}
+
+
+@pytest.fixture(params=NEEDS)
+def engine(request: pytest.FixtureRequest) -> str:
+    """Each engine by name."""
+    pytest.importorskip(NEEDS[request.param], reason=f"needs {NEEDS[request.param]}")
+    return str(request.param)
 
 
 def both(path: Path, to: float, accuracy: float, seed: int, **settings: Any) -> tuple[Any, Any, tuple[int, int]]:
@@ -55,16 +63,16 @@ POINTS = ("point", "point-on-offset-frame", "weld")
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_motion_under_constraints(case: str, tmp_path: Path) -> None:
+def test_motion_under_constraints(case: str, engine: str, tmp_path: Path) -> None:
     model, bodies = _chain(np.random.default_rng(21))
     CASES[case](model, bodies)
     model.finalizeConnections()
     model.printToXML(str(tmp_path / "model.osim"))
     if case in POINTS:
-        ours, theirs, _ = both(tmp_path / "model.osim", 0.5, 1e-8, 5)
+        ours, theirs, _ = both(tmp_path / "model.osim", 0.5, 1e-8, 5, engine=engine)
         assert np.abs(ours - theirs).max() < 1e-7
     else:
-        ours, theirs, (our_steps, their_steps) = both(tmp_path / "model.osim", 1.0, 1e-6, 5)
+        ours, theirs, (our_steps, their_steps) = both(tmp_path / "model.osim", 1.0, 1e-6, 5, engine=engine)
         assert np.abs(ours - theirs).max() < 1e-8
         assert our_steps == their_steps
 
@@ -80,7 +88,7 @@ CORPUS = {
 
 
 @pytest.mark.parametrize("name", CORPUS)
-def test_real_models_without_muscles(name: str, corpus: Any, tmp_path: Path) -> None:
+def test_real_models_without_muscles(name: str, engine: str, corpus: Any, tmp_path: Path) -> None:
     entry = next(item for item in corpus if item.id == name)
     model = read_text(gzip.decompress(entry.converted.read_bytes()).decode())
     for force in model.components(Force):
@@ -89,7 +97,7 @@ def test_real_models_without_muscles(name: str, corpus: Any, tmp_path: Path) -> 
     osimlite.write(model, tmp_path / "model.osim")
     # Knees that turn about several axes have OpenSim's derivatives.
     path = tmp_path / "model.osim"
-    ours, theirs, (our_steps, their_steps) = both(path, CORPUS[name], 1e-6, 7, opensim_derivatives=True)
+    ours, theirs, (our_steps, their_steps) = both(path, CORPUS[name], 1e-6, 7, engine=engine, opensim_derivatives=True)
     assert np.abs(ours - theirs).max() < 1e-9
     assert our_steps == their_steps
 
@@ -114,8 +122,8 @@ def four_bars() -> osimlite.Model:
     return model
 
 
-def test_a_loop_of_four_bars(tmp_path: Path) -> None:
+def test_a_loop_of_four_bars(engine: str, tmp_path: Path) -> None:
     osimlite.write(four_bars(), tmp_path / "model.osim")
-    ours, theirs, _ = both(tmp_path / "model.osim", 1.0, 1e-8, 3)
+    ours, theirs, _ = both(tmp_path / "model.osim", 1.0, 1e-8, 3, engine=engine)
     assert np.abs(ours[1]).max() > 0.2
     assert np.abs(ours - theirs).max() < 1e-6

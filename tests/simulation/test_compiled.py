@@ -17,10 +17,18 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
-from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
+from osimlite.errors import OsimliteError, SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody import functions as f
-from osimlite.multibody.joints import MOTIONS, Mobilizer, TransformAxis, custom, ellipsoid, scapulothoracic
+from osimlite.multibody.joints import (
+    MOTIONS,
+    Mobilizer,
+    TransformAxis,
+    constant_curvature,
+    custom,
+    ellipsoid,
+    scapulothoracic,
+)
 from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
 from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.multibody.spatial import offset
@@ -91,6 +99,7 @@ def custom_joint(function):
 JOINTS = {
     **{name: motions for name, motions in MOTIONS.items() if name != "WeldJoint"},
     "EllipsoidJoint": ellipsoid((0.1, 0.2, 0.3)),
+    "ConstantCurvatureJoint": constant_curvature(0.4, (0.1, -0.05, 0.2)),
     "ScapulothoracicJoint": scapulothoracic((0.1, 0.2, 0.3), (0.05, -0.1), 0.4),
     **{f"CustomJoint, {name}": custom_joint(function) for name, function in FUNCTIONS.items()},
 }
@@ -317,11 +326,6 @@ def test_fixed_steps(fast, simulation):
 
 
 # --------------------------------------------------------------------------------------------- what is refused
-def test_partly_locked_ball_is_refused():
-    with pytest.raises(UnsupportedError, match="lock all of them or none"):
-        CompiledEngine(tree(["BallJoint"], locked=(1,)), Forces(()))
-
-
 def test_wholly_locked_mechanism_stands_still(walker):
     mechanism = tree(["PinJoint"], locked=(0,))
     engine = CompiledEngine(mechanism, Forces(()))

@@ -26,7 +26,6 @@ from osimlite.schema.forces import Force
 from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline, Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.bullet import engine_class
 from osimlite.simulation.engines.protocol import Settings
 from tests.multibody.strategies import KINDS, Case, cases, constraint_of
@@ -98,12 +97,6 @@ def test_the_derivatives_of_opensim_are_those_of_our_recursion(opensim_derivativ
     assert accelerations(mechanism, q, u, "auto") == pytest.approx(expected, rel=1e-11)
     other = knee(opensim_derivatives=not opensim_derivatives).acceleration(q, u)
     assert np.abs(other - expected).max() > 0.01
-
-
-def test_the_compiled_engine_repeats_no_mistakes():
-    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
-    with pytest.raises(UnsupportedError, match=r"cannot repeat OpenSim's derivatives in '/j/thigh'"):
-        engine_factory("compiled")(knee(opensim_derivatives=True), Forces(()), Settings())
 
 
 def test_an_inertia_that_bullet_refuses_takes_no_other_route():

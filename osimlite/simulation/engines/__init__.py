@@ -17,9 +17,6 @@ ENGINES = {
 }
 """Module of each engine, whose `make` makes one."""
 
-KEEP_CONSTRAINTS = ("bullet",)
-"""The engines that keep up constraints."""
-
 
 def engine_factory(name: str) -> EngineFactory:
     """The function that makes an engine.

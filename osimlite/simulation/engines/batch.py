@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.simulation.engines.machine_code import entry_point
 from osimlite.simulation.integrators import INITIAL_STEP
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats, Ints
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ class Batch:
         event_states: keep the states at the events.
         most_tries: steps that a run may try.
         most_logged: room for steps in the log, which all runs share.
+        start_holds: the constraints hold where the runs start; otherwise they start from the nearest such states.
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
@@ -70,6 +71,7 @@ class Batch:
         event_states: bool = False,
         most_tries: int = NO_LIMIT,
         most_logged: int = 0,
+        start_holds: bool = False,
     ) -> None:
         self.states = np.array(states, dtype=np.float64, order="C")
         count, size, pairs = len(self.states), 2 * len(engine.order), len(engine.contacts)
@@ -80,8 +82,18 @@ class Batch:
         coordinates = len(engine.mechanism.coordinates)
         event = 3 + size * event_states
         spare = sum(not body.mobilizer.speeds_are_rates for body in engine.mechanism.bodies)
-        sizes = (coordinates + spare, coordinates, most_tries, len(times), most_events, event, len(kinds), most_logged)
-        self._sizes, self._settings = np.array(sizes, dtype=np.int64), np.array((to, accuracy, inf, 0.0))
+        self._sizes, self._settings = np.zeros(merson.SIZES, dtype=np.int64), np.array((to, accuracy, inf, 0.0))
+        self._sizes[: merson.START_HOLDS] = (
+            coordinates + spare,
+            coordinates,
+            most_tries,
+            len(times),
+            most_events,
+            event,
+            len(kinds),
+            most_logged,
+        )
+        self._sizes[merson.START_HOLDS] = start_holds
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
         self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)

@@ -13,6 +13,7 @@ import numpy as np
 
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.simulation.constrained import Constrained
 from osimlite.simulation.contact_elements import PairContact
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.batch import Batch
@@ -52,7 +53,7 @@ class CompiledEngine:
         program: the structure with the addresses of the machine code, good in this process only.
 
     Raises:
-        UnsupportedError: a joint, a function or a force that it does not know.
+        UnsupportedError: a joint, a function, a constraint or a force that it does not know.
     """
 
     name = "compiled"
@@ -68,6 +69,7 @@ class CompiledEngine:
         self.order = packed.order
         self.placements = packed.placements
         self.state = FreeState(mechanism, self.order)
+        self.constrained = Constrained(mechanism, self.order)
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
         self.columns = tuple(label for element in forces.elements for label in element.columns)
@@ -95,7 +97,7 @@ class CompiledEngine:
         """(qdot, udot) at a state."""
         status = self._at(t, y, layout.WHOLE)
         if status != layout.FINE:
-            raise self._refusal(status, y)
+            raise self._refusal(status, t, y)
         self._note_loads(self._pairs[:, :3])
         found: list[float] = self._f.tolist()
         return found
@@ -110,7 +112,7 @@ class CompiledEngine:
         udot = self.derivative(t, self.state.pack(q, u))[len(self.order) :]
         return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
 
-    def _refusal(self, status: int, y: Sequence[float]) -> SimulationError:
+    def _refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         if not np.isfinite(np.array(y)).all():
             return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
         if status == layout.SINGULAR_RATES:
@@ -118,7 +120,12 @@ class CompiledEngine:
                 self.mechanism.rate_matrix(self.state.values(y))
             except SimulationError as error:
                 return error
-        if status == layout.SINGULAR_MASS:
+        if status == layout.SINGULAR_MASS and self.constrained.names:
+            try:
+                self.mechanism.acceleration(self.state.values(y), self.state.speeds(y), time=t)
+            except SimulationError as error:
+                return error
+        elif status == layout.SINGULAR_MASS:
             name = self.mechanism.coordinates[self.order[int(self._f[0])]].name
             return SimulationError(
                 f"coordinate '{name}' moves no mass, or a negative inertia; "
@@ -202,7 +209,15 @@ class CompiledEngine:
         if settings.fixed_step is not None:
             rates = None if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies) else self._rates
             return SemiImplicitEuler(
-                self.derivative, t, y, len(self.order), settings.fixed_step, rates=rates, observe=observe, names=names
+                self.derivative,
+                t,
+                y,
+                len(self.order),
+                settings.fixed_step,
+                rates=rates,
+                observe=observe,
+                names=names,
+                projection=self.constrained,
             )
         return CompiledMerson(self, t, y, settings.accuracy, observe, names)
 
@@ -258,6 +273,7 @@ class CompiledMerson(RungeKuttaMerson):
             count_u=count,
             observe=observe,
             names=names,
+            projection=engine.constrained if engine.constrained.names else None,
         )
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (self.time, self.state, self.derivative)
@@ -291,6 +307,7 @@ class CompiledMerson(RungeKuttaMerson):
             next_step=self._next_step,
             times=times,
             most_logged=LOGGED_STEPS,
+            start_holds=True,
         )
         (count,), done = batch.counts, 0
         count[: merson.REPORTED] = self.taken, self.attempted, self.evaluations

@@ -58,5 +58,7 @@ def _digest() -> str:
     """What tells whether any source of the compiled code has changed."""
     package = Path(__file__).parents[2]
     sources = [*sorted(package.glob("forces/*.py")), *sorted(package.glob("simulation/kernels/*.py"))]
-    sources += [package / "simulation" / "integrators.py", Path(__file__).with_name("compiler.py")]
+    simulation = package / "simulation"
+    sources += [simulation / "integrators.py", simulation / "constrained.py", package / "multibody" / "linear.py"]
+    sources.append(Path(__file__).with_name("compiler.py"))
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:12]

@@ -61,7 +61,7 @@ def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
 
 
 def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
-    """Columns of the three speeds, rates of the angles; velocity and linear part of the own acceleration in SCRATCH."""
+    """Columns of the three speeds, rates of the angles; velocity and own acceleration in SCRATCH."""
     j = at(s, s[OPERATION_AT] + OPERATION_INTS * operation)
     kept, found, radii = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(x, j[EXTRA])
     angles, u = at(s, j[ARGUMENTS]), at(y, s[FREEDOMS])
@@ -103,6 +103,7 @@ def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: in
     found[6] = sign * (r00 * gx + r01 * gy + r02 * gz)
     found[7] = sign * (r10 * gx + r11 * gy + r12 * gz)
     found[8] = sign * (r20 * gx + r21 * gy + r22 * gz)
+    found[9] = found[10] = found[11] = 0.0
     # qdot = N u.
     if abs(c2) < 1e-12:
         return SINGULAR_RATES

@@ -24,6 +24,8 @@ from osimlite.simulation.kernels.layout import (
     FREEDOM_INTS,
     FREEDOMS,
     HALF_SPACE,
+    HELD,
+    HOLD,
     INERTIA,
     INERTIA_AT,
     ITEM_AT,
@@ -35,6 +37,7 @@ from osimlite.simulation.kernels.layout import (
     LINK_INTS,
     LINK_WORK,
     LINKS,
+    MOVED,
     NUMBERS,
     ORIGIN,
     OWN,
@@ -69,7 +72,7 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, how_far: int) 
     if how_far == PLACED:
         return FINE
     status = move(s, x, w, y, f)
-    if status != FINE:
+    if status != FINE or how_far == MOVED:
         return status
     weigh(s, x, w)
     push_all(s, x, w, y, f)
@@ -77,6 +80,8 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, how_far: int) 
         return FINE
     right = at(f, s[FREEDOMS])
     gather(s, w, right)
+    if s[HELD] > 0:
+        return call(s[LAWS + s[s[HELD] + HOLD]], s, x, w, y, f, 0)
     singular = solve(s, w, right)
     if singular >= 0:
         f[0] = singular

@@ -8,6 +8,7 @@ import numpy as np
 
 from osimlite.errors import UnsupportedError
 from osimlite.multibody import functions as f
+from osimlite.multibody.arc import COSINE_TERMS, SINE_TERMS, ArcPoint
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.simulation.kernels.layout import (
     AMOUNT,
@@ -26,9 +27,9 @@ from osimlite.simulation.kernels.layout import (
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
-PIECES, SINE, STEP, MONOMIALS, MONOMIALS_OF_OPENSIM = 0, 1, 2, 3, 4
-"""Kinds: polynomials between knots, a sine, a smooth step, a sum of products of powers of several arguments; the last
-with what OpenSim 4.6 takes for its second derivatives, which is the gradient in every column."""
+PIECES, SINE, STEP, MONOMIALS, MONOMIALS_OF_OPENSIM, ARC = 0, 1, 2, 3, 4, 5
+"""Kinds: polynomials between knots, a sine, a smooth step, a sum of products of powers of several arguments; the same
+with what OpenSim 4.6 takes for its second derivatives, which is the gradient in every column; the end of a bent rod."""
 
 
 def function_table(function: f.Function, where: str) -> list[float]:
@@ -53,6 +54,9 @@ def function_table(function: f.Function, where: str) -> list[float]:
         powers = np.array(function.powers, dtype=float)
         kind = MONOMIALS_OF_OPENSIM if function.opensim_derivatives else MONOMIALS
         return [kind, factor, float(len(powers)), *function.coefficients, *powers.ravel().tolist()]
+    if isinstance(function, ArcPoint):
+        start = [ARC, factor, float(function.component), function.length, *function.neutral, float(len(SINE_TERMS))]
+        return [*start, *SINE_TERMS.tolist(), *COSINE_TERMS.tolist()]
     knots, pieces = _pieces(function, where)
     width = max(map(len, pieces))
     rows = [[*piece, *[0.0] * (width - len(piece))] for piece in pieces]
@@ -148,7 +152,24 @@ def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, opera
     """Amount of an operation by a polynomial of several coordinates, with its derivatives."""
     j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
     size, arguments, constants, gradient = j[ARGUMENT_COUNT], at(s, j[ARGUMENTS]), at(x, j[EXTRA]), at(w, j[GRADIENT])
-    table, u = at(constants, size), at(y, s[FREEDOMS])
+    a[AMOUNT], a[RATE], a[CURVATURE] = several_at(size, arguments, constants, y, at(y, s[FREEDOMS]), gradient)
+    return FINE
+
+
+def several_at(
+    size: int, arguments: Ints, constants: Floats, y: Floats, rates: Floats, gradient: Floats
+) -> tuple[float, float, float]:
+    """Value, rate and second derivative of a polynomial of several coordinates; fills its gradient.
+
+    Args:
+        size: count of the arguments.
+        arguments: degrees of freedom, -1 for a number that does not change.
+        constants: such numbers, and the table of the polynomial after them.
+        y: values of the degrees of freedom.
+        rates: of these values.
+        gradient: by the arguments (size,).
+    """
+    table = at(constants, size)
     factor, count = table[1], int(table[2])
     value = rate = curvature = 0.0
     for place in range(size):
@@ -163,20 +184,19 @@ def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, opera
             gradient[one] += first
             if arguments[one] < 0:
                 continue
-            rate += first * u[arguments[one]]
+            rate += first * rates[arguments[one]]
             for two in range(size):
                 power = powers[two] - (1.0 if one == two else 0.0)
                 if power == 0.0 or arguments[two] < 0:
                     continue
                 second = coefficient * powers[one] * power * product(size, arguments, constants, y, powers, one, two)
-                curvature += second * u[arguments[one]] * u[arguments[two]]
+                curvature += second * rates[arguments[one]] * rates[arguments[two]]
     if int(table[0]) == MONOMIALS_OF_OPENSIM:
         total = 0.0
         for place in range(size):
-            total += u[arguments[place]] if arguments[place] >= 0 else 0.0
+            total += rates[arguments[place]] if arguments[place] >= 0 else 0.0
         curvature = rate * total
-    a[AMOUNT], a[RATE], a[CURVATURE] = value, rate, curvature
-    return FINE
+    return value, rate, curvature
 
 
 def product(size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int) -> float:

@@ -31,7 +31,9 @@ WORK_SIZE = 17
 """Length of w."""
 CONTACT_AT = 18
 """Where the places of the records of the pairs stand, by contact."""
-LAWS = 19
+HELD = 19
+"""Place of the record of all constraints, 0 if there are none."""
+LAWS = 20
 """From here on the addresses of the laws, by their number."""
 
 LINK_INTS = 5
@@ -56,6 +58,20 @@ many there are on the way."""
 LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
 """Of an item: its law, places in x and w of what it owns there, number of the first contact of its element, and from
 OWN on integers of its own."""
+
+HOLD, PROJECT, BONDS, BOND_AT, EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+"""Of all constraints: the laws that find accelerations and that project states; count of the bonds, and where the
+places of their records stand; counts of the equations, of those that bind positions, and of coordinates that are just
+locked; count of the balls, and where the places of their arguments stand; count of the numbers of the mass matrix."""
+WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = 10, 11, 12, 13
+"""Places in w of G (m, n), of the errors, and of what G u and G udot are to be."""
+WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = 14, 15, 16, 17
+"""Places in w of room: for (m, n) numbers, for a factor of them, for solving, for states."""
+HELD_INTS = 18
+
+FIRST_EQUATION, END_EQUATION, END_POSITION, BOND_OWN = 2, 3, 4, 5
+"""Of a bond, after its law and the place of its numbers: its equations, of which those up to the second end bind
+positions, and from BOND_OWN on integers of its own."""
 
 # Numbers.
 GRAVITY_AT, INERTIA_AT = 0, 3
@@ -82,17 +98,18 @@ FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
 """Of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without contact."""
 
 # Kinds.
-TURN, SLIDE, BALL, BALL_BACK = 0, 1, 2, 3
+TURN, SLIDE, BALL, BALL_BACK, DRIFT = 0, 1, 2, 3, 4
 """Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one that is passed from end to
-start."""
+start, a SimbodyDrift."""
 NOTHING, SHIFT, MOVE = 0, 1, 2
 """Fixed transforms: none, a translation, any."""
 HALF_SPACE, LIMIT = 0, 1
 """Laws that the evaluation has within; the others are called by their address."""
 
-FINE, SINGULAR_MASS, SINGULAR_RATES = 0, 1, 2
-"""What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined."""
-WHOLE, PLACED, TOUCHED = 0, 1, 2
-"""How far an evaluation goes: to the end, to the places of the links, to the contacts."""
+FINE, SINGULAR_MASS, SINGULAR_RATES, FAR = 0, 1, 2, 3
+"""What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined; of a
+projection: too far from where the constraints hold."""
+WHOLE, PLACED, TOUCHED, MOVED = 0, 1, 2, 3
+"""How far an evaluation goes: to the end, to the places of the links, to the contacts, to the velocities."""
 WITHIN = {"touch_half_space": HALF_SPACE, "limit": LIMIT}
 """Their numbers by name."""

@@ -14,8 +14,11 @@ from osimlite.simulation.kernels.layout import (
     CONTACTS,
     FINE,
     FREEDOMS,
+    HELD,
     LAWS,
     PLACED,
+    PROJECT,
+    SCRATCH,
     SINGULAR_MASS,
     TIME,
     TOUCHED,
@@ -48,6 +51,8 @@ LIMIT, ACCURACY, LARGEST_STEP, SMALLEST_STEP = 0, 1, 2, 3
 COUNT_Q, COUNT_U, MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5, 6, 7
 """Places of the sizes: as `RungeKuttaMerson` has the first two, steps that may be tried, how many rows there are and
 how long the row of an event is."""
+START_HOLDS, SIZES = 8, 9
+"""Place of whether the constraints hold at the start, and the count of the sizes."""
 
 
 class Motion(NamedTuple):
@@ -147,6 +152,13 @@ def evaluated(m: Motion, t: float, y: Floats, f: Floats, how_far: int) -> int:
     return call(m.s[LAWS], m.s, m.x, m.w, y, f, how_far)
 
 
+def projected(m: Motion, t: float, y: Floats, off: Floats, has_errors: int, limit: float) -> bool:
+    """Move a state to where the constraints hold, and tell whether they do; see `projection.project`."""
+    s, w = m.s, m.w
+    w[TIME], w[SCRATCH], w[SCRATCH + 1] = t, m.settings[ACCURACY] / 10.0, limit
+    return call(s[LAWS + s[s[HELD] + PROJECT]], s, m.x, w, y, off, has_errors) == FINE
+
+
 def run(m: Motion, y: Floats) -> int:
     """Go on from the state y, which is changed, until something ends the run."""
     s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
@@ -156,6 +168,8 @@ def run(m: Motion, y: Floats) -> int:
     before = at(room, STATES * size)
     after = at(before, s[CONTACTS] + sizes[WATCHES])
     limit = m.settings[LIMIT]
+    if s[HELD] > 0 and sizes[START_HOLDS] == 0 and not projected(m, clock[0], y, f0, 0, inf):
+        return FAILED
     copy(size, y, y0)
     status = evaluated(m, clock[0], y0, f0, WHOLE)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
@@ -194,11 +208,11 @@ def run(m: Motion, y: Floats) -> int:
             if t == t1:
                 copy(size, y1, report)
             else:
-                cubic(size, t0, y0, f0, t1, y1, f1, t, report)
+                inside(m, t0, y0, f0, t1, y1, f1, t, report)
             counts[REPORTED] += 1
         if stopped:
             if end < t1:
-                cubic(size, t0, y0, f0, t1, y1, f1, end, y)
+                inside(m, t0, y0, f0, t1, y1, f1, end, y)
             else:
                 copy(size, y1, y)
             clock[0] = end
@@ -227,13 +241,29 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         status = merson(m, t0, t1, y0, f0, y1)
         if status == SINGULAR_MASS:
             return t0 - 1.0
-        error = norm(n, y0, y1, companion, sizes[COUNT_Q], sizes[COUNT_U]) if status == FINE else inf
+        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
+        for k in range(2 * n):
+            companion[k] = 0.2 * (y1[k] - companion[k])
+        error = norm(n, y0, companion, sizes[COUNT_Q], sizes[COUNT_U]) if status == FINE else inf
+        # As in Simbody: what half a step would not mend, neither does the projection.
+        if m.s[HELD] > 0 and error <= 16.0 * accuracy:
+            error = held_error(m, t1, y0, y1, companion)
         clock[1] = min(next_step_size(h, error, accuracy, cut), settings[LARGEST_STEP])
         if error <= accuracy:
             return t1
         if h <= smallest:
             return t0 - 1.0
         clock[1] = max(clock[1], smallest)
+
+
+def held_error(m: Motion, t1: float, y0: Floats, y1: Floats, errors: Floats) -> float:
+    """Move the end of a step to where the constraints hold; the norm of the error there."""
+    n, tolerance = m.s[FREEDOMS], m.settings[ACCURACY] / 10.0
+    for k in range(2 * n):
+        errors[k] = abs(errors[k])
+    if not projected(m, t1, y1, errors, 1, max(2.0 * tolerance, sqrt(tolerance))):
+        return inf
+    return norm(n, y0, errors, m.sizes[COUNT_Q], m.sizes[COUNT_U])
 
 
 def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) -> int:
@@ -275,15 +305,14 @@ def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) 
     return status
 
 
-def norm(n: int, y0: Floats, y1: Floats, companion: Floats, count_q: int, count_u: int) -> float:
+def norm(n: int, y0: Floats, errors: Floats, count_q: int, count_u: int) -> float:
     """Larger of two root mean squares: errors of q as they are, of u relative to u at the start where |u| > 1."""
     of_q = of_u = 0.0
     for k in range(n):
-        e = 0.2 * (y1[k] - companion[k])
-        of_q += e * e
+        of_q += errors[k] * errors[k]
     for k in range(n, 2 * n):
         size = abs(y0[k])
-        weighted = (1.0 / size if size > 1.0 else 1.0) * (0.2 * (y1[k] - companion[k]))
+        weighted = (1.0 / size if size > 1.0 else 1.0) * errors[k]
         of_u += weighted * weighted
     of_q /= max(count_q, 1)
     of_u /= max(count_u, 1)
@@ -315,6 +344,15 @@ def cubic(size: int, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f
     c0 = c1 - c
     for k in range(size):
         y[k] = b0 * y0[k] + b1 * y1[k] + c0 * f0[k] + c1 * f1[k]
+
+
+def inside(
+    m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
+) -> None:
+    """State y at a time within a step, where the constraints hold if it can be moved there."""
+    cubic(2 * m.s[FREEDOMS], t0, y0, f0, t1, y1, f1, t, y)
+    if m.s[HELD] > 0:
+        projected(m, t, y, y, 0, inf)
 
 
 def note_peaks(m: Motion, t: float) -> None:
@@ -381,7 +419,7 @@ def note_events(
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            cubic(size, t0, y0, f0, t1, y1, f1, middle, ya)
+            inside(m, t0, y0, f0, t1, y1, f1, middle, ya)
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
             evaluated(m, middle, ya, fa, TOUCHED if touch else PLACED)
             levels_at(m, ya, found)
@@ -395,7 +433,7 @@ def note_events(
             stop = min(stop, t)
         row = insert(m, first, t, number, rises)
         if row < m.sizes[MOST_EVENTS] and event > 3:
-            cubic(size, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
+            inside(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
     # What lies behind the end of the run has not happened.
     while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
         if events[event * (counts[EVENTS] - 1)] <= stop:

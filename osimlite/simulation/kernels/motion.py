@@ -52,7 +52,7 @@ from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
 BALL_MOVES = 1
-"""How far after the law of a ball that places its link is the one that moves it."""
+"""How far after the law of a ball (or a drift) that places its link is the one that moves it."""
 
 
 def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
@@ -196,6 +196,9 @@ def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
                 bx += found[6]
                 by += found[7]
                 bz += found[8]
+                ax += found[9]
+                ay += found[10]
+                az += found[11]
             # The axes are carried around by what moved before.
             ax += wy * sz - wz * sy
             ay += wz * sx - wx * sz

@@ -14,13 +14,22 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyDrift, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
+from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.kernels import layout as at
-from osimlite.simulation.kernels.functions import MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
+from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.items import Item, Placement, Places, items_of
 from osimlite.simulation.kernels.merson import STATES
+from osimlite.simulation.kernels.pack_bonds import bond_of, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS
+
+LAWS_OF_FUNCTIONS = {
+    MONOMIALS: "amount_by_several",
+    MONOMIALS_OF_OPENSIM: "amount_by_several",
+    ARC: "amount_by_arc",
+}
+"""Of functions of several coordinates."""
 
 
 @dataclass
@@ -52,6 +61,8 @@ class _Operation:
     function: Any = None
     radii: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
+    turns: list[_Operation | None] = field(default_factory=list)  # of a drift
+    looked_at: list[int] = field(default_factory=list)  # by a drift: its sign, and two places in the mechanism
 
 
 @dataclass
@@ -71,9 +82,10 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
     """
     links: list[_Link] = []
     placements: list[Placement] = []
+    free = set(free_coordinates(mechanism))
     for body in mechanism.bodies:
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
-        operations, rest = _operations(mechanism, body.mobilizer, frame)
+        operations, rest = _operations(mechanism, body.mobilizer, frame, free)
         if operations:
             links.append(_Link(parent, operations))
             parent = len(links) - 1
@@ -84,32 +96,36 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
     ends = [0]
     for link in links:
         own = {place for item in link.operations for place in item.arguments}
-        order += sorted(place for place in own if not mechanism.coordinates[place].locked)
+        order += sorted(own & free)
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
     items = [items_of(element, places) for element in forces.elements]
     return _Packer(places, links, ends, items).packed(tuple(order))
 
 
-def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tuple[list[_Operation], Array]:
+def _operations(
+    mechanism: Mechanism, mobilizer: Mobilizer, frame: Array, free: set[int]
+) -> tuple[list[_Operation], Array]:
     """The motions of a joint from a frame of the carrying link on, and the carried body after the last of them."""
     own = mobilizer.coordinates
     chain: list[Motion] = [Fixed(mobilizer.parent_frame), *mobilizer.motions, Fixed(inverse(mobilizer.child_frame))]
     if mobilizer.reversed:
         chain.reverse()
     found: list[_Operation] = []
+    of_motion: dict[int, _Operation] = {}
+    drifts: list[tuple[_Operation, SimbodyDrift]] = []
     for motion in chain:
         places = [own[number] for number in motion.coordinates]
-        still = [mechanism.coordinates[place].locked for place in places]
+        still = free.isdisjoint(places)
         if isinstance(motion, Fixed):
             frame = frame @ (inverse(motion.matrix) if mobilizer.reversed else motion.matrix)
         elif isinstance(motion, SimbodyDrift):
-            if motion.elementary():
-                raise UnsupportedError(
-                    f"the compiled engine cannot repeat OpenSim's derivatives in '{mobilizer.joint}'; "
-                    "take --engine bullet, or leave out --opensim-derivatives"
-                )
-        elif all(still):
+            if motion.elementary() and not free.isdisjoint(own):
+                sign = -1 if mobilizer.reversed else 1
+                found.append(_Operation(at.DRIFT, frame, [], looked_at=[sign, *own[:2]]))
+                drifts.append((found[-1], motion))
+                frame = np.eye(4)
+        elif still:
             q = np.zeros(len(own))
             q[list(motion.coordinates)] = [mechanism.coordinates[place].default_value for place in places]
             matrix = motion.relative(q, np.zeros(len(own))).matrix
@@ -120,16 +136,12 @@ def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tup
             if motion.kind == "rotate":
                 turned = transform(_to_axis(axis))
                 found.append(_Operation(at.TURN, frame @ turned, places, function))
+                of_motion[id(motion)] = found[-1]
                 frame = inverse(turned)
             else:
                 found.append(_Operation(at.SLIDE, frame, places, function, axis=axis))
                 frame = np.eye(4)
         elif isinstance(motion, SphericalMotion):
-            if any(still):
-                raise UnsupportedError(
-                    f"'{mobilizer.joint}' ({mobilizer.joint_type}) has locked and free coordinates, which the "
-                    "simulation cannot do; lock all of them or none"
-                )
             kind = at.BALL_BACK if mobilizer.reversed else at.BALL
             found.append(_Operation(kind, frame, places, radii=motion.radii))
             frame = np.eye(4)
@@ -138,6 +150,8 @@ def _operations(mechanism: Mechanism, mobilizer: Mobilizer, frame: Array) -> tup
                 f"the compiled engine cannot compute the {type(motion).__name__} of '{mobilizer.joint}'; "
                 "take --engine bullet"
             )
+    for operation, drift in drifts:
+        operation.turns = [of_motion.get(id(turn)) for turn in drift.turns]
     return found, frame
 
 
@@ -186,6 +200,8 @@ class _Packer:
         self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
         self.work = at.WORK_HEAD
+        self.entries = 0
+        self.balls: dict[tuple[int, ...], int] = {}
         self.laws: list[str] = ["evaluate"]
 
     def packed(self, order: tuple[int, ...]) -> Packed:
@@ -204,6 +220,7 @@ class _Packer:
         above = self.link_records()
         self.freedom_records(above)
         self.operation_records()
+        self.bond_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
         ints[at.WORK_STATE] = self.room(2 * size * STATES)
         ints[at.WORK_SIZE] = self.work
@@ -242,6 +259,7 @@ class _Packer:
         for freedom in above:
             depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
             self.ints += [freedom, self.room(depths[-1] + 1), depths[-1]]
+            self.entries += depths[-1] + 1
         self.ints[at.SUMMED_AT] = len(self.ints)
         summed = [number for number in range(len(above)) if not self.is_alone(number)]
         self.ints[at.SUMMED] = len(summed)
@@ -256,11 +274,19 @@ class _Packer:
         """Write the operations, and what their functions need."""
         start = self.ints[at.OPERATION_AT] = len(self.ints)
         self.ints += [0] * (at.OPERATION_INTS * len(self.operations))
+        numbers = {id(item): number for number, item in enumerate(self.operations)}
         for number, item in enumerate(self.operations):
             freedom, law, gradient = -1, at.ALONE, 0
             extra = len(self.numbers)
             freedoms = [self.places.freedom(place) for place in item.arguments]
-            if item.kind in (at.BALL, at.BALL_BACK):
+            looked_at: list[int] = []
+            if item.kind == at.DRIFT:
+                law = self.law("place_drift")
+                self.law("move_drift")
+                sign, *watched = item.looked_at
+                looked_at = [sign, *(self.places.freedom(place) for place in watched), *[-1] * (2 - len(watched))]
+                looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
+            elif item.kind in (at.BALL, at.BALL_BACK):
                 law = self.law("place_ball")
                 self.law("move_ball")
                 self.numbers += item.radii.tolist()
@@ -270,14 +296,44 @@ class _Packer:
             else:
                 infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
                 table = function_table(item.function, f"the function of an axis of the joint '{infos[0].joint}'")
-                several = table[0] in (MONOMIALS, MONOMIALS_OF_OPENSIM)
-                law = self.law("amount_by_several" if several else "amount_by_one")
+                law = self.law(LAWS_OF_FUNCTIONS.get(int(table[0]), "amount_by_one"))
                 self.numbers += [*(info.default_value for info in infos), *table]
                 gradient = self.room(len(freedoms))
             arguments = len(self.ints)
-            self.ints += freedoms
+            self.ints += [*freedoms, *looked_at]
+            if item.kind in (at.BALL, at.BALL_BACK):
+                self.balls[tuple(freedoms)] = arguments
             record = [item.kind, _kind_of(item.before), freedom, law, arguments, len(freedoms), extra, gradient]
             self.ints[start + at.OPERATION_INTS * number : start + at.OPERATION_INTS * (number + 1)] = record
+
+    def bond_records(self, constrained: Constrained) -> None:
+        """Write what constraints need, if there are any."""
+        if not constrained.constraints:
+            return
+        start, size = len(self.ints), self.ints[at.FREEDOMS]
+        head = [0] * at.HELD_INTS
+        self.ints[at.HELD] = start
+        self.ints += head
+        bonds = [bond_of(item, self.places, self.balls) for item in constrained.constraints]
+        records: list[int] = []
+        equations = 0
+        for bond in bonds:
+            records.append(len(self.ints))
+            end, end_position = equations + bond.equations, equations + bond.positions
+            ints = [x + self.room(bond.room) if k == bond.room_at else x for k, x in enumerate(bond.ints)]
+            self.ints += [self.law(bond.law), len(self.numbers), equations, end, end_position, *ints]
+            self.numbers += bond.numbers
+            equations = end
+        head[at.HOLD], head[at.PROJECT] = self.law("hold"), self.law("project")
+        head[at.BONDS], head[at.BOND_AT] = len(bonds), len(self.ints)
+        self.ints += records
+        head[at.BALLS], head[at.BALL_AT] = len(self.balls), len(self.ints)
+        self.ints += self.balls.values()
+        head[at.EQUATIONS], head[at.POSITIONS] = equations, sum(bond.positions for bond in bonds)
+        head[at.LOCKS], head[at.ENTRIES] = constrained.locks, self.entries
+        for place, count in room_for(equations, size, self.entries).items():
+            head[place] = self.room(count)
+        self.ints[start : start + at.HELD_INTS] = head
 
     def item_records(self) -> list[list[tuple[Item, int]]]:
         """Write the items; the records of the contacts come first, in their order."""

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from osimlite.simulation.kernels.layout import LINK_WORK, ORIGIN, POSITION, VELOCITY, WORK_LINK, WRENCH
+from osimlite.simulation.kernels.layout import (
+    ACCELERATION,
+    GRAVITY_AT,
+    LINK_WORK,
+    ORIGIN,
+    POSITION,
+    VELOCITY,
+    WORK_LINK,
+    WRENCH,
+)
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
 
@@ -41,6 +50,33 @@ def turning(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     v = at(w, s[WORK_LINK] + LINK_WORK * link + VELOCITY)
     return v[0], v[1], v[2]
+
+
+def acceleration(
+    s: Ints, x: Floats, w: Floats, link: int, px: float, py: float, pz: float
+) -> tuple[float, float, float]:
+    """Acceleration of the point of a link that is at (px, py, pz) in ground, while the speeds do not change."""
+    if link < 0:
+        return 0.0, 0.0, 0.0
+    here = at(w, s[WORK_LINK] + LINK_WORK * link)
+    v, a, g = at(here, VELOCITY), at(here, ACCELERATION), at(x, GRAVITY_AT)
+    px, py, pz = px - here[ORIGIN], py - here[ORIGIN + 1], pz - here[ORIGIN + 2]
+    wx, wy, wz = v[0], v[1], v[2]
+    vx, vy, vz = v[3] + wy * pz - wz * py, v[4] + wz * px - wx * pz, v[5] + wx * py - wy * px
+    # Links are pushed upwards against gravity.
+    return (
+        a[3] + g[0] + a[1] * pz - a[2] * py + wy * vz - wz * vy,
+        a[4] + g[1] + a[2] * px - a[0] * pz + wz * vx - wx * vz,
+        a[5] + g[2] + a[0] * py - a[1] * px + wx * vy - wy * vx,
+    )
+
+
+def twist(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
+    """Angular acceleration of a link while the speeds do not change."""
+    if link < 0:
+        return 0.0, 0.0, 0.0
+    a = at(w, s[WORK_LINK] + LINK_WORK * link + ACCELERATION)
+    return a[0], a[1], a[2]
 
 
 def push(s: Ints, w: Floats, link: int, x: float, y: float, z: float, fx: float, fy: float, fz: float) -> None:

@@ -1,0 +1,89 @@
+"""The error of Simbody's angular acceleration of a CustomJoint; see `osimlite.multibody.motions.SimbodyDrift`."""
+
+from __future__ import annotations
+
+from osimlite.simulation.kernels.layout import (
+    ARGUMENT_COUNT,
+    ARGUMENTS,
+    AXIS,
+    FINE,
+    FREEDOM,
+    FREEDOMS,
+    GRADIENT,
+    OPERATION_AT,
+    OPERATION_INTS,
+    OPERATION_WORK,
+    POINT,
+    RATE,
+    SCRATCH,
+    WORK_OPERATION,
+)
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
+
+SIGN, COORDINATES, TURNS = 0, 1, 3
+"""Of its integers: -1 if it is passed backwards, else 1; the degrees of freedom of the first two coordinates of the
+joint, and the operations that are the three turns, -1 for what does not move."""
+
+
+def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Nothing moves."""
+    kept, frame = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH)
+    kept[POINT], kept[POINT + 1], kept[POINT + 2] = frame[9], frame[10], frame[11]
+    return FINE
+
+
+def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Velocity and own acceleration in SCRATCH."""
+    own = at(s, s[s[OPERATION_AT] + OPERATION_INTS * operation + ARGUMENTS])
+    kept, found, u = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(y, s[FREEDOMS])
+    px, py, pz = kept[POINT] - found[0], kept[POINT + 1] - found[1], kept[POINT + 2] - found[2]
+    tx = ty = tz = 0.0
+    for row in range(1, 3):
+        last = own[TURNS + row]
+        if last < 0:
+            continue
+        # What Simbody takes for the rates of the angles before this one turns its axis, and should not.
+        dx = dy = dz = 0.0
+        for turn in range(3):
+            number = own[TURNS + turn]
+            if number < 0:
+                continue
+            wrong = 0.0
+            for c in range(row):
+                freedom = own[COORDINATES + c]
+                if freedom >= 0:
+                    wrong += share(s, w, number, freedom) * u[freedom]
+            if turn < row:
+                wrong -= rate(s, w, u, number)
+            axis = at(w, s[WORK_OPERATION] + OPERATION_WORK * number + AXIS)
+            dx += wrong * axis[0]
+            dy += wrong * axis[1]
+            dz += wrong * axis[2]
+        axis = at(w, s[WORK_OPERATION] + OPERATION_WORK * last + AXIS)
+        size = -own[SIGN] * rate(s, w, u, last)
+        tx += size * (axis[1] * dz - axis[2] * dy)
+        ty += size * (axis[2] * dx - axis[0] * dz)
+        tz += size * (axis[0] * dy - axis[1] * dx)
+    for k in range(6):
+        found[k] = 0.0
+    found[6], found[7], found[8] = py * tz - pz * ty, pz * tx - px * tz, px * ty - py * tx
+    found[9], found[10], found[11] = tx, ty, tz
+    return FINE
+
+
+def rate(s: Ints, w: Floats, u: Floats, operation: int) -> float:
+    """Of the amount of an operation."""
+    freedom = s[s[OPERATION_AT] + OPERATION_INTS * operation + FREEDOM]
+    found: float = u[freedom] if freedom >= 0 else w[s[WORK_OPERATION] + OPERATION_WORK * operation + RATE]
+    return found
+
+
+def share(s: Ints, w: Floats, operation: int, freedom: int) -> float:
+    """Derivative of the amount of an operation by a degree of freedom."""
+    j, total = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), 0.0
+    if j[FREEDOM] >= 0:
+        return 1.0 if j[FREEDOM] == freedom else 0.0
+    for k in range(j[ARGUMENT_COUNT]):
+        if s[j[ARGUMENTS] + k] == freedom:
+            total += w[j[GRADIENT] + k]
+    return total

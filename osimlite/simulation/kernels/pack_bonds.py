@@ -1,0 +1,177 @@
+"""What a constraint becomes: a law with integers and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.errors import UnsupportedError
+from osimlite.multibody import body_constraints as b
+from osimlite.multibody.constraints import Constraint, Coupler, Prescribed
+from osimlite.multibody.mechanism import FramePlacement, StationPlacement
+from osimlite.multibody.parts import GROUND
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.kernels import layout as at
+from osimlite.simulation.kernels.bonds import ARM, AXIS, DISTANCE, PRODUCT, SLIP
+from osimlite.simulation.kernels.functions import function_table, table_of_one
+from osimlite.simulation.kernels.items import Places
+from osimlite.simulation.kernels.least_squares import factor_room
+
+Balls = Mapping[tuple[int, ...], int]
+"""By the degrees of freedom of a ball, where the place of its arguments is."""
+
+
+class Bond(NamedTuple):
+    """One constraint.
+
+    Attributes:
+        law: its name.
+        ints: of its own.
+        numbers: of its own.
+        equations: how many.
+        positions: how many of these, from the first on, bind positions.
+        room: length of its room in the work vector.
+        room_at: which of its integers is the place of that.
+    """
+
+    law: str
+    ints: list[int]
+    numbers: list[float]
+    equations: int = 1
+    positions: int = 1
+    room: int = 0
+    room_at: int = -1
+
+
+class _Vector(NamedTuple):
+    """An axis in a link, or an arm from a point of one link to one of another."""
+
+    ints: list[int]
+    numbers: list[float]
+
+
+class _Equation(NamedTuple):
+    kind: int
+    first: _Vector
+    second: _Vector
+    wanted: float = 0.0
+
+
+def bond_of(constraint: Constraint, places: Places, balls: Balls) -> Bond:
+    """The bond that keeps up a constraint.
+
+    Raises:
+        UnsupportedError: there is no law for it, or for its function.
+    """
+    match constraint:
+        case Prescribed():
+            table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
+            return Bond("prescribe", _coordinate(constraint.coordinate, places, balls), table)
+        case Coupler():
+            return _coupler(constraint, places, balls)
+        case b.RollingConstraint():
+            equations = _rolling(constraint, places)
+            return _between(equations, sum(item.kind != SLIP for item in equations))
+        case b.DistanceConstraint():
+            arm = _arm(places, constraint.first, constraint.second)
+            return _between([_Equation(DISTANCE, arm, arm, constraint.distance)])
+        case b.PointConstraint():
+            return _between(_vanishing(_arm(places, constraint.first, constraint.second)))
+        case b.PointOnLineConstraint():
+            arm = _arm(places, constraint.line, constraint.follower)
+            axes = (_axis(places, constraint.line.body, axis) for axis in constraint.across())
+            return _between([_Equation(PRODUCT, axis, arm) for axis in axes])
+        case b.WeldConstraint():
+            return _between(_weld(constraint, places))
+    raise UnsupportedError(
+        f"the compiled engine cannot keep up '{constraint.name}' ({type(constraint).__name__}); take --engine bullet, "
+        "or set its isEnforced to false"
+    )
+
+
+def room_for(equations: int, size: int, entries: int) -> dict[int, int]:
+    """Lengths of the parts of the work vector, by their places in the record of all constraints."""
+    rows = equations * size
+    by_multipliers, by_directions = equations * (equations + 1), 2 * (equations + size + size * size)
+    return {
+        at.WORK_ROWS: rows,
+        at.WORK_ERRORS: equations,
+        at.WORK_RATES: equations,
+        at.WORK_DRIFTS: equations,
+        at.WORK_KEPT: rows,
+        at.WORK_FACTOR: factor_room(equations, size),
+        at.WORK_SYSTEM: entries + size + max(by_multipliers, by_directions),
+        at.WORK_TRIAL: 6 * size,
+    }
+
+
+def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
+    """Degree of freedom of a coordinate, the place of the arguments of its ball or -1, and its number among these."""
+    freedom = places.freedom(place)
+    for freedoms, arguments in balls.items():
+        if freedom in freedoms:
+            return [freedom, arguments, freedoms.index(freedom)]
+    return [freedom, -1, 0]
+
+
+def _coupler(constraint: Coupler, places: Places, balls: Balls) -> Bond:
+    others = constraint.independent
+    table = function_table(constraint.function, f"the function of '{constraint.name}'")
+    dependent = _coordinate(constraint.dependent, places, balls)
+    ints = [*dependent, 0, len(others), *map(places.freedom, others)]
+    for place in others:
+        ints += _coordinate(place, places, balls)
+    numbers = [places.locked_value(place) for place in (constraint.dependent, *others)]
+    return Bond("couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent))
+
+
+def _between(equations: Sequence[_Equation], positions: int | None = None) -> Bond:
+    ints: list[int] = []
+    numbers: list[float] = []
+    for item in equations:
+        ints += [item.kind, *item.first.ints, *item.second.ints]
+        numbers += [*item.first.numbers, *item.second.numbers, item.wanted]
+    count = len(equations)
+    return Bond("bind_bodies", ints, numbers, count, count if positions is None else positions)
+
+
+def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
+    direction = places.direction(body, np.asarray(axis, dtype=float).tolist())
+    return _Vector([AXIS, places.placement(body).link, GROUND], [*direction, 0.0, 0.0, 0.0])
+
+
+def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
+    (one, start), (two, end) = (places.station(body, point.tolist()) for body, point in (first, second))
+    return _Vector([ARM, one, two], [*start, *end])
+
+
+def _vanishing(arm: _Vector) -> list[_Equation]:
+    """No component of an arm along ground's axes is left."""
+    axes = (_Vector([AXIS, GROUND, GROUND], [*axis, 0.0, 0.0, 0.0]) for axis in np.eye(3).tolist())
+    return [_Equation(PRODUCT, axis, arm) for axis in axes]
+
+
+def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
+    (one, inner), (two, outer) = constraint.first, constraint.second
+    turns = [
+        _Equation(PRODUCT, _axis(places, two, outer[:3, axis]), _axis(places, one, inner[:3, (axis + 1) % 3]))
+        for axis in range(3)
+    ]
+    return [*turns, *_vanishing(_arm(places, _origin(constraint.first), _origin(constraint.second)))]
+
+
+def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
+    surface, roller = constraint.surface, constraint.roller
+    arm = _arm(places, StationPlacement(surface, np.zeros(3)), StationPlacement(roller, np.zeros(3)))
+    x, _, z = np.eye(3)
+    normal: Array = constraint.normal / np.linalg.norm(constraint.normal)
+    square = _Equation(PRODUCT, _axis(places, surface, x), _axis(places, roller, z))
+    slips = [_Equation(SLIP, _axis(places, surface, axis), arm) for axis in (x, z)]
+    return [_Equation(PRODUCT, _axis(places, surface, normal), arm, constraint.height), square, *slips]
+
+
+def _origin(placement: FramePlacement) -> StationPlacement:
+    return StationPlacement(placement.body, placement.transform[:3, 3])

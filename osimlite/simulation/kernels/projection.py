@@ -1,0 +1,216 @@
+"""The nearest state where constraints hold, as :class:`osimlite.simulation.constrained.Constrained` finds it."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from osimlite.simulation.constrained import FINEST, ITERATIONS, OVERSHOOT, REDUNDANT
+from osimlite.simulation.kernels.hold import bind
+from osimlite.simulation.kernels.layout import (
+    BALL_AT,
+    BALLS,
+    BOND_AT,
+    BONDS,
+    END_POSITION,
+    EQUATIONS,
+    FAR,
+    FINE,
+    FIRST_EQUATION,
+    FREEDOMS,
+    HELD,
+    LAWS,
+    LOCKS,
+    MOVED,
+    POSITIONS,
+    SCRATCH,
+    WORK_ERRORS,
+    WORK_FACTOR,
+    WORK_KEPT,
+    WORK_RATES,
+    WORK_ROWS,
+    WORK_SYSTEM,
+    WORK_TRIAL,
+)
+from osimlite.simulation.kernels.least_squares import factorise, shortest
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.trigonometry import sine_cosine
+
+
+def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: int) -> int:
+    """Move a state to where the constraints hold, if it is near; else it stays.
+
+    Args:
+        s: the mechanism.
+        x: its numbers.
+        w: what the constraints may be off, and may be off at most in y, are in SCRATCH.
+        y: the state.
+        off: how far off each entry of it may be; of that, what lies across the constraints is taken away.
+        has_errors: 0 if that is not known.
+
+    Returns:
+        FINE if they hold then.
+    """
+    size, h = s[FREEDOMS], at(s, s[HELD])
+    tolerance, limit = w[SCRATCH], w[SCRATCH + 1]
+    trial = at(w, h[WORK_TRIAL])
+    for k in range(2 * size):
+        trial[k] = y[k]
+    status = bound(s, x, w, trial)
+    if status == FINE:
+        status = project_values(s, x, w, trial, off, has_errors, tolerance, limit)
+    if status == FINE:
+        status = project_speeds(s, w, trial, at(off, size), has_errors, tolerance, limit)
+    if status == FINE:
+        for k in range(2 * size):
+            y[k] = trial[k]
+    return status
+
+
+def bound(s: Ints, x: Floats, w: Floats, y: Floats) -> int:
+    """All equations at a state."""
+    f = at(w, s[s[HELD] + WORK_TRIAL] + 2 * s[FREEDOMS])
+    status = call(s[LAWS], s, x, w, y, f, MOVED)
+    if status == FINE:
+        bind(s, x, w, y, f)
+    return status
+
+
+def project_values(
+    s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
+) -> int:
+    """Change the values of a state whose equations are known, and the errors with them; the equations follow."""
+    size, h = s[FREEDOMS], at(s, s[HELD])
+    count, kept, factor = h[POSITIONS], at(w, h[WORK_KEPT]), at(w, h[WORK_FACTOR])
+    errors = at(w, h[WORK_SYSTEM])
+    room, step, following = at(errors, count), at(errors, 2 * count), at(w, h[WORK_TRIAL] + 4 * size)
+    norm = position_errors(s, w, errors)
+    if norm <= tolerance:
+        return FINE
+    if not norm <= limit:
+        return FAR
+    rank = 0
+    for iteration in range(ITERATIONS):
+        rows_by_values(s, w, y, kept)
+        for k in range(count * size):
+            factor[k] = kept[k]
+        rank = factorise(count, size, factor, REDUNDANT * count)
+        shortest(count, size, factor, rank, errors, room, step)
+        for k in range(size):
+            following[k], following[size + k] = y[k] - step[k], y[size + k]
+        before, norm = norm, inf
+        if bound(s, x, w, following) == FINE:
+            norm = position_errors(s, w, errors)
+        if iteration > 0 and not norm <= before:
+            norm = before
+            break
+        for k in range(size):
+            y[k] = following[k]
+        if norm <= max(OVERSHOOT * tolerance, FINEST):
+            break
+    if not norm <= tolerance:
+        return FAR
+    if has_errors > 0:
+        across(count, size, kept, factor, rank, off, errors, room, step)
+        for k in range(size):
+            off[k] -= step[k]
+    return bound(s, x, w, y)
+
+
+def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float) -> int:
+    """Change the speeds of a state whose equations are known, and their errors with them."""
+    size, h = s[FREEDOMS], at(s, s[HELD])
+    count, rows, factor = h[EQUATIONS], at(w, h[WORK_ROWS]), at(w, h[WORK_FACTOR])
+    errors, scales, u = at(w, h[WORK_SYSTEM]), at(w, h[WORK_TRIAL] + 4 * size), at(y, size)
+    room, step = at(errors, count), at(errors, 2 * count)
+    norm = speed_errors(s, w, u, errors)
+    if norm <= tolerance:
+        return FINE
+    if not norm <= limit:
+        return FAR
+    for k in range(size):
+        scales[k] = max(abs(u[k]), 1.0)
+    for i in range(count):
+        for k in range(size):
+            factor[size * i + k] = scales[k] * rows[size * i + k]
+    rank = factorise(count, size, factor, REDUNDANT * count)
+    # The rows do not depend on the speeds: one step does, a second one mends its rounding.
+    for _ in range(2):
+        shortest(count, size, factor, rank, errors, room, step)
+        for k in range(size):
+            u[k] -= scales[k] * step[k]
+        norm = speed_errors(s, w, u, errors)
+        if norm <= max(OVERSHOOT * tolerance, FINEST):
+            break
+    if not norm <= tolerance:
+        return FAR
+    if has_errors > 0:
+        across(count, size, rows, factor, rank, off, errors, room, step)
+        for k in range(size):
+            off[k] -= scales[k] * step[k]
+    return FINE
+
+
+def across(
+    count: int,
+    size: int,
+    rows: Floats,
+    factor: Floats,
+    rank: int,
+    off: Floats,
+    values: Floats,
+    room: Floats,
+    found: Floats,
+) -> None:
+    """What of some errors lies across equations, of which the factor is known."""
+    for i in range(count):
+        values[i] = 0.0
+        for k in range(size):
+            values[i] += rows[size * i + k] * off[k]
+    shortest(count, size, factor, rank, values, room, found)
+
+
+def position_errors(s: Ints, w: Floats, errors: Floats) -> float:
+    """The errors of the positions one after the other, and their root mean square."""
+    h, count, total = at(s, s[HELD]), 0, 0.0
+    for number in range(h[BONDS]):
+        bond = at(s, s[h[BOND_AT] + number])
+        for row in range(bond[FIRST_EQUATION], bond[END_POSITION]):
+            errors[count] = w[h[WORK_ERRORS] + row]
+            total += errors[count] * errors[count]
+            count += 1
+    return sqrt(total / max(count + h[LOCKS], 1))
+
+
+def speed_errors(s: Ints, w: Floats, u: Floats, errors: Floats) -> float:
+    """The errors of the speeds, and their root mean square."""
+    h, size, total = at(s, s[HELD]), s[FREEDOMS], 0.0
+    rows, rates = at(w, h[WORK_ROWS]), at(w, h[WORK_RATES])
+    for i in range(h[EQUATIONS]):
+        error = -rates[i]
+        for k in range(size):
+            error += rows[size * i + k] * u[k]
+        errors[i] = error
+        total += error * error
+    return sqrt(total / max(h[EQUATIONS] + h[LOCKS], 1))
+
+
+def rows_by_values(s: Ints, w: Floats, y: Floats, rows: Floats) -> None:
+    """Derivatives of the errors of the positions by the coordinates."""
+    h, size, count = at(s, s[HELD]), s[FREEDOMS], 0
+    for number in range(h[BONDS]):
+        bond = at(s, s[h[BOND_AT] + number])
+        for i in range(bond[FIRST_EQUATION], bond[END_POSITION]):
+            row, given = at(rows, size * count), at(w, h[WORK_ROWS] + size * i)
+            for k in range(size):
+                row[k] = given[k]
+            count += 1
+    for number in range(h[BALLS]):
+        a = at(s, s[h[BALL_AT] + number])
+        s1, c1 = sine_cosine(y[a[0]])
+        s2, c2 = sine_cosine(y[a[1]])
+        for i in range(count):
+            # The speeds are the rates of the angles times their axes.
+            row = at(rows, size * i)
+            ux, uy, uz = row[a[0]], row[a[1]], row[a[2]]
+            row[a[1]] = c1 * uy + s1 * uz
+            row[a[2]] = s2 * ux - s1 * c2 * uy + c1 * c2 * uz
