@@ -234,6 +234,8 @@ class _Evaluations:
         found = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
         self.reasons += [word for word in columns["reason"] if word][: 10 - len(self.reasons)]
         self._history += [(list(row), status, value) for row, status, value in found]
+        # What is there is not forgotten, even if fewer runs are asked for now.
+        self.budget = max(self.budget, len(self._history))
 
     def ask(self, points: Floats) -> Floats:
         """Costs (k,) of points (k, d) of the cube of the free variables; of those that the budget allows at least."""

@@ -56,8 +56,7 @@ def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
         keeps_best: let the first point be one of the first population, and the best so far a parent of every other.
     """
     strategy = require("cma", extra="optimize", purpose="the search by cma")
-    if len(search.start) < 2:
-        raise SettingError("cma searches two variables or more; take --method nelder-mead for one")
+    _needs_two(search)
     source = np.random.RandomState(search.seed)
     options: dict[str, Any] = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "randn": source.randn, "seed": np.nan}
     if search.popsize is not None:
@@ -84,6 +83,7 @@ def sobol_cma(ask: Ask, search: Search) -> str:
     the start alone, and never ends worse than it began. The look does not depend on the budget, so that a search can go
     on with a larger one.
     """
+    _needs_two(search)
     size = search.popsize or 4 + int(3.0 * np.log(len(search.start)))
     points = Sobol(search.seed, len(search.start)).points(0, LOOKS * size)
     points[0] = search.start
@@ -152,6 +152,11 @@ def method_named(name: str) -> Callable[[Ask, Search], str]:
     if name not in METHODS:
         raise SettingError(f"there is no method '{name}'{or_known(name, METHODS)}")
     return METHODS[name]
+
+
+def _needs_two(search: Search) -> None:
+    if len(search.start) < 2:
+        raise SettingError("cma searches two variables or more; take --method nelder-mead for one")
 
 
 def _needs_bounds(search: Search) -> None:
