@@ -31,6 +31,7 @@ NoteKind = Literal[
     "control-character",
     "byte-order-mark",
     "late-declaration",
+    "overlooked",
     "text-outside-root",
 ]
 

@@ -21,8 +21,26 @@ from osimlite.errors import NotWellFormedError
 
 _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
 _HYPHENS = re.compile(r"-{2,}|-\Z")
-_AMPERSAND = re.compile(r"&(?!#[0-9]+;|#x[0-9a-fA-F]+;)(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
+# OpenSim too refuses a number without its end.
+_AMPERSAND = re.compile(r"&(?!#(?!x?;))(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
 _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
+_NO_CHARACTER = re.compile("[\x01-\x08\x0e-\x1f\ufffe\uffff]")
+_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
+_VALUE = re.compile(
+    r"\"[^\"]*\"|'[^']*'|"
+    r"(?<=\s)(?P<name>[^\s=\"'<>/]+)\s*=(?:\s*(?P<bare>[^\s=\"'<>/]+)(?=[\s/>])|(?=\s*/?>))"
+)
+_TOUCHING = re.compile(r"(?:\"[^\"]*\"|'[^']*')(?=[^\s/>?\"'])")
+_SOUND_DECLARATION = re.compile(
+    r"<\?xml\s+version\s*=\s*([\"'])1\.[0-9]+\1(?:\s+encoding\s*=\s*([\"'])[A-Za-z][\w.-]*\2)?"
+    r"(?:\s+standalone\s*=\s*([\"'])(?:yes|no)\3)?\s*\?>",
+    re.ASCII,
+)
+_OPEN_DECLARATION = re.compile(r"[\s\ufeff]*(<\?xml\b[^<>]*>)(?<!\?>)")
+_NAMED = re.compile(r"<\?[^\W\d][\w.:-]*(?:\s|\?>)")
+_ENDING = re.compile(r"\]\]>")
+_XML_IN_CAPITALS = re.compile(r"<\?xml(?![\w.:-])", re.IGNORECASE)
+_REPLACEMENT = "\ufffd"
 _BLANK_CONTROLS = re.compile("[\f\v]")
 _DECLARATION = re.compile(r"<\?xml\s")
 _SPECIAL = re.compile(r"<!(?:--|\[CDATA\[)")
@@ -91,6 +109,13 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
     for match in _BLANK_CONTROLS.finditer(text):
         repairs.append(Repair("control-character", match.start(), f"\\x{ord(match[0]):02x}", " "))
     text = _BLANK_CONTROLS.sub(" ", text)
+    for match in _NO_CHARACTER.finditer(text):
+        repairs.append(Repair("overlooked", match.start(), match[0], "OpenSim keeps it"))
+    text = _NO_CHARACTER.sub(_REPLACEMENT, text)
+    unended = _OPEN_DECLARATION.match(text)
+    if unended is not None:
+        repairs.append(Repair("overlooked", unended.start(1), unended[1], "OpenSim passes over it"))
+        text = _blanked(unended[0]) + text[unended.end() :]
     pieces: list[str] = []
     place = depth = 0
     for kind, start, end, _ in markup(text):
@@ -102,9 +127,12 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
             if _DECLARATION.match(piece) and place > 0:
                 repairs.append(Repair("late-declaration", start, piece, ""))
                 piece = _blanked(piece)
+            elif _is_no_instruction(piece):
+                repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
+                piece = _blanked(piece)
         elif kind in ("open", "empty"):
             depth += kind == "open"
-            piece = _ampersands(_attributes(piece, start, repairs), start, repairs)
+            piece = _quoted(_ampersands(_attributes(piece, start, repairs), start, repairs), start, repairs)
         elif kind == "close":
             depth -= 1
         pieces.append(piece)
@@ -129,6 +157,10 @@ def _blanked(text: str) -> str:
 
 def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
     """Text before or after the root: it belongs to nothing."""
+    before, nul, _ = text.partition("\0")
+    if offset and nul and not before.strip():
+        repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
+        return _blanked(text)
     stripped = text.strip("\ufeff \t\r\n")
     if stripped and "<" not in stripped:
         word = stripped.splitlines()[0][:40]
@@ -162,10 +194,47 @@ def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     return piece
 
 
+def _is_no_instruction(piece: str) -> bool:
+    """Whether what stands between ``<?`` and ``?>`` is neither a declaration nor an instruction of XML."""
+    if _DECLARATION.match(piece):
+        return _SOUND_DECLARATION.fullmatch(piece) is None
+    return _NAMED.match(piece) is None or _XML_IN_CAPITALS.match(piece) is not None
+
+
+def _quoted(piece: str, offset: int, repairs: list[Repair]) -> str:
+    """A start tag in which every value of an attribute stands in quotes and a blank before every name."""
+
+    def quote(match: re.Match[str]) -> str:
+        if match["name"] is None:
+            return match[0]
+        meant = "OpenSim takes it for quoted" if match["bare"] else "OpenSim takes its value for empty"
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], meant))
+        return f'{match["name"]}="{match["bare"] or ""}"'
+
+    def part(match: re.Match[str]) -> str:
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], "OpenSim needs no blank behind it"))
+        return f"{match[0]} "
+
+    return _VALUE.sub(quote, _TOUCHING.sub(part, piece)) if "=" in piece else piece
+
+
 def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
-    """An ampersand that begins no reference stands for itself; HTML's references mean what they mean in HTML."""
+    """Text in which an ampersand that begins no reference stands for itself, as does what would end a CDATA section.
+
+    HTML's references mean what they mean in HTML; of a number that is no character OpenSim keeps a byte.
+    """
+    if "]]>" in text:
+        repairs += [Repair("overlooked", offset + m.start(), m[0], "OpenSim keeps it") for m in _ENDING.finditer(text)]
+        text = text.replace("]]>", "]]&gt;")
     if "&" not in text:
         return text
+
+    def number(match: re.Match[str]) -> str:
+        value = int(match[1], 16) if match[1] else int(match[2])
+        if value in (9, 10, 13) or 32 <= value < 0xD800 or 0xE000 <= value < 0xFFFE or 0x10000 <= value < 0x110000:
+            return match[0]
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], "OpenSim makes a byte of it"))
+        return _REPLACEMENT
 
     def mend(match: re.Match[str]) -> str:
         name = match[1]
@@ -177,4 +246,4 @@ def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
             return "&amp;" + match[0][1:]
         return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
 
-    return _AMPERSAND.sub(mend, text)
+    return _AMPERSAND.sub(mend, _NUMBERED.sub(number, text))

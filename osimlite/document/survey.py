@@ -9,6 +9,7 @@ from lxml import etree
 
 from osimlite.document.names import as_written
 from osimlite.document.reader import Document, document_of, parse, read_document, version_of
+from osimlite.document.repair import repaired
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.schema.model import CURRENT_VERSION
@@ -49,7 +50,9 @@ def _recovered(source: Source, fault: NotWellFormedError) -> Survey:
     if unclosed:
         found.sure_until = int(unclosed[1])
     try:
-        root = parse(source, recover=True)
+        # What the parser takes for a character in spite of all may be none that lxml can give back.
+        mended, _ = repaired(source.text)
+        root = parse(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:
         return found
     if root.tag != "OpenSimDocument" or not _same_elements(source, root, found.sure_until):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from lxml import etree
 
+from osimlite.document.lexical import Unclean, real, split
 from osimlite.document.names import as_written
 from osimlite.schema.registry import class_for
 
@@ -253,17 +254,17 @@ def text_of(parent: Element, tag: str) -> str | None:
 
 def plain(element: Element) -> str:
     """The text of an element, white space collapsed."""
-    return " ".join("".join([element.text or "", *(node.tail or "" for node in element)]).split())
+    return " ".join(split("".join([element.text or "", *(node.tail or "" for node in element)])))
 
 
 def reals(text: str | None, count: int) -> list[float] | None:
     """The numbers in a text, or None unless there are exactly `count`."""
-    words = (text or "").split()
+    words = split(text or "")
     if len(words) != count:
         return None
     try:
-        return [float(word) for word in words]
-    except ValueError:
+        return [real(word) for word in words]
+    except Unclean:
         return None
 
 

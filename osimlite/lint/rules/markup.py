@@ -60,8 +60,9 @@ def lenient_xml(subject: Subject, found: Found) -> None:
     """The text is not XML in a way that OpenSim overlooks.
 
     ## What it does
-    Reports a bare `&`, two hyphens inside a comment, form feeds, and an XML declaration that does not stand at the very
-    beginning.
+    Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have, values of attributes
+    without quotes, attributes without a blank between, and an XML declaration that is none or does not stand at the
+    very beginning.
 
     ## Why is this bad
     OpenSim's parser reads such a file, and most other XML readers refuse it. A bare `&` it leaves out: of `Anna & Bert`
@@ -82,7 +83,7 @@ def lenient_xml(subject: Subject, found: Found) -> None:
         return
     offset = -1
     for note in subject.notes:
-        if note.kind not in ("bare-ampersand", "hyphens-in-comment", "control-character", "late-declaration"):
+        if note.kind not in _OVERLOOKED:
             continue
         offset = _word_behind(source, max(offset + 1, source.line_start(note.line or 1)), note.word)
         place = source.position(offset, len(note.word.splitlines()[0]))
@@ -104,6 +105,10 @@ def lenient_xml(subject: Subject, found: Found) -> None:
                     suggestion="-",
                     fix=replaced(source, place, "-"),
                 )
+            case "overlooked":
+                odd = len(note.word) == 1 and not note.word.isprintable()
+                what = f"the character U+{ord(note.word):04X}" if odd else f"'{note.word.splitlines()[0][:40]}'"
+                found(f"{what} is not XML; {note.value}, others refuse the file", at=place)
             case "control-character":
                 place = source.position(_control(source, offset))
                 found(
@@ -124,6 +129,9 @@ def lenient_xml(subject: Subject, found: Found) -> None:
             at=source.position(start, 5),
             fix=Fix((Edit(0, start, ""),)),
         )
+
+
+_OVERLOOKED = frozenset(("bare-ampersand", "hyphens-in-comment", "control-character", "late-declaration", "overlooked"))
 
 
 def _word_behind(source: Source, start: int, word: str) -> int:
