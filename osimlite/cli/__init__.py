@@ -28,6 +28,7 @@ COMMANDS = (
     "sweep",
     "optimize",
     "gait",
+    "find-gait",
     "kinematics",
     "inverse-dynamics",
     "lsp",

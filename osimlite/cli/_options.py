@@ -39,6 +39,14 @@ ExternalLoads = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
 ]
+Foot = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="CONTACT",
+        help="Contact of a foot, with + between several of one foot; once for each foot.",
+        show_default="the ends of the legs",
+    ),
+]
 Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
 Folder = Annotated[
     Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder")

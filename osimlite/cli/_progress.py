@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,6 +37,30 @@ def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None
     finally:
         if bar is not None:
             bar.stop()
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
+    """Progress bars for work in stages, one after the other.
+
+    What is yielded takes what is being done, how much of it is, and of how much.
+    """
+    current: str | None = None
+    advance: Callable[..., None] = _silent
+    with ExitStack() as bars:
+
+        def tell(title: str, done: float, of: float) -> None:
+            nonlocal current, advance
+            if title != current:
+                bars.close()
+                current, advance = title, bars.enter_context(progress_bar(title, of))
+            advance(done, of)
+
+        yield tell
+
+
+def _silent(*_: float) -> None:
+    """Before the first bar."""
 
 
 def _started(title: str) -> Progress:

@@ -30,14 +30,7 @@ def gait(
     source: options.Source,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
-    foot: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="CONTACT",
-            help="Contact of a foot, with + between several of one foot; once for each foot.",
-            show_default="the ends of the legs",
-        ),
-    ] = None,
+    foot: options.Foot = None,
     to: Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to walk at most.")] = 60.0,
     settle: Annotated[int, typer.Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")] = 0,
     accuracy: Annotated[float, typer.Option(help="Of the integrator in the step map.")] = 1e-10,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError
 from osimlite.gait.cycle import Cycle
-from osimlite.gait.footing import Footing
+from osimlite.gait.starts import stood
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.steps import Walk, along_slope, walk_many
 from osimlite.simulation.engines.compiled import CompiledEngine
@@ -63,36 +63,6 @@ class Basin:
     def part(self) -> float:
         """Which part of the starts walks."""
         return float((self.steps >= self.wanted).mean())
-
-
-def upright(engine: CompiledEngine, footing: Footing) -> int | None:
-    """Place in the state of the coordinate that lifts the walker off the ground, if there is one (m)."""
-    n = len(engine.order)
-    names = [name for foot in footing.feet for name in foot] + list(footing.falls)
-    contacts = [engine.contacts.index(name) for name in names]
-    rng = np.random.default_rng(0)
-    poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
-    for place in range(n):
-        moved = poses.copy()
-        moved[:, place] += 0.1
-        change = along_slope(engine, moved)[1] - along_slope(engine, poses)[1]
-        if (change[:, contacts] < -0.01).all() and np.ptp(change[:, contacts]) < 1e-9:
-            return place
-    return None
-
-
-def stood(engine: CompiledEngine, footing: Footing, states: Floats, depth: float = 0.0, foot: int = 0) -> Floats:
-    """States (W, 2n) lifted or lowered until one foot is so deep (m) in the ground."""
-    place = upright(engine, footing)
-    if place is None:
-        return states
-    contacts = [engine.contacts.index(name) for name in footing.feet[foot]]
-    one = states.copy()
-    one[:, place] += 0.1
-    now, then = (along_slope(engine, rows)[1][:, contacts].max(axis=1) for rows in (states, one))
-    placed = states.copy()
-    placed[:, place] += (depth - now) * 0.1 / (then - now)
-    return placed
 
 
 def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int) -> Floats:

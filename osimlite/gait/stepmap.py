@@ -7,6 +7,7 @@ map goes from step to step, and otherwise from stride to stride.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError
 from osimlite.gait.footing import Footing, find_footing
-from osimlite.gait.steps import Walk, along_slope, falls, room_for, walks_of
+from osimlite.gait.steps import Step, along_slope, falls, room_for, walks_of
 from osimlite.gait.symmetry import leg_exchange, neutral_directions
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.kernels.pointers import Floats, Ints
@@ -91,21 +92,46 @@ class StepMap:
         self.threads = threads
         self.exchange: Ints | None = None
         here = np.array(near, dtype=float)
-        walk, times = self._first_step(here)
-        step = walk.steps[0]
-        reports = run_many(engine, here[None], step.time, report_times=times.tolist(), numbers=self.numbers).reports[0]
-        self.exchange = leg_exchange(engine, self.footing, reports)
-        self.neutral = neutral_directions(engine, reports)
+        step, moments = self._first_step(here)
+        self.exchange = leg_exchange(engine, self.footing, moments)
+        self.neutral = neutral_directions(engine, moments)
         full, _ = np.linalg.qr(np.hstack((self.neutral, np.eye(len(here)))))
         self.basis: Floats = full[:, self.neutral.shape[1] :]
         self.start = self.land(step.state, step.foot)
         if step.foot != 0:
             self.start = self._other_leg(self.start)
 
-    def _first_step(self, near: Floats) -> tuple[Walk, Floats]:
+    def varied(self, engine: CompiledEngine, near: ArrayLike, accuracy: float | None = None) -> StepMap:
+        """The step map of a model with other numbers, whose reduced states are as near to these as they can be.
+
+        Args:
+            engine: of that model, of the same structure.
+            near: a state from which it makes a step, and where reduced states are along the neutral directions (2n,).
+            accuracy: of the integrator; by default the same.
+
+        Raises:
+            OsimliteError: it makes no step from there, or has more or fewer neutral directions.
+        """
+        other = copy(self)
+        other.engine, other.numbers = engine, engine.numbers
+        other.start = np.array(near, dtype=float)
+        other.accuracy = self.accuracy if accuracy is None else accuracy
+        other.neutral = neutral_directions(engine, other._first_step(other.start)[1])
+        if other.neutral.shape != self.neutral.shape:
+            raise OsimliteError(
+                f"'{engine.mechanism.name}' has {other.neutral.shape[1]} neutral directions where it had "
+                f"{self.neutral.shape[1]} before its numbers changed"
+            )
+        turned = self.basis - other.neutral @ (other.neutral.T @ self.basis)
+        left, _, right = np.linalg.svd(turned, full_matrices=False)
+        other.basis = left @ right
+        return other
+
+    def _first_step(self, near: Floats) -> tuple[Step, Floats]:
+        """The first step from a state, and states on the way there (k, 2n)."""
         runs = run_many(
             self.engine, near[None], self.longest, numbers=self.numbers, accuracy=self.accuracy,
-            watches=falls(self.footing), most_events=room_for(self.longest), event_states=True,
+            watches=falls(self.footing), most_events=room_for(self.longest), event_states=True, threads=1,
         )  # fmt: skip
         (walk,) = walks_of(self.engine, near[None], runs, self.footing, numbers=self.numbers)
         if not walk.steps:
@@ -114,7 +140,11 @@ class StepMap:
                 f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s ({how}); give another start"
             )
         # At its ends a foot only just touches, where the force has no derivative.
-        return walk, np.linspace(0.0, walk.steps[0].time, ALONG_A_STEP + 2)[1:-1]
+        times = np.linspace(0.0, walk.steps[0].time, ALONG_A_STEP + 2)[1:-1].tolist()
+        runs = run_many(
+            self.engine, near[None], walk.steps[0].time, report_times=times, numbers=self.numbers, threads=1
+        )
+        return walk.steps[0], runs.reports[0]
 
     def _other_leg(self, state: Floats) -> Floats:
         if self.exchange is not None:

@@ -17,6 +17,9 @@ SAME = 1e-6
 NUDGE = 1e-6
 """By how much a state is moved to differentiate, rad, m and per second."""
 
+UNEVEN = 10.0
+"""A state at which the derivative is so many times less even than at most others is left out."""
+
 
 def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) -> Ints | None:
     """The places (2n,) from which the state is taken when the legs change parts, or None if they are not alike.
@@ -78,7 +81,9 @@ def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
         engine: of the model.
         states: some that the walk goes through (k, 2n).
     """
-    slopes = [derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)]
+    found_slopes = [derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)]
+    usual = float(np.median([uneven for _, uneven in found_slopes]))
+    slopes = [slope for slope, uneven in found_slopes if uneven <= UNEVEN * usual]
     size = slopes[0].shape[0]
     found = np.zeros((size, 0))
     while True:
@@ -86,7 +91,8 @@ def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
         rows = np.concatenate([rest @ slope for slope in slopes])
         sizes = np.linalg.norm(rows, axis=1)
         rows = rows[sizes > SAME] / sizes[sizes > SAME, None]
-        _, values, vectors = np.linalg.svd(rows)
+        # The triangle has the same singular values and right vectors, and is much smaller.
+        _, values, vectors = np.linalg.svd(np.linalg.qr(rows, mode="r"))
         values = np.concatenate((values, np.zeros(size - len(values))))
         larger = vectors[values < SAME * values[0]].T
         if larger.shape[1] <= found.shape[1]:
@@ -94,13 +100,19 @@ def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
         found = larger
 
 
-def derivative_matrix(engine: CompiledEngine, state: Floats) -> Floats:
-    """Derivative (2n, 2n) of the rate of change of the state by the state."""
-    columns = []
+def derivative_matrix(engine: CompiledEngine, state: Floats) -> tuple[Floats, float]:
+    """Derivative (2n, 2n) of the rate of change of the state by the state, and how even that is.
+
+    Evenness: the part by which the differences to either side are unlike; much where a contact only just touches.
+    """
+    columns, uneven = [], []
+    here = np.array(engine.derivative(0.0, state.tolist()))
     for k in range(len(state)):
         ahead, back = state.copy(), state.copy()
         ahead[k] += NUDGE
         back[k] -= NUDGE
         rates = [np.array(engine.derivative(0.0, y.tolist())) for y in (ahead, back)]
         columns.append((rates[0] - rates[1]) / (2.0 * NUDGE))
-    return np.array(columns).T
+        uneven.append((rates[0] - 2.0 * here + rates[1]) / NUDGE)
+    slope = np.array(columns).T
+    return slope, float(np.linalg.norm(uneven) / np.linalg.norm(slope))

@@ -1,0 +1,95 @@
+"""``osimlite find-gait``: the numbers and the start with which a model keeps on walking."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from osimlite.cli import _options as options
+from osimlite.cli import _sweeping as sweeping
+
+if TYPE_CHECKING:
+    from osimlite.sweep.gaits import Gait
+
+
+def find_gait(
+    source: options.Source,
+    vary: sweeping.Vary = None,
+    samples: Annotated[int, typer.Option(min=1, metavar="N", help="How many random walkers are tried.")] = 65536,
+    tries: Annotated[
+        int, typer.Option(min=1, metavar="N", help="How many of the best of them are led to a cycle.")
+    ] = 40,
+    enough: Annotated[int, typer.Option(min=1, metavar="N", help="Cycles after which no more are looked for.")] = 5,
+    budget: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Sets of numbers to try on the way to the most stable cycle.")
+    ] = 300,
+    stable: Annotated[
+        float, typer.Option(help="A largest multiplier below this is small enough; then the basin counts.")
+    ] = 0.6,
+    perturb: Annotated[
+        float, typer.Option(metavar="PART", help="How near the cycle walkers start for that: 0.1 is 10 %.")
+    ] = 0.1,
+    digits: Annotated[
+        int, typer.Option(min=1, max=17, metavar="N", help="Round the numbers of the model to so many.")
+    ] = 3,
+    start_digits: Annotated[
+        int | None,
+        typer.Option(min=1, max=17, metavar="N", help="Round the start to so many.", show_default="not rounded"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
+    foot: options.Foot = None,
+    parameter: options.Parameters = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json.")
+    ] = Path("found"),
+    skip_unsupported: options.SkipUnsupported = False,
+) -> None:
+    """Look for the numbers of a model, and the start, with which a walker never stops; writes it, ready to walk.
+
+    Give the ranges of what may change in the model, and of the values and speeds of the joints at a random start. The
+    walker is put on the ground with one foot at rest. Of random walkers, those whose second step is most like their
+    first are led to cycles. The best of these is led on to where its largest Floquet multiplier is small, and then to
+    where most of 60 walkers that start near it make 20 steps.
+
+    Example: osimlite find-gait walker.osim --vary '/bodyset/*Shank/inertia/2=0.02:1:log' --vary RHip_rz=-30deg:60deg
+    --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary LHip_rz/speed=-4:4
+    """
+    from rich.console import Console
+
+    from osimlite.cli._progress import progress_bars
+    from osimlite.sweep.gaits import find_gait as search
+
+    plan = sweeping.make_plan(source, vary, parameter, None, None, skip_unsupported=skip_unsupported)
+    with progress_bars() as stage:
+        gait = search(
+            plan, output, feet=foot, samples=samples, tries=tries, enough=enough, budget=budget, stable=stable,
+            perturb=perturb, digits=digits, start_digits=start_digits, seed=seed, stage=stage,
+        )  # fmt: skip
+    Console().print(_table(gait))
+    if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
+        raise typer.Exit(1)
+
+
+def _table(gait: Gait) -> Any:
+    from rich.table import Table
+
+    from osimlite.text import counted, listed
+
+    cycle, walk = gait.found.cycle, gait.walk
+    stable = "stable" if cycle.largest < 1.0 else "not stable"
+    table = Table(title=f"{stable}: largest multiplier {cycle.largest:.4g}", title_justify="left", show_header=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, number in gait.found.numbers.items():
+        table.add_row(name, f"{number:.6g}")
+    table.add_row("step length", f"{cycle.length:.6g} m")
+    table.add_row("period", f"{cycle.period:.6g} s")
+    end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
+    done = f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
+    table.add_row("walk", done)
+    table.add_row("near it", f"{gait.found.walking:.0%} walk")
+    table.add_row("search", f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found")
+    table.add_row("files", listed([str(path) for path in gait.files]))
+    return table

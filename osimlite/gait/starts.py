@@ -1,0 +1,142 @@
+"""Where walkers start: how to put one on its feet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from osimlite.gait.footing import Footing
+from osimlite.gait.steps import along_slope
+from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import contact_places
+
+APART = 0.1
+"""How far a coordinate is moved to see what it carries, rad or m."""
+
+NUDGE = 1e-6
+"""Over so short a time (s) states are moved on to find out how fast their feet are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Carriers:
+    """The coordinates that carry a walker as a whole.
+
+    Attributes:
+        places: of those that move every contact by the same way, in the state (m,).
+        ways: how far each does, in ground (m, 3).
+        lift: place of the one among them that lifts it off the ground, or None.
+    """
+
+    places: tuple[int, ...]
+    ways: Floats
+    lift: int | None
+
+
+def carriers(engine: CompiledEngine, footing: Footing) -> Carriers:
+    """Find the coordinates that carry a walker as a whole, by moving each at some poses."""
+    n = len(engine.order)
+    contacts = _contacts(engine, footing)
+    rng = np.random.default_rng(0)
+    poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
+    here, depths = _centres(engine, poses)[:, contacts], along_slope(engine, poses)[1][:, contacts]
+    places, ways, lift = [], [], None
+    for place in range(n):
+        moved = poses.copy()
+        moved[:, place] += APART
+        way = ((_centres(engine, moved)[:, contacts] - here) / APART).reshape(-1, 3)
+        if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
+            continue
+        places.append(place)
+        ways.append(way[0])
+        if lift is None and (along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all():
+            lift = place
+    return Carriers(tuple(places), np.array(ways).reshape(-1, 3), lift)
+
+
+def stood(
+    engine: CompiledEngine,
+    footing: Footing,
+    states: Floats,
+    depth: float = 0.0,
+    foot: int = 0,
+    *,
+    numbers: Floats | None = None,
+) -> Floats:
+    """States (W, 2n) lifted or lowered until one foot is so deep (m) in the ground.
+
+    Args:
+        engine: of the model.
+        footing: its feet.
+        states: what to lift; as they are if no coordinate lifts the walker.
+        depth: of the deepest contact of the foot.
+        foot: which one; -1 for the deeper.
+        numbers: of models of the same structure, one row for each state; by default the engine's own.
+    """
+    lift = carriers(engine, footing).lift
+    if lift is None:
+        return states
+    rows = np.arange(len(states)) if numbers is not None else None
+    feet = footing.feet if foot < 0 else footing.feet[foot : foot + 1]
+    contacts = [engine.contacts.index(name) for names in feet for name in names]
+    one = states.copy()
+    one[:, lift] += APART
+    now, then = (along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one))
+    chosen = np.arange(len(states)), now.argmax(axis=1)
+    placed = states.copy()
+    placed[:, lift] += (depth - now[chosen]) * APART / (then[chosen] - now[chosen])
+    return placed
+
+
+def planted(engine: CompiledEngine, footing: Footing, states: Floats, *, numbers: Floats | None = None) -> Floats:
+    """States (W, 2n) put on the ground with the deeper foot, which is at rest there.
+
+    The walker is lifted or lowered until that foot only just touches; then the speeds of the coordinates that carry it
+    as a whole are those with which the centre of this foot's deepest contact does not move.
+
+    Args:
+        engine: of the model.
+        footing: its feet.
+        states: values and speeds of all other coordinates.
+        numbers: as in `stood`.
+    """
+    placed = stood(engine, footing, states, foot=-1, numbers=numbers)
+    found = carriers(engine, footing)
+    if not found.places:
+        return placed
+    n, count = len(engine.order), np.arange(len(states))
+    rows = None if numbers is None else count
+    feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
+    deepest = feet[along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
+    ahead, back = placed.copy(), placed.copy()
+    ahead[:, :n] += NUDGE * placed[:, n:]
+    back[:, :n] -= NUDGE * placed[:, n:]
+    ways = _centres(engine, ahead, numbers, rows) - _centres(engine, back, numbers, rows)
+    speeds = ways[count, deepest] / (2.0 * NUDGE)
+    placed[:, [n + place for place in found.places]] -= speeds @ np.linalg.pinv(found.ways)
+    return placed
+
+
+def upright(states: Floats, neutral: Floats) -> Floats:
+    """States (..., 2n) moved along the neutral directions (2n, m) until the first entries that can be are zero.
+
+    A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin and not turned.
+    """
+    chosen: list[int] = []
+    for place in range(len(neutral)):
+        if np.linalg.matrix_rank(neutral[[*chosen, place]], tol=1e-6) > len(chosen):
+            chosen.append(place)
+    moved: Floats = states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
+    return moved
+
+
+def _centres(engine: CompiledEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None) -> Floats:
+    """Centres of the contacts' second surfaces (k, P, 3), in ground."""
+    places: Floats = contact_places(engine, states, numbers, rows)[..., 6:]
+    return places
+
+
+def _contacts(engine: CompiledEngine, footing: Footing) -> Ints:
+    names = [name for foot in footing.feet for name in foot] + list(footing.falls)
+    return np.array([engine.contacts.index(name) for name in names])

@@ -1,0 +1,202 @@
+"""A walker that keeps on walking: found, rounded, put on its way, written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.document.printer import write
+from osimlite.errors import OsimliteError, SimulationError
+from osimlite.files import make_folder, write_atomically
+from osimlite.gait.stepmap import TIGHT
+from osimlite.gait.steps import Walk, walk_many
+from osimlite.sweep.cycles import CycleSearch, Found, along
+from osimlite.sweep.plan import Plan
+from osimlite.sweep.variables import Floats
+
+BEST, CYCLES, SUMMARY = "best.osim", "cycles.csv", "summary.json"
+"""What a search writes into its folder."""
+
+PHASES = (0.4, 0.5, 0.3, 0.6, 0.2, 0.7, 0.1, 0.8, 0.9)
+"""Parts of a step after the heel strike at which a walk may begin, the most wanted first."""
+
+WALK_SECONDS, WALK_ACCURACY = 60.0, 1e-6
+"""How long the walker that is written walks before it is believed."""
+
+cost = attrgetter("cost")
+
+Stage = Callable[[str, float, float], object]
+"""Called with what is being done, how much of it, and of how much."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gait:
+    """A walker that was found.
+
+    Attributes:
+        found: its numbers and its cycle.
+        start: value and speed of each coordinate at the start, by name.
+        walk: from there.
+        candidates: how many of the random walkers made two steps.
+        cycles: how many cycles were found among them, and on the way to the most stable.
+        files: that were written.
+    """
+
+    found: Found
+    start: dict[str, tuple[float, float]]
+    walk: Walk
+    candidates: int
+    cycles: int
+    files: tuple[Path, ...]
+
+
+def find_gait(
+    plan: Plan,
+    folder: str | Path,
+    *,
+    feet: Sequence[str] | None = None,
+    samples: int = 65536,
+    tries: int = 40,
+    enough: int = 5,
+    budget: int = 300,
+    stable: float = 0.6,
+    perturb: float = 0.1,
+    digits: int = 3,
+    start_digits: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    stage: Stage | None = None,
+) -> Gait:
+    """Look for numbers of a model, and a start, with which it walks in the most stable cycle that is found.
+
+    Args:
+        plan: what is varied: values and speeds of coordinates, from which random starts are drawn, and numbers of the
+            model.
+        folder: where `best.osim`, `cycles.csv` and `summary.json` are written.
+        feet: contacts of each foot; found by the structure of the model if left out.
+        samples: random walkers.
+        tries: how many of the best are led to a cycle.
+        enough: cycles after which no more of them are.
+        budget: sets of numbers that are tried on the way to the most stable cycle.
+        stable: largest multiplier that is small enough; below it, what counts is how many walk from near the cycle.
+        perturb: how near: every value and speed is changed by this part at most.
+        digits: that the numbers of the model are rounded to.
+        start_digits: that the start is rounded to; None for all of them.
+        seed: what makes the search the same again.
+        threads: how many work.
+        stage: called as work is done.
+
+    Raises:
+        SimulationError: no cycle was found, or the best is lost when the numbers are rounded.
+        OsimliteError: the plan cannot be run, or the model has no two feet.
+    """
+    search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
+    tell = stage or (lambda *_: None)
+    candidates = search.candidates(samples, seed, lambda done, of: tell("random walkers", done, of))
+    if not candidates:
+        raise SimulationError(f"none of {samples} random walkers made two steps; widen the ranges or draw more")
+    cycles: list[Found] = []
+    for number, candidate in enumerate(candidates[:tries]):
+        tell("closing cycles", number, min(tries, len(candidates)))
+        found = search.close(candidate)
+        if found is not None:
+            cycles.append(found)
+        if len(cycles) == enough:
+            break
+    if not cycles:
+        raise SimulationError(
+            f"none of the {min(tries, len(candidates))} best of {samples} random walkers comes to a cycle; draw more, "
+            "try more, or vary other numbers"
+        )
+    if search.names:
+        cycles += search.improve(
+            min(cycles, key=cost), budget, seed, lambda done, of: tell("making it stable", done, of)
+        )
+    best = rounded(search, min(cycles, key=cost), digits)
+    start, walk = started(search, best, start_digits)
+    gait = Gait(
+        best, start, walk, len(candidates), len(cycles), tuple(Path(folder) / name for name in (BEST, CYCLES, SUMMARY))
+    )
+    settings = {
+        **plan.settings(), "samples": samples, "tries": tries, "enough": enough, "budget": budget, "stable": stable,
+        "perturb": perturb, "digits": digits, "start_digits": start_digits, "seed": seed,
+    }  # fmt: skip
+    _write(Path(folder), search, gait, cycles, settings)
+    return gait
+
+
+def rounded(search: CycleSearch, found: Found, digits: int) -> Found:
+    """The cycle, to its last digits, of the model whose numbers are rounded.
+
+    Raises:
+        SimulationError: there is none.
+    """
+    numbers = {name: float(f"{value:.{digits}g}") for name, value in found.numbers.items()}
+    try:
+        return search.cycle(search.fractions(numbers), found.cycle.state, fine=True)
+    except OsimliteError as error:
+        raise SimulationError(
+            f"with numbers of {digits} digits the cycle is lost; keep more. {error.message}"
+        ) from None
+
+
+def started(search: CycleSearch, found: Found, digits: int | None) -> tuple[dict[str, tuple[float, float]], Walk]:
+    """A start between two steps of a cycle, by the names of the coordinates, and the walk from there.
+
+    Of some moments of the step, the first is taken from which, after rounding, it walks on without a scuff.
+
+    Args:
+        search: that found it.
+        found: a model with its cycle.
+        digits: that values and speeds are rounded to; None for all of them.
+    """
+    step_map = search.step_map(found.fractions, found.cycle.state, TIGHT)
+    engine, ordered = step_map.engine, sorted(PHASES)
+    states = along(step_map, found.cycle, ordered)[[ordered.index(part) for part in PHASES]]
+    states[np.abs(states) < 1e-12] = 0.0
+    if digits is not None:
+        states = np.array([[float(f"{number:.{digits}g}") for number in row] for row in states.tolist()])
+    walks = walk_many(
+        engine, states, WALK_SECONDS, footing=search.footing, accuracy=WALK_ACCURACY, threads=search.threads
+    )
+    best = max(range(len(walks)), key=lambda k: (walks[k].walks and not walks[k].scuffs, -k))
+    return _named(engine, states[best]), walks[best]
+
+
+def _named(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
+    names = [engine.mechanism.coordinates[place].name for place in engine.order]
+    values, speeds = np.split(state, 2)
+    return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
+
+
+def _write(folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found], settings: dict[str, Any]) -> None:
+    make_folder(folder)
+    model = search.model(gait.found.fractions, gait.start)
+    write(model, folder / BEST)
+    heads = [*search.names, "largest_multiplier", "walking", "step_length_m", "period_s", "scuffs"]
+    rows = [",".join(heads)]
+    for each in sorted(cycles, key=cost):
+        cycle = each.cycle
+        numbers = [*each.numbers.values(), cycle.largest, each.walking, cycle.length, cycle.period, cycle.scuffs]
+        rows.append(",".join(repr(number) for number in numbers))
+    write_atomically(folder / CYCLES, "\n".join(rows) + "\n")
+    found, walk = gait.found, gait.walk
+    summary = {
+        "numbers": found.numbers,
+        "start": {name: {"value": value, "speed": speed} for name, (value, speed) in gait.start.items()},
+        "largest_multiplier": found.cycle.largest,
+        "walking": found.walking,
+        "step_length_m": found.cycle.length,
+        "period_s": found.cycle.period,
+        "residual": found.cycle.residual,
+        "walk": {"steps": len(walk.steps), "scuffs": len(walk.scuffs), "end_s": walk.end, "ending": walk.ending},
+        "candidates": gait.candidates,
+        "settings": settings,
+    }
+    write_atomically(folder / SUMMARY, json.dumps(summary, indent=2) + "\n")

@@ -1,0 +1,74 @@
+"""Putting walkers on their feet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.simulation import Simulation
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.gait.footing import find_footing
+from osimlite.gait.starts import carriers, planted, stood, upright
+from osimlite.gait.steps import along_slope
+from osimlite.simulation.many import contact_places
+
+
+@pytest.fixture(scope="module")
+def walker():
+    with Simulation(dynamic_walker(), "compiled") as simulation:
+        yield simulation.engine
+
+
+@pytest.fixture
+def states(walker):
+    rng = np.random.default_rng(3)
+    n = len(walker.order)
+    return np.hstack((rng.uniform(-0.5, 0.5, (20, n)), rng.uniform(-3.0, 3.0, (20, n))))
+
+
+def places_of(walker, *names: str) -> list[int]:
+    infos = walker.mechanism.coordinates
+    return [[infos[place].name for place in walker.order].index(name) for name in names]
+
+
+def test_the_pelvis_carries_the_walker(walker):
+    found = carriers(walker, find_footing(walker))
+    forward, up = places_of(walker, "Pelvis_tx", "Pelvis_ty")
+    assert found.places == (forward, up) and found.lift == up
+    # Its joint is turned with the slope of 10 degrees.
+    c, s = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
+    assert found.ways == pytest.approx(np.array([(c, -s, 0.0), (s, c, 0.0)]), abs=1e-9)
+
+
+def test_a_planted_foot_touches_and_rests(walker, states):
+    footing = find_footing(walker)
+    placed = planted(walker, footing, states)
+    feet = [walker.contacts.index(foot[0]) for foot in footing.feet]
+    depths = along_slope(walker, placed)[1][:, feet]
+    assert np.abs(depths.max(axis=1)).max() < 1e-12
+    n, dt = len(walker.order), 1e-6
+    later = placed.copy()
+    later[:, :n] += dt * placed[:, n:]
+    moved = (contact_places(walker, later) - contact_places(walker, placed))[:, feet, 6:]
+    rows = np.arange(len(placed))
+    assert np.linalg.norm(moved[rows, depths.argmax(axis=1)], axis=1).max() < 20 * dt**2
+    others = [k for k in range(2 * n) if k not in places_of(walker, "Pelvis_ty") and k - n not in range(1, 3)]
+    assert (placed[:, others] == states[:, others]).all()
+
+
+def test_one_foot_is_put_as_deep_as_it_is_wanted(walker, states):
+    footing = find_footing(walker)
+    for foot in (0, 1):
+        placed = stood(walker, footing, states, 0.002, foot)
+        depths = along_slope(walker, placed)[1][:, walker.contacts.index(footing.feet[foot][0])]
+        assert depths == pytest.approx(0.002, abs=1e-12)
+
+
+def test_upright_takes_away_what_does_not_matter():
+    """The first entry that a direction changes becomes zero; what it does not change stays."""
+    neutral = np.array([[0.0, 1.0, 0.0, 2.0], [0.0, 0.0, 3.0, -3.0]]).T
+    moved = upright(np.array([[5.0, 1.0, 2.0, 3.0]]), neutral)
+    assert moved == pytest.approx(np.array([[5.0, 0.0, 0.0, 3.0 - 2.0 + 2.0]]))

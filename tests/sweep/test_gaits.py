@@ -1,0 +1,123 @@
+"""The search for walkers that never stop, in narrow ranges around one that is known."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from osimlite.cli import app
+from osimlite.document.printer import to_text
+from osimlite.document.reader import read
+from osimlite.errors import SettingError, SimulationError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.models.walkers import STEADY_START, steady_walker
+from osimlite.schema.coordinates import Coordinate
+from osimlite.simulation import Simulation
+from osimlite.sweep.plan import plan
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+from osimlite.gait.cycle import find_cycle
+from osimlite.gait.stepmap import StepMap
+from osimlite.sweep.cycles import CycleSearch
+from osimlite.sweep.gaits import find_gait
+
+INERTIA, AHEAD = "/bodyset/*Shank/inertia/2", "/contactgeometryset/*FootContact/location/0"
+JOINTS = [name for name in STEADY_START if not name.startswith("Pelvis")]
+NEAR = {
+    INERTIA: (0.085, 0.1),
+    AHEAD: (0.065, 0.085),
+    **{name: (STEADY_START[name][0] - 0.1, STEADY_START[name][0] + 0.1) for name in JOINTS},
+    **{f"{name}/speed": (STEADY_START[name][1] - 0.4, STEADY_START[name][1] + 0.4) for name in JOINTS},
+}
+FEW = {"samples": 512, "tries": 3, "enough": 1, "budget": 6}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("found")
+    stages = []
+    gait = find_gait(plan(dynamic_walker(), NEAR), folder, **FEW, stage=lambda *words: stages.append(words))
+    return gait, folder, stages
+
+
+def test_a_walker_is_found_that_never_stops(found):
+    gait, folder, stages = found
+    assert gait.found.cycle.residual < 1e-9 and gait.found.cycle.largest < 1.0
+    assert gait.walk.walks and len(gait.walk.steps) > 50 and not gait.walk.scuffs
+    assert sorted({title for title, _, _ in stages}) == ["closing cycles", "making it stable", "random walkers"]
+    with Simulation(read(folder / "best.osim"), "compiled") as simulation:
+        cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
+    assert cycle.largest == pytest.approx(gait.found.cycle.largest, abs=1e-3)
+    assert (cycle.length, cycle.period) == pytest.approx((gait.found.cycle.length, gait.found.cycle.period), rel=1e-9)
+
+
+def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
+    gait, folder, _ = found
+    before, after = dynamic_walker(), read(folder / "best.osim")
+    assert {name: float(f"{number:.3g}") for name, number in gait.found.numbers.items()} == gait.found.numbers
+    for body in ("LeftShank", "RightShank"):
+        assert after[f"/bodyset/{body}"].inertia == (1.0, 1.0, gait.found.numbers[INERTIA], 0.0, 0.0, 0.0)
+        before[f"/bodyset/{body}"].inertia = after[f"/bodyset/{body}"].inertia
+    for side in "LR":
+        sphere = f"/contactgeometryset/{side}FootContact"
+        assert after[sphere].location[0] == gait.found.numbers[AHEAD]
+        before[sphere].location = after[sphere].location
+    for coordinate in after.components(Coordinate):
+        if coordinate.name in gait.start:
+            mine = before[coordinate.path]
+            mine.default_value, mine.default_speed_value = gait.start[coordinate.name]
+    assert to_text(before) == to_text(after)
+
+
+def test_the_files_tell_what_was_found_and_how(found):
+    gait, folder, _ = found
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["numbers"] == gait.found.numbers and summary["settings"]["seed"] == 0
+    assert summary["largest_multiplier"] == gait.found.cycle.largest
+    heads, *rows = (folder / "cycles.csv").read_text().splitlines()
+    assert heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and len(rows) == gait.cycles
+
+
+def test_the_same_seed_finds_the_same(found, tmp_path):
+    again = find_gait(plan(dynamic_walker(), NEAR), tmp_path, **FEW, threads=1)
+    assert (tmp_path / "best.osim").read_bytes() == (found[1] / "best.osim").read_bytes()
+    assert again.found.cycle.state.tolist() == found[0].found.cycle.state.tolist()
+
+
+def test_more_of_them_walk_where_a_cycle_costs_less():
+    """Below what is stable enough, the cost is less by the part that walks."""
+    search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
+    with Simulation(steady_walker(), "compiled") as simulation:
+        cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
+    known = search.cycle(search.fractions({INERTIA: 0.091, AHEAD: 0.072}), cycle.state)
+    assert known.cycle.state == pytest.approx(cycle.state, abs=1e-4)
+    assert known.walking > 0.5 and known.cost == 1.0 - known.walking
+    search.stable = 0.1
+    strict = search.cycle(known.fractions, cycle.state)
+    assert strict.cost == strict.cycle.largest and strict.walking == 0.0
+
+
+def test_a_search_needs_random_starts():
+    with pytest.raises(SettingError, match="vary some values and speeds"):
+        CycleSearch(plan(dynamic_walker(), {INERTIA: (0.05, 0.1)}))
+
+
+def test_walkers_that_only_fall_are_told_of(tmp_path):
+    falling = {name: (-1.4, -1.3) for name in ("RKnee_rz", "LKnee_rz")}
+    with pytest.raises(SimulationError, match="none of 64 random walkers made two steps"):
+        find_gait(plan(dynamic_walker(), falling), tmp_path / "none", samples=64)
+    assert not (tmp_path / "none").exists()
+
+
+def test_the_command_writes_a_walker(tmp_path):
+    words = [f"--vary={name}={low!r}:{high!r}" for name, (low, high) in NEAR.items()]
+    options = ["--samples=512", "--tries=3", "--enough=1", "--budget=0", "--start-digits=4", "-o", str(tmp_path)]
+    done = CliRunner().invoke(app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options])
+    assert "largest multiplier" in done.output and done.exit_code in (0, 1)
+    start = json.loads((tmp_path / "summary.json").read_text())["start"]
+    numbers = np.array([number for each in start.values() for number in each.values()])
+    assert (numbers == [float(f"{number:.4g}") for number in numbers]).all()
