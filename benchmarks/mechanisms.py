@@ -30,10 +30,9 @@ import osimlite
 from osimlite import Body, Coordinate, Model, PinJoint
 from osimlite.errors import OsimliteError
 from osimlite.multibody import Mechanism, build_mechanism
-from osimlite.multibody.constraints import Lock
 from osimlite.schema.forces import Force
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.engines import KEEP_CONSTRAINTS, engine_factory
+from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Settings
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
@@ -120,8 +119,6 @@ def timed(model: Model, mechanism: Mechanism) -> dict[str, float | None]:
         calls: dict[str, Call | None] = {}
         for way, (engine, route) in WAYS.items():
             calls[way] = None
-            if engine not in KEEP_CONSTRAINTS and not all(isinstance(item, Lock) for item in mechanism.constraints):
-                continue
             try:
                 made: Any = engine_factory(engine)(mechanism, Forces(()), Settings(route=route))
             except OsimliteError:

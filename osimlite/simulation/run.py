@@ -118,6 +118,9 @@ class Simulation:
     """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
 
     Args and errors: as those of :func:`simulate`.
+
+    Attributes:
+        constraints: names of what the coordinates of the state must fulfil.
     """
 
     def __init__(
@@ -151,7 +154,7 @@ class Simulation:
             visuals = collect_visuals(model, self.mechanism)
         self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
         self.state = FreeState(self.mechanism, self.engine.order)
-        self._constraints = Constrained(self.mechanism, self.engine.order).names
+        self.constraints = Constrained(self.mechanism, self.engine.order).names
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._settings = {
             "skip_unsupported": skip_unsupported,
@@ -245,7 +248,7 @@ class Simulation:
                     raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
                 row[place] = float(value)
                 places[-1].append(place)
-        if self._constraints:
+        if self.constraints:
             # To find the nearest pose can take as long as the motion: the same start is not looked for again.
             start = (q, u, places)
             if self._start is None or self._start[0] != start:
@@ -273,7 +276,7 @@ class Simulation:
                 **course(stepper, settings, wall),
                 **outcome(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
                 "skipped_forces": list(self.forces.skipped),
-                "constraints": self._constraints,
+                "constraints": self.constraints,
                 "versions": versions(engine),
             }
 

@@ -236,15 +236,16 @@ class Runner:
         for number, variant in enumerate(variants):
             simulation = variant.simulation
             assert simulation is not None
-            paths = [simulation.mechanism.coordinates[place].path for place in order]
+            infos = [simulation.mechanism.coordinates[place] for place in order]
+            may = [k for k, info in enumerate(infos) if info.prescribed is None and not info.locked]
             row = starts[number].tolist()
             try:
                 trajectory = simulation.run(
                     plan.to,
                     accuracy=plan.accuracy,
                     report_interval=plan.report_interval or plan.to,
-                    initial=dict(zip(paths, row[:count], strict=True)),
-                    initial_speeds=dict(zip(paths, row[count:], strict=True)),
+                    initial={infos[k].path: row[k] for k in may},
+                    initial_speeds={infos[k].path: row[count + k] for k in may},
                 )
             except OsimliteError as error:
                 why.append((FAILED, str(error)))

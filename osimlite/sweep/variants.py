@@ -93,6 +93,13 @@ class Variants:
             variant.start.copy(),
             (self.given if variant.structure == self.given.structure else variant).engine,
         )
+        simulation = variant.simulation or self.given.simulation
+        if simulation is not None and simulation.constraints:
+            # The rest follows from what is set.
+            chosen: tuple[dict[str, float], dict[str, float]] = {}, {}
+            for place, target in self._starts:
+                chosen[target.is_speed][target.coordinate] = float(values[place])
+            return np.array(simulation.initial_state(*chosen))
         for place, target in self._starts:
             coordinate = engine.mechanism.coordinate_index(target.coordinate)
             if coordinate not in engine.order:

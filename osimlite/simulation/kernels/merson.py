@@ -28,6 +28,7 @@ from osimlite.simulation.kernels.layout import (
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import station
+from osimlite.simulation.kernels.states import copy, cubic, is_finite
 
 DONE, FAILED, FULL, STOPPED, TOO_MANY = 0, 1, 2, 3, 4
 """How a run ends: at its limit, at a state beyond which there is no step, with a full log, at an event that stops it,
@@ -317,33 +318,6 @@ def norm(n: int, y0: Floats, errors: Floats, count_q: int, count_u: int) -> floa
     of_q /= max(count_q, 1)
     of_u /= max(count_u, 1)
     return sqrt(max(of_q, of_u)) if isfinite(of_q + of_u) else inf
-
-
-def copy(count: int, values: Floats, to: Floats) -> None:
-    """Copy numbers."""
-    for k in range(count):
-        to[k] = values[k]
-
-
-def is_finite(count: int, values: Floats) -> bool:
-    """Whether all are."""
-    total = 0.0
-    for k in range(count):
-        total += values[k]
-    return total - total == 0.0
-
-
-def cubic(size: int, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats) -> None:
-    """State y at a time within a step, on the cubic Hermite polynomial through its ends."""
-    h = t1 - t0
-    z = (t - t0) / h
-    b1 = z * z * (3.0 - 2.0 * z)
-    b0 = 1.0 - b1
-    c = h * z * (z - 1.0)
-    c1 = c * z
-    c0 = c1 - c
-    for k in range(size):
-        y[k] = b0 * y0[k] + b1 * y1[k] + c0 * f0[k] + c1 * f1[k]
 
 
 def inside(
