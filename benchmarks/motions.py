@@ -48,7 +48,7 @@ def main() -> None:
             cells = {}
             for title, engine in (("PyBullet", "bullet"), ("compiled", "compiled")):
                 try:
-                    simulation = Simulation(osimlite.read(file), engine, opensim_derivatives=engine == "bullet")
+                    simulation = Simulation(osimlite.read(file), engine, opensim_derivatives=True)
                 except OsimliteError as error:
                     console.print(f"{name}: {error}", highlight=False)
                     continue

@@ -39,7 +39,7 @@ def test_same_accelerations(corpus_model):
         pytest.skip("OpenSim cannot load this file")
     model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
     mechanism = build_mechanism(model)
-    # Constraints are kept up outside of the engines.
+    # Those with constraints have a test of their own.
     locks = tuple(item for item in mechanism.constraints if isinstance(item, Lock))
     mechanism = replace(mechanism, constraints=locks)
     try:
@@ -69,6 +69,33 @@ def test_same_accelerations(corpus_model):
             assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
                 theirs.force_records(0.1, theirs.state.pack(q, u)), rel=1e-7, abs=1e-7
             )
+
+
+def test_same_accelerations_under_constraints(corpus_model):
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
+    mechanism = build_mechanism(model)
+    if all(isinstance(item, Lock) for item in mechanism.constraints):
+        pytest.skip("the model has no constraints")
+    forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
+    ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
+    y = ours.state.pack(*state_near(mechanism, 3))
+    found = ours.constrained.project(0.1, y, None, 1e-10)
+    assert found is not None
+    q, u = ours.state.values(found[0]), ours.state.speeds(found[0])
+    with theirs:
+        try:
+            expected = theirs.acceleration(0.1, q, u)
+        except SimulationError as error:
+            with pytest.raises(SimulationError, match="no mass"):
+                ours.acceleration(0.1, q, u)
+            assert "no mass" in str(error)
+            return
+        assert largest_difference(ours.acceleration(0.1, q, u), expected) < 1e-9 * conditioning(mechanism)
+        assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
+            theirs.force_records(0.1, theirs.state.pack(q, u)), rel=1e-7, abs=1e-7
+        )
 
 
 def conditioning(mechanism):
