@@ -106,7 +106,7 @@ class Found:
         fractions: where its numbers lie in their ranges (k,).
         numbers: by the names of the variables.
         cycle: that it walks in.
-        walking: which part of the walkers that start near it walk; 0 where the cycle is not stable enough to ask.
+        walking: which part of the walkers that start near it walk; 0 where nobody asked.
         cost: the less, the better: the largest multiplier, and below what is stable enough, less by `walking`.
     """
 
@@ -309,8 +309,9 @@ class CycleSearch:
         step_map = self.step_map(fractions, state, TIGHT if fine else FINE)
         found = find_cycle(step_map, state, converged=CONVERGED if fine else NEAR, most_steps=MOST_STEPS if fine else 8)
         cost, walking = found.largest + SCUFFED * found.scuffs, 0.0
-        if cost < self.stable:
+        if cost < self.stable or fine:
             walking = self._walking(step_map, found)
+        if cost < self.stable:
             cost = self.stable - walking
         return Found(np.array(fractions), self.numbers(fractions), found, walking, cost)
 

@@ -20,6 +20,10 @@ MEANINGS = {
     "--measure": "to keep of a run, or in the history of a search",
     "--resume": "a sweep, or a search",
     "--pictures": "of a basin, or of a walk",
+    "--force": "over results of a sweep, or of a search",
+    "--budget": "runs, or models",
+    "--perturb": "once or often",
+    "--samples": "of a sweep, or walkers",
     "--report-interval": "of the result files, or of what a measure looks at",
 }
 """Options whose help differs between commands, and why."""
