@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 
+from osimlite.document.source import Source
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -66,11 +67,12 @@ def included_file(subject: Subject, found: Found) -> None:
     """An object is kept in another file.
 
     ## What it does
-    Reports `file=` on an object: for information, or as a warning if that file is not there.
+    Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, and as an
+    error if the element itself holds something.
 
     ## Why is this bad
     OpenSim reads the object from the other file, and writes that file anew when it saves the model; if it is missing,
-    it goes on with an empty object. What is in it is not checked here.
+    it goes on with an empty object. Of what stands inside an element with `file=` it reads nothing.
 
     ## Example
     ```xml
@@ -87,17 +89,30 @@ def included_file(subject: Subject, found: Found) -> None:
     ```
     """
     for note in subject.notes:
-        if note.kind != "include" or note.owner is None:
+        if note.kind != "include" or note.owner is None or not note.value:
             continue
         there = subject.folder is None or (subject.folder / str(note.value)).is_file()
-        state = "is read from" if there else "should be read from"
+        read = there and (subject.folder is None or (note.owner.layout is not None and note.owner.layout.include))
+        ignored = _has_content(subject.source, note.number)
+        state = "is read from" if read else "should be read from"
+        why = "" if read else f", which {'holds none' if there else 'is not there'}"
+        fate = ": OpenSim ignores what stands here" if ignored else "" if read else ": it stays empty"
         found(
-            f"{called(note.owner)} {state} '{note.value}'" + ("" if there else ", which is not there: it stays empty"),
+            f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,
             number=note.number,
             attribute="file",
-            severity=None if there else WARNING,
+            severity=ERROR if ignored else None if read else WARNING,
         )
+
+
+def _has_content(source: Source | None, number: int) -> bool:
+    """Whether an element with a ``file`` holds something; of members of a set OpenSim does not look at the file."""
+    if source is None or not source.children(number):
+        return False
+    end = source.spans[number].end
+    around = next((i for i in range(number - 1, -1, -1) if source.spans[i].end >= end), 0)
+    return source.spans[around].tag != "objects"
 
 
 @rule("OSIM703", "missing-data-file", severity=ERROR)
