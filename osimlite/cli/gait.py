@@ -129,8 +129,8 @@ def _refuse_constraints(model: Model) -> None:
 
     if kept := kept_constraints(build_mechanism(model)):
         raise UnsupportedError(
-            f"gaits are computed by the compiled engine, which cannot keep up {listed(kept)}; set isEnforced of a "
-            "constraint and prescribed of a coordinate to false"
+            f"gaits are looked for in all directions of the state, some of which {listed(kept)} takes away; set "
+            "isEnforced of a constraint and prescribed of a coordinate to false"
         )
 
 
