@@ -24,17 +24,13 @@ from osimlite.gait.basin import perturbed, walks_from
 from osimlite.gait.cycle import find_cycle
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.steps import Walk, walk_many
-from osimlite.models.source import make_model
+from osimlite.models.source import make_model, parameters_of
 from osimlite.simulation import Simulation
 
 TO = 60.0
 CONFIRMED = {"steady-walker": 1e-8, "human-walker": 1e-6}
 """Accuracy at which OpenSim walks."""
 
-CHANGED: dict[str, dict[str, float]] = {
-    "steady-walker": {"shank_inertia": 0.091, "foot_ahead": 0.072},
-    "human-walker": {"slope": 2.5, "foot_radius": 0.17, "foot_ahead": 0.044, "knee_stiffness": 15.8},
-}
 MANY = 50
 """So many steps in that time are a walk."""
 
@@ -46,7 +42,7 @@ def main() -> None:
     console = Console()
     names = sys.argv[1:] or list(CONFIRMED)
     for part in (near, margins):
-        console.print(part([name for name in names if name in CHANGED]))
+        console.print(part([name for name in names if parameters_of(name)]))
     console.print(confirmation(names))
 
 
@@ -105,7 +101,7 @@ def margins(names: list[str]) -> Table:
     for heading in ("model", "property", "least", "value", "most"):
         table.add_column(heading, justify="left" if heading in ("model", "property") else "right")
     for name in names:
-        for parameter, value in CHANGED[name].items():
+        for parameter, value in parameters_of(name).items():
 
             def walks(number: float, name: str = name, parameter: str = parameter) -> bool:
                 return len(our_walk(make_model(name, {parameter: repr(number)}), TO, 1e-6).steps) >= MANY

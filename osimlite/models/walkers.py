@@ -17,12 +17,12 @@ from osimlite.schema.geometry import Brick
 from osimlite.schema.model import Model
 
 STEADY_START = {
-    "Pelvis_ty": (0.8870024144342886, 0.06277540570143135),
-    "Pelvis_tx": (0.0, 0.3280729681277193),
-    "RHip_rz": (0.07395818266607702, -0.37911635605573263),
-    "LHip_rz": (0.5735902364983329, 3.2771753211504695),
-    "RKnee_rz": (0.08031330630713877, 0.06578201741772846),
-    "LKnee_rz": (-1.3764721715934252, -1.229888719685166),
+    "Pelvis_ty": (0.8870825818903174, 0.06204849473790841),
+    "Pelvis_tx": (0.0, 0.32978662763705174),
+    "RHip_rz": (0.06553174347786672, -0.3884813145562898),
+    "LHip_rz": (0.5814903904437594, 3.259289619513205),
+    "RKnee_rz": (0.08461044751483902, 0.07925290918841822),
+    "LKnee_rz": (-1.3878847584730702, -1.209184775969098),
 }
 """Value and speed of each coordinate on the cycle of the steady walker, 0.4 of a step after a heel strike."""
 
@@ -59,7 +59,7 @@ def furthest_walker() -> Model:
     return _ready(model, FURTHEST_START, 10.0)
 
 
-def steady_walker(shank_inertia: float = 0.091, foot_ahead: float = 0.072) -> Model:
+def steady_walker(shank_inertia: float = 0.0929, foot_ahead: float = 0.0758) -> Model:
     """Build the walker that differs from the exercise in two properties and never stops.
 
     Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and its feet stand out

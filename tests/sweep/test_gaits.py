@@ -52,7 +52,7 @@ def test_a_walker_is_found_that_never_stops(found):
     with Simulation(read(folder / "best.osim"), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
     assert cycle.largest == pytest.approx(gait.found.cycle.largest, abs=1e-3)
-    assert (cycle.length, cycle.period) == pytest.approx((gait.found.cycle.length, gait.found.cycle.period), rel=1e-9)
+    assert (cycle.length, cycle.period) == pytest.approx((gait.found.cycle.length, gait.found.cycle.period), rel=1e-7)
 
 
 def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
@@ -93,7 +93,7 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
     with Simulation(steady_walker(), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    known = search.cycle(search.fractions({INERTIA: 0.091, AHEAD: 0.072}), cycle.state)
+    known = search.cycle(search.fractions({INERTIA: 0.0929, AHEAD: 0.0758}), cycle.state)
     assert known.cycle.state == pytest.approx(cycle.state, abs=1e-4)
     assert known.walking > 0.5 and known.cost == 1.0 - known.walking
     search.stable = 0.1
