@@ -13,6 +13,7 @@ from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, Sine
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements import force_elements
+from tests.oracle.opensim_runs import put
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
@@ -77,11 +78,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
             for place, info in enumerate(mechanism.coordinates):
                 if info.locked:
                     q[place], u[place] = info.default_value, 0.0
-            for name, value, speed in zip(names, q, u, strict=True):
-                coordinate = theirs.updCoordinateSet().get(name)
-                if not coordinate.getLocked(state):
-                    coordinate.setValue(state, value, False)
-                    coordinate.setSpeedValue(state, speed)
+            put(map(theirs.getCoordinateSet().get, names), state, q, u)
             state.setTime(TIME)
             theirs.realizeAcceleration(state)
             expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]

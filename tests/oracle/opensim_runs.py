@@ -1,11 +1,20 @@
-"""What OpenSim's own programs make of a file."""
+"""What OpenSim's own programs make of a file, or of a state."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from osimlite.simulation.storage import StoTable, read_sto
+
+
+def put(coordinates: Iterable[Any], state: Any, q: Iterable[float], u: Iterable[float]) -> None:
+    """Values and speeds of OpenSim's coordinates into a state; locked ones keep their values."""
+    for coordinate, value, speed in zip(coordinates, q, u, strict=True):
+        if not coordinate.getLocked(state):
+            coordinate.setValue(state, float(value), False)
+        coordinate.setSpeedValue(state, float(speed))
 
 
 def simulated(path: Path, to: float, accuracy: float) -> StoTable:

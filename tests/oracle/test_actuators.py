@@ -39,7 +39,15 @@ def test_actuators_by_torque(model, tmp_path):
     model.add(
         TorqueActuator(name="a", bodyA="b2", bodyB="b0", axis=axis, optimal_force=3.0),
         TorqueActuator(name="b", bodyA="b1", bodyB="ground", axis=axis, torque_is_global=False, optimal_force=2.0),
-        TorqueActuator(name="c", bodyA="/bodyset/b2/f2", bodyB="/bodyset/b1", axis=axis, torque_is_global=False),
+        TorqueActuator(
+            name="c",
+            bodyA="/bodyset/b2/f2",
+            bodyB="/bodyset/b1",
+            axis=axis,
+            torque_is_global=False,
+            # OpenSim takes the defaults of a document for those of all that it reads later.
+            optimal_force=1.0,
+        ),
         TorqueActuator(name="idle", bodyA="b1", bodyB="b0", axis=axis),
     )
     drive(model, "a", "b", "c")

@@ -14,6 +14,7 @@ import pytest
 import osimlite
 from osimlite.multibody import Mechanism, build_mechanism
 from osimlite.multibody.mechanism import MassProperties
+from tests.oracle.opensim_runs import put
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -237,10 +238,7 @@ def _go(rng: np.random.Generator, mechanism: Mechanism, state: Any, coordinates:
     q = mechanism.assemble(q + moved, time)
     u = mechanism.project_speeds(q, rng.uniform(-1.0, 1.0, len(q)), time)
     state.setTime(time)
-    for coordinate, value, speed in zip(coordinates, q, u, strict=True):
-        if not coordinate.getLocked(state):
-            coordinate.setValue(state, value, False)
-        coordinate.setSpeedValue(state, speed)
+    put(coordinates, state, q, u)
     return q, u, time
 
 

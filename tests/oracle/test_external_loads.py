@@ -21,7 +21,7 @@ pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402
-from tests.oracle.opensim_runs import inverse_dynamics  # noqa: E402
+from tests.oracle.opensim_runs import inverse_dynamics, put  # noqa: E402
 
 LABELS = [f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"]
 
@@ -109,10 +109,7 @@ def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
         # Within the data, and before and after it.
         for time in (0.0, 0.37, 0.93, -0.2, 1.3):
             q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
-            for name, value, speed in zip(names, q, u, strict=True):
-                coordinate = theirs.updCoordinateSet().get(name)
-                coordinate.setValue(state, value, False)
-                coordinate.setSpeedValue(state, speed)
+            put(map(theirs.getCoordinateSet().get, names), state, q, u)
             state.setTime(time)
             theirs.realizeAcceleration(state)
             expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]

@@ -13,6 +13,7 @@ from osimlite.document.reader import read_text
 from osimlite.errors import SimulationError
 from osimlite.multibody import Mechanism, build_mechanism
 from osimlite.multibody.constraints import Lock
+from tests.oracle.opensim_runs import put
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -48,10 +49,7 @@ def _random_state(mechanism: Mechanism, rng: np.random.Generator) -> tuple[Any, 
 
 def _assign(model: Any, state: Any, q: Any, u: Any) -> list[Any]:
     coordinates = [model.getCoordinateSet().get(index) for index in range(len(q))]
-    for coordinate, value, speed in zip(coordinates, q, u, strict=True):
-        if not coordinate.getLocked(state):
-            coordinate.setValue(state, value, False)
-        coordinate.setSpeedValue(state, speed)
+    put(coordinates, state, q, u)
     return coordinates
 
 

@@ -106,7 +106,8 @@ def test_forces_across_a_locked_coordinate(tmp_path):
     model.add(
         SpringGeneralizedForce(name="held", coordinate="q1_0", stiffness=3.0, viscosity=2.0),
         ExpressionBasedCoordinateForce(name="formula", coordinate="q1_0", expression="3*q + qdot/q"),
-        CoordinateActuator(name="motor", coordinate="q1_0"),
+        # OpenSim takes the defaults of a document for those of all that it reads later.
+        CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=1.0),
         PointToPointSpring(
             name="within", socket_body1="/bodyset/b0", socket_body2="/bodyset/b1", point1=(1, 0, 0), stiffness=5.0
         ),
