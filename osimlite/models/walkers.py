@@ -28,12 +28,12 @@ STEADY_START = {
 
 
 HUMAN_START = {
-    "Pelvis_tx": (0.0, 0.45),
-    "Pelvis_ty": (0.9, 0.03),
-    "RHip_rz": (0.0073, -0.52),
-    "LHip_rz": (0.22, 0.97),
-    "RKnee_rz": (0.041, 0.024),
-    "LKnee_rz": (-0.73, 2.5),
+    "Pelvis_ty": (0.9, 0.032),
+    "Pelvis_tx": (0.0, 0.44),
+    "RHip_rz": (0.016, -0.49),
+    "LHip_rz": (0.22, 1.0),
+    "RKnee_rz": (0.039, 0.011),
+    "LKnee_rz": (-0.73, 2.2),
 }
 """Value and speed of each coordinate of the human walker in the middle of a step, rounded to two digits."""
 
@@ -82,7 +82,7 @@ def steady_walker(shank_inertia: float = 0.0929, foot_ahead: float = 0.0758) -> 
 
 
 def human_walker(
-    slope: float = 2.5, foot_radius: float = 0.17, foot_ahead: float = 0.044, knee_stiffness: float = 15.8
+    slope: float = 2.74, foot_radius: float = 0.111, foot_ahead: float = 0.0396, knee_stiffness: float = 16.8
 ) -> Model:
     """Build the walker whose mass is distributed as in a human, on a gentle slope.
 
