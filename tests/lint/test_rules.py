@@ -162,3 +162,22 @@ def test_rules_can_be_selected_and_ignored():
     assert set(validate(source, select="OSIM1").codes) == {"OSIM101"}
     assert set(validate(source, select=["unknown-tag", "OSIM505"]).codes) == {"OSIM101", "OSIM505"}
     assert set(validate(source, ignore="structure,OSIM3").codes) == {"OSIM505"}
+
+
+def test_the_place_of_an_old_connector_is_the_name_in_it():
+    text = """<OpenSimDocument Version="30506"><Model name="m"><BodySet><objects>
+        <Body name="b"><mass>1</mass><attached_geometry><Brick name="g"><connectors><Connector_Frame_ name="frame">
+            <connectee_name>b</connectee_name>
+        </Connector_Frame_></connectors></Brick></attached_geometry></Body>
+    </objects></BodySet></Model></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode()), select="OSIM304").findings
+    assert (finding.line, finding.column) == (3, 29)
+    assert "names 'b'" in finding.message
+
+
+@pytest.mark.parametrize(("tag", "nearest"), [("OpenSim::Body", "Body"), ("xml:Body", "Body"), ("o:body", "Body")])
+def test_a_namespace_does_not_hide_the_right_name(tag, nearest):
+    text = f"""<OpenSimDocument Version="40600"><Model name="m"><BodySet>
+        <objects> <{tag} name="b"> <mass>1</mass> </{tag}> </objects></BodySet></Model></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode()), select="OSIM102").findings
+    assert (finding.suggestion, finding.line, finding.column) == (nearest, 2, 19)

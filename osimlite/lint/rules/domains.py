@@ -49,6 +49,8 @@ def not_finite(subject: Subject, found: Found) -> None:
         bad = [number for number in _numbers(value) if math.isnan(number) or (math.isinf(number) and not _bound(spec))]
         if bad:
             fate = "OpenSim refuses the model" if _refuses_not_finite(item, spec, bad[0]) else _NAN_FATE
+            if spec.tag in ("min_control", "max_control"):
+                fate = "what takes it as a bound fails"
             found(
                 f"{subject.titled(item, spec)} is {shown(value)}: {fate}",
                 item,

@@ -175,7 +175,9 @@ def reference_form(subject: Subject, found: Found) -> None:
         _report(subject, found, broken, message)
     for change in subject.changes:
         if change.step == "set_levels" and subject.source is not None:
-            place = subject.source.of_text(change.number)
+            # In files of the time a name stood in an element of its own inside a connector.
+            inner = next(iter(subject.source.children(change.number)), change.number)
+            place = subject.source.of_text(inner)
             start = subject.source.line_start(place.line) + place.column - 1
             text = subject.source.text[start : start + place.length]
             found(

@@ -77,9 +77,10 @@ def closed_loop(subject: Subject, found: Found) -> None:
     Reports each joint that connects bodies which earlier joints have connected already.
 
     ## Why is this bad
-    OpenSim cuts the loop: it splits a body and welds the halves with a constraint, which adds coordinates and
-    multipliers that the file does not mention. If the loop does not close in the default pose, it refuses the model.
-    Say what is meant with a constraint.
+    OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds coordinates and
+    multipliers that the file does not mention, and the halves together have another mass or inertia than the body, so
+    the model moves otherwise than it says even where the loop closes. Where it does not close in the default pose,
+    OpenSim refuses the model. Say what is meant with a constraint.
 
     ## Example
     ```xml
@@ -110,7 +111,7 @@ def closed_loop(subject: Subject, found: Found) -> None:
             other = f", which {called(before)} has placed already" if before is not None else ""
             found(
                 f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; "
-                "OpenSim splits a body and adds a constraint, or refuses the model",
+                "OpenSim splits a body, with inertias of its own, and adds a constraint, or refuses the model",
                 link.joint,
                 tag="socket_child_frame",
             )
