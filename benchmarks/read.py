@@ -9,25 +9,14 @@ FOLDER holds `.osim` or `.osim.gz` files; without one the shared corpus is used.
 from __future__ import annotations
 
 import argparse
-import gzip
 import sys
 import tempfile
 import tracemalloc
 from pathlib import Path
 from statistics import median
 
+from _corpus import CORPUS, unpacked
 from _pair import Pair, pair, pair_commands, report
-
-CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
-
-
-def unpacked(folder: Path, into: Path) -> list[Path]:
-    files = []
-    for path in sorted(folder.glob("*.osim*")):
-        target = into / path.name.removesuffix(".gz")
-        target.write_bytes(gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes())
-        files.append(target)
-    return files
 
 
 def exponent(sizes: list[int], times: list[float]) -> float:

@@ -11,7 +11,6 @@ there is without osimlite. Findings kept from earlier runs are used in the last 
 from __future__ import annotations
 
 import argparse
-import gzip
 import os
 import subprocess
 import sys
@@ -23,11 +22,11 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
+from _corpus import CORPUS, unpacked
 from _pair import Pair, pair, pair_commands, report
 
 ROOT = Path(__file__).resolve().parents[1]
 WALKER = ROOT / "fixtures" / "walker" / "DynamicWalkerModel.osim"
-CORPUS = ROOT.parent / "shared" / "corpus" / "converted"
 THEIRS = """
 import opensim
 opensim.Logger.setLevelString("off")
@@ -47,15 +46,6 @@ def whole_processes(rounds: int, models: list[Path]) -> None:
     ours = [*command, "validate", str(models[0])]
     rows.append(pair_commands(f"{models[0].stem}, unchanged", ours=ours, theirs=theirs, rounds=rounds))
     report("Whole processes: osimlite validate FILE", rows)
-
-
-def unpacked(folder: Path, into: Path) -> list[Path]:
-    files = []
-    for path in sorted(folder.glob("*.osim*")):
-        target = into / path.name.removesuffix(".gz")
-        target.write_bytes(gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes())
-        files.append(target)
-    return files
 
 
 def in_process(rounds: int, files: list[Path], each: bool) -> None:
