@@ -101,11 +101,16 @@ def planted(engine: CompiledEngine, footing: Footing, states: Floats, *, numbers
         states: values and speeds of all other coordinates.
         numbers: as in `stood`.
     """
-    placed = stood(engine, footing, states, foot=-1, numbers=numbers)
+    n, count = len(engine.order), np.arange(len(states))
     found = carriers(engine, footing)
+    free = states.copy()
+    # What comes out must not depend, by a rounding, on what was there.
+    free[:, [n + place for place in found.places]] = 0.0
+    if found.lift is not None:
+        free[:, found.lift] = 0.0
+    placed = stood(engine, footing, free, foot=-1, numbers=numbers)
     if not found.places:
         return placed
-    n, count = len(engine.order), np.arange(len(states))
     rows = None if numbers is None else count
     feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
     deepest = feet[along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
