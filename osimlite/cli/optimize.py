@@ -27,7 +27,9 @@ def optimize(
     ],
     vary: sweeping.Vary = None,
     budget: Annotated[int, typer.Option(metavar="N", help="How many runs are allowed.")] = 1000,
-    method: Annotated[str, typer.Option(help="sobol-cma, cma, differential-evolution or nelder-mead.")] = "sobol-cma",
+    method: Annotated[
+        str, typer.Option(help="cma, sobol-cma (for a few hundred runs), differential-evolution or nelder-mead.")
+    ] = "cma",
     popsize: Annotated[
         int | None, typer.Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
     ] = None,

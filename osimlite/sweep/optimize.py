@@ -79,7 +79,7 @@ def optimize(
     objective: Objective,
     folder: str | Path,
     *,
-    method: str = "sobol-cma",
+    method: str = "cma",
     budget: int = 1000,
     popsize: int | None = None,
     seed: int = 0,

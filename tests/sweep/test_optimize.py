@@ -78,7 +78,7 @@ def test_it_begins_where_the_model_is(made, tmp_path):
 
 def test_it_looks_around_from_where_the_model_is(made, tmp_path):
     """The model as it is comes first, then points all over the ranges; what follows begins at the best of them."""
-    found = optimize(made, DISTANCE, tmp_path, budget=40, popsize=8, sigma=1e-6, seed=3)
+    found = optimize(made, DISTANCE, tmp_path, method="sobol-cma", budget=40, popsize=8, sigma=1e-6, seed=3)
     table = pq.read_table(found.history).to_pydict()
     rows = np.array([table[name] for name in VARY]).T
     assert rows[0] == pytest.approx([np.radians(30.0), 0.0, 1.0])
