@@ -35,7 +35,7 @@ from osimlite.sweep.search import Enough, Search, cma, nelder_mead
 from osimlite.sweep.variables import Floats, Start
 from osimlite.sweep.variants import Variants
 
-ROUGH, FINE = 1e-7, 1e-8
+ROUGH, FINE = 1e-7, 1e-9
 """Accuracy of the integrator where a walker is far from its cycle, and where it is near."""
 
 NEAR = 1e-6
@@ -181,6 +181,11 @@ class CycleSearch:
         """Where numbers, by name, lie in their ranges (k,)."""
         items = {item.name: item for item in self.plan.variables}
         return np.array([items[name].fraction(numbers[name]) for name in self.names])
+
+    def rounded(self, fractions: Floats, digits: int) -> Floats:
+        """Where the numbers lie when they have so many digits (k,)."""
+        numbers = {name: float(f"{number:.{digits}g}") for name, number in self.numbers(fractions).items()}
+        return self.fractions(numbers)
 
     def model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
         """The model with these numbers, and with values and speeds of coordinates as their defaults."""
@@ -334,12 +339,15 @@ class CycleSearch:
         return self._first.varied(engine, state, accuracy)
 
     # ---------------------------------------------------------------------------------------- stability
-    def improve(self, found: Found, budget: int, seed: int, progress: Progress | None = None) -> list[Found]:
+    def improve(
+        self, found: Found, budget: int, digits: int, seed: int, progress: Progress | None = None
+    ) -> list[Found]:
         """Lead a cycle to the numbers at which it costs least.
 
         Args:
             found: where to begin.
             budget: how many sets of numbers may be tried.
+            digits: that the numbers have.
             seed: of the search.
             progress: called with how many have been.
 
@@ -356,7 +364,7 @@ class CycleSearch:
             tried += len(points)
             if progress is not None:
                 progress(min(tried, budget), budget)
-            return np.array([self._cost(point, known) for point in points])
+            return np.array([self._cost(self.rounded(point, digits), known) for point in points])
 
         look = cma if len(found.fractions) > 1 else nelder_mead
         with suppress(Enough):
