@@ -116,7 +116,7 @@ def find_gait(
         )
     if search.names:
         cycles += search.improve(
-            min(cycles, key=cost), budget, seed, lambda done, of: tell("making it stable", done, of)
+            min(cycles, key=cost), budget, digits, seed, lambda done, of: tell("making it stable", done, of)
         )
     best = rounded(search, min(cycles, key=cost), digits)
     start, walk = started(search, best, start_digits)
@@ -137,9 +137,8 @@ def rounded(search: CycleSearch, found: Found, digits: int) -> Found:
     Raises:
         SimulationError: there is none.
     """
-    numbers = {name: float(f"{value:.{digits}g}") for name, value in found.numbers.items()}
     try:
-        return search.cycle(search.fractions(numbers), found.cycle.state, fine=True)
+        return search.cycle(search.rounded(found.fractions, digits), found.cycle.state, fine=True)
     except OsimliteError as error:
         raise SimulationError(
             f"with numbers of {digits} digits the cycle is lost; keep more. {error.message}"
