@@ -28,7 +28,7 @@ from osimlite.models.source import make_model, parameters_of
 from osimlite.simulation import Simulation
 
 TO = 60.0
-CONFIRMED = {"steady-walker": 1e-8, "human-walker": 1e-6}
+CONFIRMED = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}
 """Accuracy at which OpenSim walks."""
 
 MANY = 50

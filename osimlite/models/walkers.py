@@ -39,18 +39,20 @@ HUMAN_START = {
 
 
 FURTHEST_START = {
-    "Pelvis_tx": (0.0, 0.0780009),
-    "Pelvis_ty": (0.774823, 0.999683),
-    "RHip_rz": (0.016902, 2.92303),
-    "LHip_rz": (0.0600742, -0.848992),
-    "RKnee_rz": (-1.3517, 1.48941),
-    "LKnee_rz": (-0.854596, 2.31941),
+    "Pelvis_tx": (0.0, 0.171338),
+    "Pelvis_ty": (0.718966, 0.222891),
+    "RHip_rz": (-0.316983, -1.20538),
+    "LHip_rz": (0.165195, 3.35629),
+    "RKnee_rz": (-0.59857, 2.28733),
+    "LKnee_rz": (-1.58442, 3.04607),
 }
 """Value and speed of each coordinate from which the exercise's own walker makes the most steps that were found."""
 
 
 def furthest_walker() -> Model:
     """Build the exercise's own walker, with the start from which it makes four steps before it falls.
+
+    It stands on its right foot, which is at rest, the left leg drawn up and swinging forward.
 
     It has no cycle that was found: its shanks are so hard to turn that a leg swings too slowly.
     """

@@ -24,8 +24,8 @@ from osimlite.sweep.plan import Plan
 from osimlite.sweep.renewal import Renewal, Variant
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
 
-PRESSED = 1e-4
-"""So deep (m) in the ground is the foot of a walker that is planted: no doubt that it stands on it."""
+PRESSED = 8e-4
+"""So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
 
 MOST_KEPT = 64
 """So many models are kept: a grid asks for the same ones again and again."""

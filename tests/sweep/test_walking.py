@@ -16,6 +16,7 @@ from osimlite.sweep.measures import measure
 from osimlite.sweep.optimize import Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
+from osimlite.sweep.variants import PRESSED
 
 pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
 VARY = {"RHip_rz": (-0.5, 0.5), "LHip_rz/speed": (-4.0, 4.0), "LKnee_rz": (-1.0, 0.0)}
@@ -34,7 +35,7 @@ def walks_of(made, rows):
         engine = runner.variants.variant(row.tolist()).engine
         start = runner.variants.start(runner.variants.variant(row.tolist()), row.tolist())
         starts.append(planted(engine, find_footing(engine), start[None])[0])
-        starts[-1][engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))] -= 1e-4
+        starts[-1][engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))] -= PRESSED
         walks += walk_many(engine, starts[-1][None], made.to, accuracy=made.accuracy)
     return np.array(starts), walks
 
@@ -81,7 +82,7 @@ def test_a_planted_walker_stands_at_rest(walker):
 
     along, depths = of_feet(starts)
     stands = depths.argmax(axis=1)
-    assert depths.max(axis=1) == pytest.approx(np.full(len(rows), 1e-4), abs=1e-12)
+    assert depths.max(axis=1) == pytest.approx(np.full(len(rows), PRESSED), abs=1e-12)
     later = starts.copy()
     later[:, :n] += 1e-6 * later[:, n:]
     then, deeper = of_feet(later)
