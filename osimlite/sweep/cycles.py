@@ -5,13 +5,12 @@
 2. From the best of them, the start and the numbers are moved together until the step ends where it began (least squares
    by a trust region, then Newton's method), which is a cycle.
 3. The numbers of the best cycle are led on, from cycle to cycle, to where its largest multiplier is small, and then to
-   where most of the walkers that start near it walk (cma).
+   where most of the walkers that start near it walk (`osimlite.sweep.stability`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -31,7 +30,6 @@ from osimlite.schema.model import Model
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.many import run_many
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.search import Enough, Search, cma, nelder_mead
 from osimlite.sweep.variables import Floats, Start
 from osimlite.sweep.variants import Variants
 
@@ -68,8 +66,8 @@ MIDWAY = 0.4
 STARTS, STEPS = 60, 20
 """So many walkers start near a cycle, and after so many steps they walk."""
 
-FIRST_REACH, WORST, SCUFFED = 0.05, 100.0, 1.0
-"""Of the search for stability: how far it looks at first, what numbers without a cycle cost, and what a scuff does."""
+SCUFFED = 1.0
+"""What a scuff in a cycle costs."""
 
 FIRST_SECONDS = 3.0
 """So long random walkers walk."""
@@ -337,49 +335,6 @@ class CycleSearch:
         if self._first is None:
             self._first = StepMap(engine, state, footing=self.footing, threads=self.threads)
         return self._first.varied(engine, state, accuracy)
-
-    # ---------------------------------------------------------------------------------------- stability
-    def improve(
-        self, found: Found, budget: int, digits: int, seed: int, progress: Progress | None = None
-    ) -> list[Found]:
-        """Lead a cycle to the numbers at which it costs least.
-
-        Args:
-            found: where to begin.
-            budget: how many sets of numbers may be tried.
-            digits: that the numbers have.
-            seed: of the search.
-            progress: called with how many have been.
-
-        Returns:
-            The cycles on the way.
-        """
-        known = [found]
-        tried = 0
-
-        def ask(points: Floats) -> Floats:
-            nonlocal tried
-            if tried >= budget:
-                raise Enough
-            tried += len(points)
-            if progress is not None:
-                progress(min(tried, budget), budget)
-            return np.array([self._cost(self.rounded(point, digits), known) for point in points])
-
-        look = cma if len(found.fractions) > 1 else nelder_mead
-        with suppress(Enough):
-            look(ask, Search(found.fractions, FIRST_REACH, None, seed, True, budget, 1e-4))
-        return known[1:]
-
-    def _cost(self, fractions: Floats, known: list[Found]) -> float:
-        """Of the cycle there, which is found from the nearest that is known; much if there is none."""
-        near = min(known, key=lambda each: float(np.linalg.norm(each.fractions - fractions)))
-        try:
-            found = self.cycle(fractions, near.cycle.state)
-        except (OsimliteError, np.linalg.LinAlgError):
-            return float(WORST + np.linalg.norm(near.fractions - fractions))
-        known.append(found)
-        return found.cost
 
 
 def along(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:

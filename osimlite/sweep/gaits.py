@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from osimlite.gait.stepmap import TIGHT
 from osimlite.gait.steps import Walk, walk_many
 from osimlite.sweep.cycles import CycleSearch, Found, along
 from osimlite.sweep.plan import Plan
+from osimlite.sweep.stability import Improvement, cost
 from osimlite.sweep.variables import Floats
 
 BEST, CYCLES, SUMMARY = "best.osim", "cycles.csv", "summary.json"
@@ -28,8 +28,6 @@ PHASES = (0.4, 0.5, 0.3, 0.6, 0.2, 0.7, 0.1, 0.8, 0.9)
 
 WALK_SECONDS, WALK_ACCURACY = 60.0, 1e-6
 """How long the walker that is written walks before it is believed."""
-
-cost = attrgetter("cost")
 
 Stage = Callable[[str, float, float], object]
 """Called with what is being done, how much of it, and of how much."""
@@ -114,11 +112,11 @@ def find_gait(
             f"none of the {min(tries, len(candidates))} best of {samples} random walkers comes to a cycle; draw more, "
             "try more, or vary other numbers"
         )
+    improvement = Improvement(search, min(cycles, key=cost), digits)
     if search.names:
-        cycles += search.improve(
-            min(cycles, key=cost), budget, digits, seed, lambda done, of: tell("making it stable", done, of)
-        )
-    best = rounded(search, min(cycles, key=cost), digits)
+        improvement.run(budget, seed, lambda done, of: tell("making it stable", done, of))
+    best = rounded(search, improvement.best, digits)
+    cycles += improvement.cycles
     start, walk = started(search, best, start_digits)
     gait = Gait(
         best, start, walk, len(candidates), len(cycles), tuple(Path(folder) / name for name in (BEST, CYCLES, SUMMARY))

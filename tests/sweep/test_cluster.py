@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -184,7 +185,7 @@ def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, mon
     """A module that is on this machine's path only, and another version of osimlite."""
     (tmp_path / "only_here.py").write_text("def one(run):\n    return 1.0\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    from only_here import one
+    one = importlib.import_module("only_here").one
 
     chosen = samples(plan(walker, {"RHip_rz": (0.3, 0.7)}).variables, "random", 10)
     for measure in (one, "only_here:one"):

@@ -109,7 +109,8 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
 
 
 def test_finished_results_are_spared_unless_forced(made, tmp_path):
-    path, few, more = tmp_path / "r.parquet", *(samples(made.variables, "sobol", count, 5) for count in (6, 8))
+    path = tmp_path / "r.parquet"
+    few, more = (samples(made.variables, "sobol", count, 5) for count in (6, 8))
     first = sweep(made, few, path).path.read_bytes()
     for resume in (False, True):
         with pytest.raises(SettingError, match="--force"):
