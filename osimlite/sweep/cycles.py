@@ -167,7 +167,8 @@ class CycleSearch:
         """A sample of the plan with the model's numbers at fractions (k,) of their ranges."""
         row = list(self._least)
         for place, fraction in zip(self._numbers, fractions, strict=True):
-            row[place] = float(self.plan.variables[place].at(np.array(fraction)))
+            # Without the noise of the last bits, a number that was rounded stays so.
+            row[place] = float(f"{self.plan.variables[place].at(np.array(fraction)):.14g}")
         return row
 
     def numbers(self, fractions: Floats) -> dict[str, float]:

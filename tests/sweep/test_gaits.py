@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,8 +23,9 @@ pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.gait.cycle import find_cycle
 from osimlite.gait.stepmap import StepMap
-from osimlite.sweep.cycles import CycleSearch
+from osimlite.sweep.cycles import CycleSearch, Found
 from osimlite.sweep.gaits import find_gait
+from osimlite.sweep.stability import Improvement
 
 INERTIA, AHEAD = "/bodyset/*Shank/inertia/2", "/contactgeometryset/*FootContact/location/0"
 JOINTS = [name for name in STEADY_START if not name.startswith("Pelvis")]
@@ -99,6 +101,55 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
     search.stable = 0.1
     strict = search.cycle(known.fractions, cycle.state)
     assert strict.cost == strict.cycle.largest and strict.walking == 0.0
+
+
+def test_rounded_numbers_have_no_noise_in_the_last_bit():
+    search = CycleSearch(plan(dynamic_walker(), NEAR | {INERTIA: (0.02, 1.0, "log")}))
+    for inertia in (0.0894, 0.0673, 0.112, 0.33):
+        numbers = search.numbers(search.rounded(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3))
+        assert numbers == {INERTIA: inertia, AHEAD: 0.0694}
+
+
+class Valley:
+    """Cycles whose largest multiplier is a narrow, slanting valley of two numbers, with its end at (0.8, 0.8)."""
+
+    stable = 0.5
+
+    def __init__(self):
+        self.asked = []
+
+    def rounded(self, fractions, digits):
+        return np.round(fractions, digits)
+
+    def cycle(self, fractions, state):
+        self.asked.append(fractions)
+        along, across = fractions.sum() - 1.6, fractions[0] - fractions[1]
+        largest = 0.2 + abs(along) + 300.0 * abs(across)
+        if largest > 3.0:
+            raise SimulationError("no cycle")
+        cost = largest if largest >= self.stable else self.stable - 0.5 * (1.0 - abs(along))
+        return Found(fractions, {}, SimpleNamespace(state=state), 0.0, cost)
+
+
+def test_a_narrow_valley_is_followed_to_rounded_numbers():
+    """It follows the narrow valley without rounding, and rounds where it is wide enough for that."""
+    valley = Valley()
+    first = valley.cycle(np.array([0.3111, 0.3113]), np.zeros(2))
+    improvement = Improvement(valley, first, 2)
+    improvement.run(400, 0)
+    assert improvement.best.cost < valley.stable
+    assert (improvement.best.fractions == np.round(improvement.best.fractions, 2)).all()
+    assert improvement.best.fractions == pytest.approx([0.8, 0.8], abs=0.05)
+    assert len(valley.asked) <= 401 and len(improvement.cycles) < 400
+    assert len({tuple(each) for each in valley.asked}) == len(valley.asked)
+
+
+def test_a_search_that_gets_nowhere_keeps_the_first_cycle():
+    valley = Valley()
+    first = valley.cycle(np.array([0.3, 0.3]), np.zeros(2))
+    improvement = Improvement(valley, first, 2)
+    improvement.run(0, 0)
+    assert improvement.best is first and not improvement.cycles
 
 
 def test_a_search_needs_random_starts():
