@@ -56,7 +56,7 @@ def find_footing(engine: CompiledEngine, feet: Sequence[str] | None = None) -> F
         feet: the contacts of each foot, with + between those of one foot, instead of looking for them.
 
     Raises:
-        OsimliteError: a contact does not exist, or the model has no two legs.
+        OsimliteError: a contact does not exist or is named twice, or the model has no two legs.
     """
     if not engine.contacts:
         raise OsimliteError(f"'{engine.mechanism.name}' has no contact forces, so that nothing walks")
@@ -64,12 +64,15 @@ def find_footing(engine: CompiledEngine, feet: Sequence[str] | None = None) -> F
     known = [sole.contact for sole in soles]
     if feet:
         given = tuple(tuple(part.strip() for part in foot.split("+")) for foot in feet)
-        for contact in (contact for foot in given for contact in foot):
+        named = [contact for foot in given for contact in foot]
+        for contact in named:
             if contact not in known:
                 raise OsimliteError(
                     f"no sphere touches a half space in '{contact}'"
                     f"{or_known(contact, known) if known else '; none does'}"
                 )
+            if named.count(contact) > 1:
+                raise OsimliteError(f"'{contact}' is given to the feet twice; name it once, for one of them")
         if len(given) < 2:
             raise OsimliteError(f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each")
     else:

@@ -51,6 +51,9 @@ def test_feet_may_be_given(engine):
         find_footing(engine, ["RFotForce", "LFootForce"])
     with pytest.raises(OsimliteError, match="two feet"):
         find_footing(engine, ["RFootForce"])
+    for feet in (["RFootForce", "RFootForce"], ["RFootForce", "LFootForce + RFootForce"]):
+        with pytest.raises(OsimliteError, match="'RFootForce' is given to the feet twice"):
+            find_footing(engine, feet)
 
 
 def test_a_model_without_legs_says_so():
