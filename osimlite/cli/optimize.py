@@ -57,6 +57,7 @@ def optimize(
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
+    foot: options.Foot = None,
     parameter: options.Parameters = None,
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
@@ -79,7 +80,7 @@ def optimize(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, is_planted=planted,
+        accuracy=accuracy, is_planted=planted, feet=tuple(foot) if foot else None,
         skip_unsupported=skip_unsupported,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:

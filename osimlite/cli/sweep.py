@@ -44,6 +44,7 @@ def sweep(
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
+    foot: options.Foot = None,
     report_interval: Annotated[
         float | None,
         typer.Option(
@@ -75,7 +76,7 @@ def sweep(
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure) if measure else None, to=to,
         engine=engine, accuracy=accuracy, report_interval=report_interval, is_planted=planted,
-        skip_unsupported=skip_unsupported,
+        feet=tuple(foot) if foot else None, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)
     with progress_bar("sweeping", chosen.count) as progress:

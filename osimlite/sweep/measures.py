@@ -87,7 +87,7 @@ class Measure:
 class MeasureMaker(Protocol):
     """Makes a measure for the models of an engine."""
 
-    def __call__(self, engine: Any) -> Measure:
+    def __call__(self, engine: Any, feet: Sequence[str] | None) -> Measure:
         """Make it; raises OsimliteError if the model has nothing of the kind."""
 
 
@@ -145,8 +145,13 @@ class Run:
         return self.engine.mechanism
 
 
-def measure(spec: Any, engine: Any) -> Measure:
+def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """The measure that is meant by a name, by ``NAME/value`` or ``NAME/speed`` at the end, or by a function.
+
+    Args:
+        spec: what is meant.
+        engine: of the model.
+        feet: contacts of each foot, for the measures of a walker; found by the structure of the model if left out.
 
     Raises:
         SettingError: there is none of that name, or the model has nothing of the kind.
@@ -157,7 +162,7 @@ def measure(spec: Any, engine: Any) -> Measure:
     if name in BUILT_IN:
         module, _, function = BUILT_IN[name].partition(":")
         maker: MeasureMaker = getattr(import_module(module), function)
-        return maker(engine)
+        return maker(engine, feet)
     if ":" in name:
         return Measure(name, partial(_each, _function(name)), room=_room)
     if "/" in name:
@@ -184,7 +189,7 @@ def measure_name(spec: Any) -> str:
     return str(spec)
 
 
-def distance(engine: Any) -> Measure:
+def distance(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How far the first free coordinate that slides has come, m."""
     infos = engine.mechanism.coordinates
     place = next((k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None)
@@ -193,12 +198,12 @@ def distance(engine: Any) -> Measure:
     return Measure("distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place])
 
 
-def largest_force(engine: Any) -> Measure:
+def largest_force(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """The largest force of any contact at the end of a step, N."""
     return Measure("largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0))
 
 
-def energy(engine: Any) -> Measure:
+def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """Mechanical energy at the end less that at the start, J; contact and damping take it away."""
 
     def gained(batch: Batch) -> Floats:

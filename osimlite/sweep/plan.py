@@ -59,6 +59,7 @@ class Plan:
         accuracy: of the integrator.
         stops: what ends a run before.
         is_planted: whether the walker is put on the ground with the deeper foot, at rest there, before each run.
+        feet: contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out.
         report_interval: time between the moments that a measure of one's own can look at (s), None for none.
         skip_unsupported: leave out forces that cannot be computed.
         make: makes the model from parameters, where some of them are varied.
@@ -73,6 +74,7 @@ class Plan:
     accuracy: float = DEFAULT_ACCURACY
     stops: tuple[Stop, ...] = ()
     is_planted: bool = False
+    feet: tuple[str, ...] | None = None
     report_interval: float | None = None
     skip_unsupported: bool = False
     make: Maker | None = None
@@ -136,6 +138,7 @@ class Plan:
             "accuracy": self.accuracy,
             "stops": [item.words for item in self.stops],
             "planted": self.is_planted,
+            "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
             "skip_unsupported": self.skip_unsupported,
         }

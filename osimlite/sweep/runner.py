@@ -64,7 +64,7 @@ class _Look:
     """
 
     def __init__(self, plan: Plan, engine: Any) -> None:
-        self.measures = [measure(spec, engine) for spec in plan.measures]
+        self.measures = [measure(spec, engine, plan.feet) for spec in plan.measures]
         stops = [
             Watch(stop.words, coordinate=stop.coordinate, level=stop.level, stops=-1 if stop.is_below else 1)
             for stop in plan.stops

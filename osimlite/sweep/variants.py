@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from osimlite.simulation.run import Simulation
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.renewal import Renewal, Variant
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
+
+if TYPE_CHECKING:
+    from osimlite.gait.footing import Footing
 
 PRESSED = 8e-4
 """So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
@@ -52,6 +55,9 @@ class Variants:
         self._parameters = [k for k, target in enumerate(targets) if isinstance(target, Parameter)]
         self._adopt(plan.model())
         self.given = self._whole()
+        if plan.is_planted:
+            # A model without two feet is told of before any run.
+            self._footing(self.given.engine)
         self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
         self._renewal: Renewal | None = None
 
@@ -121,10 +127,9 @@ class Variants:
         """
         if not self._plan.is_planted:
             return starts
-        from osimlite.gait.footing import find_footing
         from osimlite.gait.starts import planted, stood
 
-        footing = find_footing(engine)
+        footing = self._footing(engine)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
         return stood(engine, footing, planted(engine, footing, starts, numbers=numbers), PRESSED, -1, numbers=numbers)
 
@@ -175,6 +180,14 @@ class Variants:
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
 
     # ------------------------------------------------------------------------------------------------ helpers
+    def _footing(self, engine: Any) -> Footing:
+        """The feet that a walker is planted on."""
+        from osimlite.gait.footing import find_footing
+
+        if engine.name != "compiled":
+            raise SettingError("a walker is planted with --engine compiled only")
+        return find_footing(engine, self._plan.feet)
+
     def _adopt(self, model: Model) -> None:
         self.model = model
         self._gravity = math.hypot(*model.gravity[:2])

@@ -14,35 +14,35 @@ from osimlite.sweep.measures import Batch, Measure
 from osimlite.sweep.variables import Floats
 
 
-def steps(engine: Any) -> Measure:
+def steps(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many steps were made."""
-    return _measure("steps", engine, lambda walk: len(walk.steps))
+    return _measure("steps", engine, feet, lambda walk: len(walk.steps))
 
 
-def scuffs(engine: Any) -> Measure:
+def scuffs(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many touch-downs were no steps."""
-    return _measure("scuffs", engine, lambda walk: len(walk.scuffs))
+    return _measure("scuffs", engine, feet, lambda walk: len(walk.scuffs))
 
 
-def time_to_fall(engine: Any) -> Measure:
+def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """When the walk ended, s; the end of the run for those that did not fall."""
-    return _measure("time_to_fall", engine, lambda walk: walk.end)
+    return _measure("time_to_fall", engine, feet, lambda walk: walk.end)
 
 
-def progress(engine: Any) -> Measure:
+def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many steps were made before the first scuff, and how near the next one was: what a search can climb.
 
     The part after the point is the mean of two numbers below one. One is how near the foot came to where its step would
     have counted, when it scuffed or the run ended: 1/2 if it lacked as much again as the shortest step. The other is
     how long it had gone on by then: 1/2 for a second.
     """
-    footing = _footing("progress", engine)
-    feet = [[engine.contacts.index(name) for name in foot] for foot in footing.feet]
+    footing = _footing("progress", engine, feet)
+    contacts = [[engine.contacts.index(name) for name in foot] for foot in footing.feet]
 
     def numbers(batch: Batch) -> Floats:
         rows = None if batch.numbers is None else np.arange(len(batch.starts))
         along = along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
-        places = np.stack([along[:, foot].max(axis=1) for foot in feet], axis=1)
+        places = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
         found = zip(_walks(footing, batch), places.tolist(), strict=True)
         return np.array([_progress(walk, ends) for walk, ends in found])
 
@@ -59,15 +59,15 @@ def _progress(walk: Walk, places: Sequence[float]) -> float:
     return walk.clean_steps + 0.5 * (near + until / (until + 1.0))
 
 
-def _measure(name: str, engine: Any, number: Callable[[Walk], float]) -> Measure:
-    footing = _footing(name, engine)
+def _measure(name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[Walk], float]) -> Measure:
+    footing = _footing(name, engine, feet)
     return _made(name, footing, lambda batch: np.array([number(walk) for walk in _walks(footing, batch)], float))
 
 
-def _footing(name: str, engine: Any) -> Footing:
+def _footing(name: str, engine: Any, feet: Sequence[str] | None) -> Footing:
     if engine.name != "compiled":
         raise SettingError(f"the measure '{name}' needs --engine compiled")
-    return find_footing(engine)
+    return find_footing(engine, feet)
 
 
 def _made(name: str, footing: Footing, numbers: Callable[[Batch], Floats]) -> Measure:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import SettingError
+from osimlite.errors import OsimliteError, SettingError
 from osimlite.gait.footing import find_footing
 from osimlite.gait.starts import planted
 from osimlite.gait.steps import along_slope, walk_many
@@ -98,6 +98,31 @@ def test_the_best_model_starts_on_its_feet(walker, tmp_path):
     (wanted,), (walk,) = walks_of(made, np.array([list(best.values.values())]))
     assert start == pytest.approx(wanted, abs=1e-9)
     assert int(best.value) == walk.clean_steps
+
+
+def test_feet_may_be_given(walker):
+    """With a knee in the part of a foot, a knee on the ground does not end the walk."""
+    rows = points(VARY, 8)
+    found = {}
+    for feet in (None, ("RFootForce", "LFootForce"), ("RFootForce + RKneeForce", "LFootForce + LKneeForce")):
+        made = plan(walker, VARY, measures=("time_to_fall", "scuffs"), to=1.5, is_planted=True, feet=feet)
+        block = Runner(made).run(rows)
+        found[feet] = [column.tolist() for column in block.measures.values()]
+        assert made.settings()["feet"] == (None if feet is None else list(feet))
+    by_structure, named, knees = found.values()
+    assert named == by_structure
+    assert all(later >= fell for later, fell in zip(knees[0], named[0], strict=True)) and knees[0] != named[0]
+
+
+def test_who_cannot_be_planted_is_told_before_any_run(walker):
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    with pytest.raises(SettingError, match="planted with --engine compiled only"):
+        Runner(plan(walker, VARY, engine="bullet", is_planted=True))
+    walker.tree().by_path["/forceset/LFootForce"].appliesForce = False
+    walker.tree().by_path["/forceset/LKneeForce"].appliesForce = False
+    walker.tree().by_path["/forceset/LHipForce"].appliesForce = False
+    with pytest.raises(OsimliteError, match="the ends of 1 leg"):
+        Runner(plan(walker, VARY, is_planted=True))
 
 
 def test_walking_needs_the_compiled_engine():
