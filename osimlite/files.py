@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -92,6 +92,26 @@ def make_folder(path: str | Path) -> Path:
         reason = "this is a file, not a folder" if file is not None else error.strerror
         raise OsimliteError(f"cannot make a folder here: {reason}", file=str(file or folder)) from None
     return folder
+
+
+@contextmanager
+def folder_to_fill(path: str | Path) -> Iterator[Path]:
+    """A folder for what takes a while to find, made before the work begins; gone again if that fails without a file.
+
+    Raises:
+        OsimliteError: it cannot be made or written to; the message says why.
+    """
+    is_new = not Path(path).exists()
+    folder = make_folder(path)
+    if not os.access(folder, os.W_OK):
+        raise OsimliteError("cannot write here: permission denied", file=str(folder))
+    try:
+        yield folder
+    except BaseException:
+        if is_new:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 @contextmanager

@@ -14,11 +14,11 @@ import numpy as np
 from osimlite._require import require
 from osimlite.document.printer import write
 from osimlite.errors import SettingError, SimulationError
-from osimlite.files import make_folder, write_atomically
+from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare
+from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare, spare_strangers
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
@@ -38,7 +38,7 @@ class Objective:
 
     Attributes:
         measure: name of a measure, ``module:function``, or a function.
-        is_maximized: whether more is better; by default for distance, steps and time_to_fall.
+        is_maximized: whether more is better; by default for the measures in `LARGER_IS_BETTER`.
     """
 
     measure: Any
@@ -140,8 +140,7 @@ def optimize(
         **plan.settings(), "objective": names[0], "sign": objective.sign, "method": method, "popsize": popsize,
         "seed": seed, "sigma": sigma, "tolerance": tolerance, "bounded": is_bounded, "start": point.tolist(),
     }  # fmt: skip
-    where = make_folder(folder)
-    with pool(plan, workers=workers, cluster=cluster) as workforce:
+    with folder_to_fill(folder) as where, pool(plan, workers=workers, cluster=cluster) as workforce:
         evaluations = _Evaluations(plan, free, objective.sign, is_bounded, budget, workforce, progress)
         partial = _open(
             where / HISTORY, schema(plan.columns("evaluation", "batch"), wanted), resume, force, evaluations
@@ -198,6 +197,8 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
                 f"'{path}' has {before.num_rows} runs of this search, more than are asked for now; keep them with "
                 "--resume, or replace them with --force"
             )
+    if not force and not path.exists() and not partial_of(path).exists():
+        spare_strangers(path.with_name(name) for name in (BEST, SUMMARY))
     partial = Partial(path, table, resume=resume)
     partial.read(evaluations.remember)
     return partial

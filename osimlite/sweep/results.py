@@ -10,7 +10,7 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -88,11 +88,33 @@ def spare(path: Path, wanted: Mapping[str, Any]) -> None:
         SettingError: there are such results.
         OsimliteError: the file is none of osimlite's results.
     """
-    if unlike := differences(settings_of(path), wanted):
+    refuse_others(path, settings_of(path), wanted)
+
+
+def refuse_others(path: Path, before: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Stop where the settings of what is there are others.
+
+    Raises:
+        SettingError: they are.
+    """
+    if unlike := differences(before, wanted):
         raise SettingError(
             f"'{path}' has results of other settings: {listed(unlike)}; name another place with -o, or replace them "
             "with --force"
         )
+
+
+def spare_strangers(paths: Iterable[Path]) -> None:
+    """Stop before files are lost of which nothing says that they are results of the same command.
+
+    Raises:
+        SettingError: one of them is there.
+    """
+    for path in paths:
+        if path.exists():
+            raise SettingError(
+                f"'{path}' is not from such a search; name another folder with -o, or replace it with --force"
+            )
 
 
 def partial_of(path: Path) -> Path:

@@ -218,3 +218,20 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
         optimize(plan(walker, {"RHip_rz": 0.3}), DISTANCE, tmp_path)
     with pytest.raises(SettingError, match="did you mean 'distance'"):
         optimize(made, Objective("distanc"), tmp_path)
+
+
+@pytest.mark.parametrize("name", [BEST, SUMMARY])
+def test_files_of_others_are_spared_unless_forced(made, tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(SettingError, match=rf"{name}' is not from such a search; .*--force"):
+        optimize(made, DISTANCE, tmp_path, budget=4, popsize=4)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
+    assert optimize(made, DISTANCE, tmp_path, budget=4, popsize=4, force=True).evaluations == 4
+
+
+def test_a_search_that_cannot_begin_leaves_no_folder(made, walker, tmp_path):
+    with pytest.raises(SettingError, match="did you mean 'distance'"):
+        optimize(made, Objective("distanc"), tmp_path / "new")
+    with pytest.raises(SettingError, match="take --method nelder-mead"):
+        optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path / "new")
+    assert not list(tmp_path.iterdir())
