@@ -44,6 +44,7 @@ def find_gait(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json.")
     ] = Path("found"),
+    force: Annotated[bool, typer.Option("--force", help="Replace what another search found.")] = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Look for the numbers of a model, and the start, with which a walker never stops; writes it, ready to walk.
@@ -65,7 +66,8 @@ def find_gait(
     with progress_bars() as stage:
         gait = search(
             plan, output, feet=foot, samples=samples, tries=tries, enough=enough, budget=budget, stable=stable,
-            perturb=perturb, digits=digits, start_digits=start_digits, seed=seed, stage=stage,
+            perturb=perturb, digits=digits, start_digits=start_digits, seed=seed, force=force,
+            stage=stage,
         )  # fmt: skip
     Console().print(_table(gait))
     if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):

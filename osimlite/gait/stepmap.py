@@ -13,13 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.gait.footing import Footing, find_footing
 from osimlite.gait.steps import Step, along_slope, falls, room_for, walks_of
 from osimlite.gait.symmetry import leg_exchange, neutral_directions
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.many import Watch, run_many
+from osimlite.simulation.run import kept_constraints
+from osimlite.text import listed
 
 TIGHT = 1e-10
 """Accuracy of the integrator for maps that are differentiated."""
@@ -32,6 +35,19 @@ AT_ONCE = 1e-6
 
 ALONG_A_STEP = 9
 """At so many moments of a step the neutral directions are looked for."""
+
+
+def refuse_constraints(mechanism: Mechanism) -> None:
+    """Stop where constraints act, which no step map is made for.
+
+    Raises:
+        UnsupportedError: some do.
+    """
+    if kept := kept_constraints(mechanism):
+        raise UnsupportedError(
+            f"gaits are looked for in all directions of the state, some of which {listed(kept)} takes away; set "
+            "isEnforced of a constraint and prescribed of a coordinate to false"
+        )
 
 
 @dataclass

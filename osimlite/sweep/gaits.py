@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from osimlite.document.printer import write
-from osimlite.errors import OsimliteError, SimulationError
-from osimlite.files import make_folder, write_atomically
-from osimlite.gait.stepmap import TIGHT
+from osimlite.errors import OsimliteError, SettingError, SimulationError
+from osimlite.files import folder_to_fill, write_atomically
+from osimlite.gait.stepmap import TIGHT, refuse_constraints
 from osimlite.gait.steps import Walk, walk_many
-from osimlite.sweep.cycles import CycleSearch, Found, along
+from osimlite.sweep.cycles import Candidate, CycleSearch, Found, Progress, along
 from osimlite.sweep.plan import Plan
+from osimlite.sweep.results import refuse_others, spare_strangers
 from osimlite.sweep.stability import Improvement, cost
 from osimlite.sweep.variables import Floats
 
@@ -68,6 +70,7 @@ def find_gait(
     digits: int = 3,
     start_digits: int | None = None,
     seed: int = 0,
+    force: bool = False,
     threads: int | None = None,
     stage: Stage | None = None,
 ) -> Gait:
@@ -87,21 +90,94 @@ def find_gait(
         digits: that the numbers of the model are rounded to.
         start_digits: that the start is rounded to; None for all of them.
         seed: what makes the search the same again.
+        force: replace what another search has left in the folder.
         threads: how many work.
         stage: called as work is done.
 
     Raises:
+        SettingError: a number has no meaning, or the folder has files of another search.
         SimulationError: no cycle was found, or the best is lost when the numbers are rounded.
-        OsimliteError: the plan cannot be run, or the model has no two feet.
+        UnsupportedError: constraints act on the model.
+        OsimliteError: the plan cannot be run, the model has no two feet, or the folder cannot be written to.
     """
-    search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
+    settings = {
+        **plan.settings(), "feet": None if feet is None else list(feet), "samples": samples, "tries": tries,
+        "enough": enough, "budget": budget, "stable": stable, "perturb": perturb, "digits": digits,
+        "start_digits": start_digits, "seed": seed,
+    }  # fmt: skip
+    _check_numbers(settings)
     tell = stage or (lambda *_: None)
-    candidates = search.candidates(samples, seed, lambda done, of: tell("random walkers", done, of))
-    if not candidates:
-        raise SimulationError(f"none of {samples} random walkers made two steps; widen the ranges or draw more")
+    with folder_to_fill(folder) as where:
+        if not force:
+            _spare(where, settings)
+        search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
+        refuse_constraints(search.variants.given.engine.mechanism)
+        candidates = search.candidates(samples, seed, lambda done, of: tell("random walkers", done, of))
+        if not candidates:
+            raise SimulationError(f"none of {samples} random walkers made two steps; widen the ranges or draw more")
+        cycles = closed(search, candidates[:tries], enough, lambda done, of: tell("closing cycles", done, of))
+        improvement = Improvement(search, min(cycles, key=cost), digits)
+        if search.names:
+            improvement.run(budget, seed, lambda done, of: tell("making it stable", done, of))
+        best = rounded(search, improvement.best, digits)
+        cycles += improvement.cycles
+        start, walk = started(search, best, start_digits)
+        files = tuple(where / name for name in (BEST, CYCLES, SUMMARY))
+        gait = Gait(best, start, walk, len(candidates), len(cycles), files)
+        _write(where, search, gait, cycles, settings)
+    return gait
+
+
+def _check_numbers(given: Mapping[str, Any]) -> None:
+    """Stop at settings that mean nothing before the search, which takes minutes."""
+    for name, least in (("samples", 1), ("tries", 1), ("enough", 1), ("budget", 0)):
+        if given[name] < least:
+            raise SettingError(f"'{name}' is a whole number from {least} on, not {given[name]}")
+    for name in ("stable", "perturb"):
+        if not (isfinite(given[name]) and given[name] > 0.0):
+            raise SettingError(f"'{name}' is a positive number, not {given[name]:g}")
+    for name in ("digits", "start_digits"):
+        if given[name] is not None and not 1 <= given[name] <= 17:
+            raise SettingError(f"'{name}' is a whole number from 1 to 17, not {given[name]}")
+    # Every turn of the search for stability has a seed of its own, of 32 bits at most.
+    most = 2**32 - 1 - given["budget"]
+    if not 0 <= given["seed"] <= most:
+        raise SettingError(f"the seed is a whole number from 0 to {most}, not {given['seed']}")
+
+
+def _spare(folder: Path, wanted: dict[str, Any]) -> None:
+    """Stop before the walker of another search is lost.
+
+    Raises:
+        SettingError: there is one.
+    """
+    summary = folder / SUMMARY
+    try:
+        before = dict(json.loads(summary.read_text())["settings"])
+    except (OSError, ValueError, LookupError, TypeError):
+        spare_strangers(folder / name for name in (BEST, CYCLES, SUMMARY))
+    else:
+        refuse_others(summary, before, wanted)
+
+
+def closed(
+    search: CycleSearch, candidates: Sequence[Candidate], enough: int, progress: Progress | None = None
+) -> list[Found]:
+    """The cycles that candidates are led to.
+
+    Args:
+        search: that found them.
+        candidates: the best first.
+        enough: cycles after which no more are looked for.
+        progress: called with how many have been led, and of how many.
+
+    Raises:
+        SimulationError: none comes to a cycle.
+    """
     cycles: list[Found] = []
-    for number, candidate in enumerate(candidates[:tries]):
-        tell("closing cycles", number, min(tries, len(candidates)))
+    for number, candidate in enumerate(candidates):
+        if progress is not None:
+            progress(number, len(candidates))
         found = search.close(candidate)
         if found is not None:
             cycles.append(found)
@@ -109,24 +185,10 @@ def find_gait(
             break
     if not cycles:
         raise SimulationError(
-            f"none of the {min(tries, len(candidates))} best of {samples} random walkers comes to a cycle; draw more, "
-            "try more, or vary other numbers"
+            f"none of the {len(candidates)} best random walkers comes to a cycle; draw more, try more, or vary other "
+            "numbers"
         )
-    improvement = Improvement(search, min(cycles, key=cost), digits)
-    if search.names:
-        improvement.run(budget, seed, lambda done, of: tell("making it stable", done, of))
-    best = rounded(search, improvement.best, digits)
-    cycles += improvement.cycles
-    start, walk = started(search, best, start_digits)
-    gait = Gait(
-        best, start, walk, len(candidates), len(cycles), tuple(Path(folder) / name for name in (BEST, CYCLES, SUMMARY))
-    )
-    settings = {
-        **plan.settings(), "samples": samples, "tries": tries, "enough": enough, "budget": budget, "stable": stable,
-        "perturb": perturb, "digits": digits, "start_digits": start_digits, "seed": seed,
-    }  # fmt: skip
-    _write(Path(folder), search, gait, cycles, settings)
-    return gait
+    return cycles
 
 
 def rounded(search: CycleSearch, found: Found, digits: int) -> Found:
@@ -173,7 +235,6 @@ def _named(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
 
 
 def _write(folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found], settings: dict[str, Any]) -> None:
-    make_folder(folder)
     model = search.model(gait.found.fractions, gait.start)
     write(model, folder / BEST)
     heads = [*search.names, "largest_multiplier", "walking", "step_length_m", "period_s", "scuffs"]
