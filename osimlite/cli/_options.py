@@ -11,6 +11,7 @@ import typer
 if TYPE_CHECKING:
     from osimlite.document.printer import Numbers as NumberStyle
     from osimlite.multibody.mechanism import Mechanism
+    from osimlite.schema.model import Model
 
 File = Annotated[Path, typer.Argument(help="A model file.", show_default=False)]
 Source = Annotated[
@@ -104,6 +105,23 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
             # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}") from None
     return found
+
+
+def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Path | None]:
+    """The model that a command is given, and the folder of its file if it is in one.
+
+    Raises:
+        OsimliteError: there is none, or it does not take the parameters of ``-p``.
+    """
+    from osimlite.document.reader import read
+    from osimlite.errors import SettingError
+    from osimlite.models.source import make_model
+
+    if Path(source).suffix.lower() != ".osim":
+        return make_model(source, named_words(parameter, "-p")), None
+    if parameter:
+        raise SettingError(f"'{source}' is a file and takes no parameters; -p is for functions that make a model")
+    return read(source), Path(source).resolve().parent
 
 
 def named_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:

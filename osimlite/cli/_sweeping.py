@@ -1,4 +1,4 @@
-"""What `sweep` and `optimize` have in common: the model, and what of it is varied."""
+"""What `sweep`, `optimize` and `find-gait` have in common: the model, and what of it is varied."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from osimlite.cli._options import named_words
+from osimlite.cli._options import named_words, read_source
 
 if TYPE_CHECKING:
     from osimlite.sweep.plan import Plan
@@ -84,26 +84,32 @@ def make_plan(
 
 def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any) -> Plan:
     from functools import partial
+    from inspect import Parameter
 
-    from osimlite.document.reader import read
     from osimlite.errors import SettingError
-    from osimlite.models.source import make_model, parameters_of
+    from osimlite.models.source import parameters_of
     from osimlite.sweep.plan import plan
 
     if Path(source).suffix.lower() == ".osim":
-        if parameter:
-            raise SettingError(f"'{source}' is a file and takes no parameters; vary its properties by their paths")
-        return plan(read(source), ranges, folder=str(Path(source).resolve().parent), **choices)
+        model, folder = read_source(source, parameter)
+        return plan(model, ranges, folder=str(folder), **choices)
     given = named_words(parameter, "-p")
     both = [name for name in ranges if name in given]
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
     known = {name: default for name, default in parameters_of(source).items() if name not in given}
-    return plan(partial(_make, make_model, source, given), ranges, parameters=known, **choices)
+    needed = {
+        name: str(ranges[name]).partition(":")[0] for name in known if known[name] is Parameter.empty and name in ranges
+    }
+    return plan(partial(_make, source, {**needed, **given}), ranges, parameters=known, **choices)
 
 
-def _make(make_model: Any, source: str, given: dict[str, str], parameters: dict[str, float]) -> Any:
-    return make_model(source, {**given, **{name: repr(value) for name, value in parameters.items()}})
+def _make(source: str, given: Mapping[str, str], parameters: Mapping[str, float]) -> Any:
+    from osimlite.models.source import make_model
+
+    # A parameter that is a whole number is written as one.
+    words = {name: repr(int(value) if value.is_integer() else value) for name, value in parameters.items()}
+    return make_model(source, {**given, **words})
 
 
 def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from osimlite.gait.cycle import Cycle
     from osimlite.gait.stepmap import StepMap
     from osimlite.gait.steps import Scuff, Step, Walk
-    from osimlite.schema.model import Model
     from osimlite.simulation.engines.compiled import CompiledEngine
 
 
@@ -59,6 +59,7 @@ def gait(
             "-o", "--output", metavar="FOLDER", help="For gait.json, basin.csv, basin.png.", show_default=False
         ),
     ] = None,
+    parameter: options.Parameters = None,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Count the steps of a walker, find the cycle that it walks in, and say whether that is stable.
@@ -67,24 +68,26 @@ def gait(
     ahead along the slope after at least 0.05 s in the air; any other touch-down is a scuff; anything but a foot on the
     ground ends the walk.
 
+    Exits with 1 if there is no cycle.
+
     Example: osimlite gait steady-walker --perturb 0.05 --basin -o gait
     """
     from rich.console import Console
 
     from osimlite._require import require
-    from osimlite.document.reader import read
+    from osimlite.files import folder_to_fill
     from osimlite.gait.basin import basin_places, find_basin, perturbed, walks_from
-    from osimlite.models.source import make_model
+    from osimlite.gait.stepmap import refuse_constraints
     from osimlite.simulation.run import Simulation
 
     if basin and pictures and output:
         require("matplotlib", extra="plot", purpose="a picture of a basin")
-    _check_numbers(to, accuracy, reach, perturb or ())
-    is_file = Path(source).suffix.lower() == ".osim"
-    model = read(source) if is_file else make_model(source)
-    _refuse_constraints(model)
-    folder = Path(source).parent if is_file else None
-    with Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder) as simulation:
+    _check_numbers(to, accuracy, reach, perturb or (), seed)
+    model, folder = options.read_source(source, parameter)
+    with ExitStack() as work:
+        where = None if output is None else work.enter_context(folder_to_fill(output))
+        simulation = work.enter_context(Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder))
+        refuse_constraints(simulation.mechanism)
         state = simulation.initial_state(
             options.quantities(start, simulation.mechanism, "--set"),
             options.quantities(start_speed, simulation.mechanism, "--set-speed"),
@@ -92,6 +95,7 @@ def gait(
         engine: Any = simulation.engine
         basin_places(engine, basin_x, basin_y)
         found, step_map = _walk(engine, state, foot, to, settle, accuracy)
+        found.skipped = simulation.forces.skipped
         cycle = found.cycle
         if step_map is not None and cycle is not None:
             for part in perturb or ():
@@ -104,12 +108,13 @@ def gait(
                     found.basin = find_basin(
                         step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
                     )
-    files = _write(output, found, pictures) if output else []
-    found.skipped = simulation.forces.skipped
+        files = _write(where, found, pictures) if where else []
     Console().print(_table(found, files))
+    if cycle is None:
+        raise typer.Exit(1)
 
 
-def _check_numbers(to: float, accuracy: float, reach: float, perturb: Sequence[float]) -> None:
+def _check_numbers(to: float, accuracy: float, reach: float, perturb: Sequence[float], seed: int) -> None:
     """Before the walk, which takes a while, stop at numbers that mean nothing."""
     from math import inf
 
@@ -119,19 +124,8 @@ def _check_numbers(to: float, accuracy: float, reach: float, perturb: Sequence[f
     for option, number in numbers:
         if not 0.0 < number < inf:
             raise SettingError(f"{option} is a positive number, not {number:g}")
-
-
-def _refuse_constraints(model: Model) -> None:
-    from osimlite.errors import UnsupportedError
-    from osimlite.multibody import build_mechanism
-    from osimlite.simulation.run import kept_constraints
-    from osimlite.text import listed
-
-    if kept := kept_constraints(build_mechanism(model)):
-        raise UnsupportedError(
-            f"gaits are looked for in all directions of the state, some of which {listed(kept)} takes away; set "
-            "isEnforced of a constraint and prescribed of a coordinate to false"
-        )
+    if seed < 0:
+        raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
 
 
 @dataclass
@@ -217,7 +211,7 @@ def _table(found: Found, files: Sequence[Path]) -> Any:
         table.add_row("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
         table.add_row("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
-        table.add_row("fixed point", f"to {cycle.residual:.2g} after {cycle.iterations} steps of Newton")
+        table.add_row("fixed point", f"to {cycle.residual:.2g} after {counted(cycle.iterations, 'step')} of Newton")
     for near in found.nearby:
         table.add_row(f"within {near.part:.0%}", f"{near.walked} of {near.starts} starts make {near.steps} steps")
     if found.basin is not None:
@@ -233,9 +227,8 @@ def _table(found: Found, files: Sequence[Path]) -> Any:
 def _write(folder: Path, found: Found, pictures: bool) -> list[Path]:
     import json
 
-    from osimlite.files import make_folder, write_atomically
+    from osimlite.files import write_atomically
 
-    make_folder(folder)
     written = [folder / "gait.json"]
     write_atomically(written[0], (json.dumps(_facts(found), indent=1) + "\n").encode())
     basin = found.basin
@@ -269,7 +262,9 @@ def _facts(found: Found) -> dict[str, Any]:
             "fell_on": walk.fell_on,
         },
     }
-    if cycle is not None:
+    if cycle is None:
+        facts |= {"cycle": None, "why_no_cycle": found.why_not}
+    else:
         n = len(names)
         facts["cycle"] = {
             "values": dict(zip(names, cycle.state[:n].tolist(), strict=True)),
@@ -283,5 +278,7 @@ def _facts(found: Found) -> dict[str, Any]:
             "scuffs": cycle.scuffs,
             "per_stride": cycle.per_stride,
         }
-        facts["random_starts"] = [{"part": each.part, "walk": each.walked, "of": each.starts} for each in found.nearby]
+        facts["random_starts"] = [
+            {"part": each.part, "walk": each.walked, "of": each.starts, "steps": each.steps} for each in found.nearby
+        ]
     return facts

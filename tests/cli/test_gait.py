@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,9 @@ def pendulum() -> osimlite.Model:
         (["--perturb", "-1"], "--perturb is a positive number, not -1"),
         (["--to", "0"], "--to is a positive number, not 0"),
         (["--reach", "nan"], "--reach is a positive number, not nan"),
+        (["--seed", "-1"], "the seed is a whole number from 0 on, not -1"),
+        (["-p", "slop=2"], "no parameter 'slop'; did you mean 'slope'"),
+        (["-o", __file__], "this is a file, not a folder"),
         (["--basin-x", "UNKNOWN"], "UNKNOWN"),
         (["--basin-y", "RHip_rz/sped"], "RHip_rz/sped"),
     ],
@@ -52,6 +56,29 @@ def test_options_are_checked_before_the_walk(
     assert run("dynamic-walker", *words) in (1, 2)
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
+
+
+def test_without_a_cycle_the_steps_are_counted_and_the_answer_is_no(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("dynamic-walker", "-p", "slope=8", "--to", "1", "--basin", "-o", str(tmp_path / "gait")) == 1
+    assert "makes no step" in " ".join(capsys.readouterr().out.split())
+    facts = json.loads((tmp_path / "gait" / "gait.json").read_text())
+    assert facts["walk"]["steps"] == [] and facts["walk"]["ending"] == "fell"
+    assert facts["cycle"] is None and "makes no step" in facts["why_no_cycle"]
+    assert [path.name for path in (tmp_path / "gait").iterdir()] == ["gait.json"]
+
+
+def test_what_cannot_walk_leaves_no_folder(tmp_path: Path, file: str) -> None:
+    osimlite.write(pendulum(), file)
+    assert run(file, "-o", str(tmp_path / "gait")) == 2
+    assert not (tmp_path / "gait").exists()
+
+
+def test_parameters_are_of_functions_only(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    osimlite.write(pendulum(), file)
+    assert run(file, "-p", "slope=8") == 2
+    assert "takes no parameters" in capsys.readouterr().err
 
 
 def test_without_contacts(file: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -49,6 +49,20 @@ def test_parameters_and_stops(folder: Path) -> None:
     assert set(table["reason"]) <= {None, "Pelvis_ty below 0.7"} and len(table["run"]) == 4
 
 
+def test_parameters_may_be_whole_numbers_or_have_no_default(folder: Path) -> None:
+    Path("made.py").write_text(
+        "from osimlite.models.dynamic_walker import dynamic_walker\n\n\n"
+        "def make(steep, count: int = 1):\n    return dynamic_walker(slope=steep * range(3)[count])\n"
+    )
+    words = ["sweep", "made.py", "--to", "0.05", "--measure", "RHip_rz/value"]
+    assert run(*words, "--vary", "count=1:2:2", "-p", "steep=4", "-o", "count.parquet") == 0
+    assert pq.read_table("count.parquet")["status"].to_pylist() == ["done", "done"]
+    assert run(*words, "--vary", "steep=4:8:2", "-o", "steep.parquet") == 0
+    assert pq.read_table("steep.parquet")["steep"].to_pylist() == [4.0, 8.0]
+    ends = [pq.read_table(f"{name}.parquet")["RHip_rz/value"].to_pylist() for name in ("count", "steep")]
+    assert ends[0] == ends[1] and ends[0][0] != ends[0][1]
+
+
 def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
     words = [
