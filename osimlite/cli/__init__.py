@@ -111,7 +111,10 @@ def _built_in(error: OsimliteError) -> str:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exits with 0 (done), 1 (the answer is no) or 2 (could not be carried out)."""
+    """Run the command line.
+
+    Exits with 0 (done), 1 (the answer is no), 2 (could not be carried out) or 130 (interrupted).
+    """
     import warnings
 
     from osimlite.errors import DoubtfulWarning, OsimliteError

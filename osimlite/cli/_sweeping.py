@@ -98,6 +98,7 @@ def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | Non
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
     known = {name: default for name, default in parameters_of(source).items() if name not in given}
+    # The model as it is given needs a value of what has no default.
     needed = {
         name: str(ranges[name]).partition(":")[0] for name in known if known[name] is Parameter.empty and name in ranges
     }

@@ -19,11 +19,12 @@ from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare, spare_strangers
-from osimlite.sweep.run import Interrupted
+from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
 from osimlite.sweep.variables import Floats
 from osimlite.sweep.variants import Variants
+from osimlite.text import counted
 
 HISTORY, BEST, SUMMARY = "history.parquet", "best.osim", "summary.json"
 """What a search writes into its folder."""
@@ -151,9 +152,7 @@ def optimize(
         except Enough:
             ended = f"as many runs as were allowed: {evaluations.count}"
         except KeyboardInterrupt:
-            raise Interrupted(
-                f"interrupted after {partial.rows} runs, which are in '{partial.partial}'; go on with --resume"
-            ) from None
+            raise interrupted(partial, counted(partial.rows, "run")) from None
         finally:
             partial.close()
         partial.finish()

@@ -38,6 +38,13 @@ class Interrupted(OsimliteError):
     exit_code = 130
 
 
+def interrupted(partial: Partial, runs: str) -> Interrupted:
+    """What is said of a file that is not whole, after so many runs."""
+    if partial.rows == 0:
+        return Interrupted("interrupted before any run was saved")
+    return Interrupted(f"interrupted after {runs}, which are in '{partial.partial}'; go on with --resume")
+
+
 @dataclass
 class Outcome:
     """What a sweep did.
@@ -112,10 +119,7 @@ def sweep(
         try:
             _Work(samples, workforce, partial, outcome, progress).do()
         except KeyboardInterrupt:
-            raise Interrupted(
-                f"interrupted after {partial.rows} of {samples.count} runs, which are in '{partial.partial}'; "
-                "go on with --resume"
-            ) from None
+            raise interrupted(partial, f"{partial.rows} of {samples.count} runs") from None
         finally:
             partial.close()
         partial.finish()

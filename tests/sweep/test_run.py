@@ -89,6 +89,12 @@ def test_an_interrupted_sweep_goes_on(made, tmp_path):
     assert again.before == 80 and not again.status
 
 
+def test_interrupted_before_anything_was_saved(made, tmp_path):
+    with pytest.raises(Interrupted, match=r"^interrupted before any run was saved$"):
+        sweep(made, samples(made.variables, "sobol", 80, 5), tmp_path / "r.parquet", progress=Stopper(0))
+    assert not list(tmp_path.iterdir())
+
+
 def test_other_settings_are_told_apart(made, walker, tmp_path):
     path = tmp_path / "r.parquet"
     chosen = samples(made.variables, "sobol", 40, 5)
