@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -77,11 +77,16 @@ class Setter:
         return float(found if self.entry is None else found[self.entry])
 
 
-def places(model: Model, path: str) -> tuple[Place, ...]:
+def places(model: Model, path: str, others: Iterable[str] = ()) -> tuple[Place, ...]:
     """The numbers that a path means; a ``*`` in it stands for any part of a name.
 
     A path is that of a component and then the names of properties, with ``/``; entries of lists are counted from 0
     (``/bodyset/Pelvis/mass_center/1``). What stands alone in a list needs no number.
+
+    Args:
+        model: whose.
+        path: as above.
+        others: what else might have been meant.
 
     Raises:
         SettingError: there is no such number; with the nearest spelling.
@@ -105,7 +110,7 @@ def places(model: Model, path: str) -> tuple[Place, ...]:
         if found:
             return tuple(found)
         break
-    raise SettingError(f"the model has no number '{path}'{did_you_mean(path, _spellings(model))}")
+    raise SettingError(f"the model has no number '{path}'{did_you_mean(path, [*others, *_spellings(model)])}")
 
 
 def _spellings(model: Model) -> list[str]:

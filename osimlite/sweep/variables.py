@@ -184,7 +184,7 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         default = parameters[name]
         return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
     if name.startswith("/"):
-        found = places(model, name)
+        found = places(model, name, list(infos))
         unit = found[0].unit
         if unit.startswith("rad | m") and found[0].component in infos:
             unit = _unit_of(infos[found[0].component])
@@ -193,7 +193,7 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         return Slope(), "rad"
     known = [*(info.name for info in mechanism.coordinates), *parameters, "slope"]
     known += [f"{info.name}/speed" for info in mechanism.coordinates]
-    near = did_you_mean(name, known)
+    near = did_you_mean(name, known) or ("; a path begins with /" if "/" in name else "")
     raise SettingError(f"there is no coordinate, parameter or path '{name}' to vary{near}")
 
 

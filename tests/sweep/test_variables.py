@@ -84,8 +84,10 @@ def test_units():
     [
         ("RHip_rx", "RHip_rz"),
         ("RHip_rz/sped", "RHip_rz/speed"),
+        ("RHip_rx/speed", "RHip_rz/speed"),
         ("slpe", "slope"),
         ("thigh_lenght", "thigh_length"),
+        ("/jointset/RightThigToPelvis/RHip_rz", "/jointset/RightThighToPelvis/RHip_rz"),
         ("/bodyset/Pelvis/mas", "/bodyset/Pelvis/mass"),
         ("/bodyset/Plvis/mass", "/bodyset/Pelvis/mass"),
         ("/forceset/RFotForce/contact_parameters/stiffnes", "/forceset/RFootForce/contact_parameters/stiffness"),
@@ -94,6 +96,11 @@ def test_units():
 def test_the_nearest_spelling_is_told(name, near):
     with pytest.raises(SettingError, match=f"did you mean '{near}'"):
         one(name, parameters={"thigh_length": 0.4})
+
+
+def test_a_path_without_its_slash_is_told():
+    with pytest.raises(SettingError, match="'bodyset/Pelvis/mass' to vary; a path begins with /"):
+        one("bodyset/Pelvis/mass")
 
 
 @pytest.mark.parametrize(
