@@ -42,7 +42,10 @@ Planted = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option(
-        min=1, metavar="N", help="How many processes work here.", show_default="one for each core of this machine"
+        min=1,
+        metavar="N",
+        help="How many threads or processes work here.",
+        show_default="one for each core of this machine",
     ),
 ]
 Cluster = Annotated[

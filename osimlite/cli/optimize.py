@@ -80,8 +80,7 @@ def optimize(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, is_planted=planted, feet=tuple(foot) if foot else None,
-        skip_unsupported=skip_unsupported,
+        accuracy=accuracy, is_planted=planted, feet=tuple(foot) if foot else None, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
         found = search(
@@ -95,6 +94,8 @@ def optimize(
 def _table(objective: str, found: Optimum) -> Any:
     from rich.table import Table
 
+    from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY
+
     table = Table(title=f"{objective} {found.value:.6g}", title_justify="left", show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
@@ -102,5 +103,5 @@ def _table(objective: str, found: Optimum) -> Any:
         table.add_row(name, f"{value:.6g}")
     table.add_row("runs", f"{found.evaluations}, the best was number {found.evaluation}")
     table.add_row("ended", found.ended)
-    table.add_row("files", f"{found.model}, {found.history}")
+    table.add_row("files", ", ".join(str(found.model.with_name(name)) for name in (BEST, HISTORY, SUMMARY)))
     return table

@@ -225,7 +225,7 @@ def follow(
             continue
         here = float(along[places[name]])
         others = [float(along[foot].max()) for other, foot in enumerate(feet) if other != number and down[other]]
-        # With no foot on the ground, the one that touched it last is what the step is measured from.
+        # With no foot on the ground, the one that made the last step is what the step is measured from.
         behind = max(others) if others else float(along[feet[last]].max()) if 0 <= last != number else here
         length, air = here - behind, time - lifted[number]
         if first_place is None:

@@ -23,7 +23,6 @@ from osimlite.sweep.variables import Floats
 MOST_LOSSES = 20
 """A task that was lost with its worker so often is not tried again."""
 
-
 PATIENCE = 30
 """So long a cluster may take to have its first worker, s."""
 
