@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from rich.console import Console
-
+from osimlite.cli._console import plain_console
 from osimlite.document.reader import read
 from osimlite.errors import OsimliteError
 from osimlite.files import make_folder
@@ -39,7 +38,7 @@ def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Pa
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]
         write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
         names.append("markers.trc")
-    console = Console(highlight=False, soft_wrap=True)
+    console = plain_console(highlight=False, soft_wrap=True)
     if recorded.missing:
         console.print(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
     if recorded.ignored:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
+from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.sweep.gaits import Gait
@@ -57,8 +58,6 @@ def find_gait(
     Example: osimlite find-gait walker.osim --vary '/bodyset/*Shank/inertia/2=0.02:1:log' --vary RHip_rz=-30deg:60deg
     --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary LHip_rz/speed=-4:4
     """
-    from rich.console import Console
-
     from osimlite.cli._progress import progress_bars
     from osimlite.sweep.gaits import find_gait as search
 
@@ -66,32 +65,27 @@ def find_gait(
     with progress_bars() as stage:
         gait = search(
             plan, output, feet=foot, samples=samples, tries=tries, enough=enough, budget=budget, stable=stable,
-            perturb=perturb, digits=digits, start_digits=start_digits, seed=seed, force=force,
-            stage=stage,
+            perturb=perturb, digits=digits, start_digits=start_digits, seed=seed, force=force, stage=stage,
         )  # fmt: skip
-    Console().print(_table(gait))
+    _told(gait).show()
     if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
         raise typer.Exit(1)
 
 
-def _table(gait: Gait) -> Any:
-    from rich.table import Table
-
+def _told(gait: Gait) -> Facts:
     from osimlite.text import counted, listed
 
     cycle, walk = gait.found.cycle, gait.walk
     stable = "stable" if cycle.largest < 1.0 else "not stable"
-    table = Table(title=f"{stable}: largest multiplier {cycle.largest:.4g}", title_justify="left", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
+    facts = Facts(f"{stable}: largest multiplier {cycle.largest:.4g}")
     for name, number in gait.found.numbers.items():
-        table.add_row(name, f"{number:.6g}")
-    table.add_row("step length", f"{cycle.length:.6g} m")
-    table.add_row("period", f"{cycle.period:.6g} s")
+        facts.add(name, f"{number:.6g}")
+    facts.add("step length", f"{cycle.length:.6g} m")
+    facts.add("period", f"{cycle.period:.6g} s")
     end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
     done = f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
-    table.add_row("walk", done)
-    table.add_row("near it", f"{gait.found.walking:.0%} walk")
-    table.add_row("search", f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found")
-    table.add_row("files", listed([str(path) for path in gait.files]))
-    return table
+    facts.add("walk", done)
+    facts.add("near it", f"{gait.found.walking:.0%} walk")
+    facts.add("search", f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found")
+    facts.add("files", listed([str(path) for path in gait.files]))
+    return facts

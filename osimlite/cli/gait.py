@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from osimlite.cli import _options as options
+from osimlite.cli._console import Facts
 from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
@@ -72,8 +73,6 @@ def gait(
 
     Example: osimlite gait steady-walker --perturb 0.05 --basin -o gait
     """
-    from rich.console import Console
-
     from osimlite._require import require
     from osimlite.files import folder_to_fill
     from osimlite.gait.basin import basin_places, find_basin, perturbed, walks_from
@@ -109,7 +108,7 @@ def gait(
                         step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
                     )
         files = _write(where, found, pictures) if where else []
-    Console().print(_table(found, files))
+    _told(found, files).show()
     if cycle is None:
         raise typer.Exit(1)
 
@@ -184,44 +183,40 @@ def _walk(
     return found, step_map
 
 
-def _table(found: Found, files: Sequence[Path]) -> Any:
-    from rich.table import Table
-
+def _told(found: Found, files: Sequence[Path]) -> Facts:
     from osimlite.simulation.elements import by_class
     from osimlite.text import counted
 
     walk, cycle = found.walk, found.cycle
-    table = Table(title=found.model, title_justify="left", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
+    facts = Facts(found.model)
     end = f"fell on {walk.fell_on} after {walk.end:.4g} s" if walk.fell_on else f"{walk.ending} after {walk.end:.4g} s"
-    table.add_row(
+    facts.add(
         "walk",
         f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}, {walk.distance:.4g} m; {end}",
     )
     if cycle is None:
-        table.add_row("cycle", found.why_not)
+        facts.add("cycle", found.why_not)
     else:
-        table.add_row("step length", f"{cycle.length:.6g} m")
-        table.add_row("period", f"{cycle.period:.6g} s" + (" (mean of the two steps)" if cycle.per_stride else ""))
-        table.add_row("speed", f"{cycle.speed:.6g} m/s")
+        facts.add("step length", f"{cycle.length:.6g} m")
+        facts.add("period", f"{cycle.period:.6g} s" + (" (mean of the two steps)" if cycle.per_stride else ""))
+        facts.add("speed", f"{cycle.speed:.6g} m/s")
         if cycle.scuffs:
-            table.add_row("scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}")
+            facts.add("scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}")
         stable = "stable" if cycle.largest < 1.0 else "not stable"
-        table.add_row("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
+        facts.add("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
-        table.add_row("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
-        table.add_row("fixed point", f"to {cycle.residual:.2g} after {counted(cycle.iterations, 'step')} of Newton")
+        facts.add("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
+        facts.add("fixed point", f"to {cycle.residual:.2g} after {counted(cycle.iterations, 'step')} of Newton")
     for near in found.nearby:
-        table.add_row(f"within {near.part:.0%}", f"{near.walked} of {near.starts} starts make {near.steps} steps")
+        facts.add(f"within {near.part:.0%}", f"{near.walked} of {near.starts} starts make {near.steps} steps")
     if found.basin is not None:
         basin = found.basin
-        table.add_row("basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps")
+        facts.add("basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps")
     for skipped in by_class(found.skipped):
-        table.add_row("left out", skipped)
+        facts.add("left out", skipped)
     if files:
-        table.add_row("files", ", ".join(str(path) for path in files))
-    return table
+        facts.add("files", ", ".join(str(path) for path in files))
+    return facts
 
 
 def _write(folder: Path, found: Found, pictures: bool) -> list[Path]:

@@ -25,9 +25,9 @@ def info(
 
     Example: osimlite info gait2392.osim
     """
-    from rich.console import Console
     from rich.table import Table
 
+    from osimlite.cli._console import plain_console
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
     from osimlite.schema.coordinates import Coordinate
@@ -40,7 +40,7 @@ def info(
     muscles = sum(is_a(component, "Muscle") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
 
-    console = Console()
+    console = plain_console()
     facts = Table(show_header=False, box=None, pad_edge=False)
     facts.add_column(style="bold")
     facts.add_column(overflow="fold")
@@ -64,17 +64,17 @@ def info(
     console.print(facts)
 
     if any(joint.coordinates for joint in model.components(Joint)):
-        console.print("\n[bold]Coordinates[/bold]: default, range")
+        console.print("\n[bold]Coordinates[/bold]: default, range", markup=True)
         for line in _coordinates(model):
             # A name is never broken, however narrow the terminal is.
-            console.print(line, soft_wrap=True, highlight=False, markup=False)
+            console.print(line, soft_wrap=True, highlight=False)
 
     counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in components)
     shown = counts.most_common(None if every_class else 15)
     # A count stays with its class.
     listed = ", ".join(f"{count}\0{name}" for name, count in shown)
     text = textwrap.fill(f"Classes: {listed}", console.width, subsequent_indent="  ", break_long_words=False)
-    console.print("\n" + text.replace("\0", " "), soft_wrap=True, highlight=False, markup=False)
+    console.print("\n" + text.replace("\0", " "), soft_wrap=True, highlight=False)
     if len(counts) > len(shown):
         console.print(f"and {len(counts) - len(shown)} classes more (--all lists them)", highlight=False)
 

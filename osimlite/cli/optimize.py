@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
+from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.sweep.optimize import Optimum
@@ -72,8 +73,6 @@ def optimize(
 
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
     """
-    from rich.console import Console
-
     from osimlite.cli._progress import progress_bar
     from osimlite.sweep.optimize import Objective
     from osimlite.sweep.optimize import optimize as search
@@ -88,20 +87,16 @@ def optimize(
             sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, force=force,
             workers=workers, cluster=cluster, progress=progress,
         )  # fmt: skip
-    Console().print(_table(objective, found))
+    _told(objective, found).show()
 
 
-def _table(objective: str, found: Optimum) -> Any:
-    from rich.table import Table
-
+def _told(objective: str, found: Optimum) -> Facts:
     from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY
 
-    table = Table(title=f"{objective} {found.value:.6g}", title_justify="left", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
+    facts = Facts(f"{objective} {found.value:.6g}")
     for name, value in found.values.items():
-        table.add_row(name, f"{value:.6g}")
-    table.add_row("runs", f"{found.evaluations}, the best was number {found.evaluation}")
-    table.add_row("ended", found.ended)
-    table.add_row("files", ", ".join(str(found.model.with_name(name)) for name in (BEST, HISTORY, SUMMARY)))
-    return table
+        facts.add(name, f"{value:.6g}")
+    facts.add("runs", f"{found.evaluations}, the best was number {found.evaluation}")
+    facts.add("ended", found.ended)
+    facts.add("files", ", ".join(str(found.model.with_name(name)) for name in (BEST, HISTORY, SUMMARY)))
+    return facts

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from osimlite.cli import _options as options
+from osimlite.cli._console import Facts
 from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
@@ -53,8 +54,6 @@ def simulate(
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """
-    from rich.console import Console
-
     from osimlite._require import require
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError
@@ -94,7 +93,7 @@ def simulate(
                 progress=progress,
             )
     files = _write(model, trajectory, output, plot=plot, animate=animate)
-    Console().print(_table(trajectory, files))
+    _told(trajectory, files).show()
 
 
 PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}
@@ -138,21 +137,17 @@ def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, an
     return [folder / path.name for path in written]
 
 
-def _table(trajectory: Trajectory, files: Sequence[Path]) -> Any:
-    from rich.table import Table
-
+def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
     from osimlite.simulation.elements import by_class
 
     summary = trajectory.summary
-    table = Table(title=f"{summary['model']}, {trajectory.times[-1]:g} s", title_justify="left", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
-    table.add_row("engine", f"{summary['engine']}, {summary['route']}, {summary['integrator']}")
+    facts = Facts(f"{summary['model']}, {trajectory.times[-1]:g} s")
+    facts.add("engine", f"{summary['engine']}, {summary['route']}, {summary['integrator']}")
     tried = summary["attempted_steps"]
-    table.add_row("steps", f"{summary['steps']} of {tried} tried, {summary['evaluations']} evaluations of the forces")
-    table.add_row("time taken", f"{summary['wall_time_s']:.3g} s")
+    facts.add("steps", f"{summary['steps']} of {tried} tried, {summary['evaluations']} evaluations of the forces")
+    facts.add("time taken", f"{summary['wall_time_s']:.3g} s")
     first, last = (summary["energy_J"][when]["total"] for when in ("start", "end"))
-    table.add_row("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")
+    facts.add("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")
     for name, largest in summary["largest_contact_forces"].items():
         times = [
             f"{'on' if event['event'] == 'begin' else 'off'} {event['time_s']:.4g}"
@@ -162,8 +157,8 @@ def _table(trajectory: Trajectory, files: Sequence[Path]) -> Any:
         # The unit follows the last time.
         shown = ", ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
         size, when = largest["force_N"], largest["time_s"]
-        table.add_row(name, f"at most {size:.4g} N ({when:.4g} s)" + (f"; {shown}" if times else ""))
+        facts.add(name, f"at most {size:.4g} N ({when:.4g} s)" + (f"; {shown}" if times else ""))
     for skipped in by_class(summary["skipped_forces"]):
-        table.add_row("left out", skipped)
-    table.add_row("files", ", ".join(str(path) for path in files))
-    return table
+        facts.add("left out", skipped)
+    facts.add("files", ", ".join(str(path) for path in files))
+    return facts

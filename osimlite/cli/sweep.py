@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
+from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.sweep.plan import Plan
@@ -67,8 +68,6 @@ def sweep(
 
     Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1 --samples 1000
     """
-    from rich.console import Console
-
     from osimlite.cli._progress import progress_bar
     from osimlite.sweep.run import sweep as run
     from osimlite.sweep.sampling import samples as choose
@@ -83,38 +82,34 @@ def sweep(
         outcome = run(
             plan, chosen, output, resume=resume, force=force, workers=workers, cluster=cluster, progress=progress
         )
-    Console().print(_table(plan, outcome))
+    _told(plan, outcome).show()
     if outcome.status["failed"] == outcome.count:
         print("osimlite: every run failed", file=sys.stderr)
         raise typer.Exit(1)
 
 
-def _table(plan: Plan, outcome: Outcome) -> Any:
-    from rich.table import Table
-
+def _told(plan: Plan, outcome: Outcome) -> Facts:
     from osimlite.sweep.measures import measure_name
     from osimlite.sweep.results import ranges
     from osimlite.text import counted
 
-    table = Table(title=counted(outcome.count, "run"), title_justify="left", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
+    facts = Facts(counted(outcome.count, "run"))
     new = sum(outcome.status.values())
     if outcome.before:
-        table.add_row("there before", str(outcome.before))
+        facts.add("there before", str(outcome.before))
     if new:
-        table.add_row("time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second")
-        table.add_row("ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common()))
+        facts.add("time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second")
+        facts.add("ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common()))
     told = outcome.reasons.most_common(3)
     for reason, count in told:
-        table.add_row("failed", f"{counted(count, 'run')}: {reason}")
+        facts.add("failed", f"{counted(count, 'run')}: {reason}")
     if others := outcome.status["failed"] - sum(count for _, count in told):
-        table.add_row("failed", f"{counted(others, 'run')} for other reasons; the column 'reason' has them all")
+        facts.add("failed", f"{counted(others, 'run')} for other reasons; the column 'reason' has them all")
     for name, found in ranges(outcome.path, [measure_name(spec) for spec in plan.measures]).items():
-        table.add_row(
+        facts.add(
             name,
             f"{found.least:.6g} (run {found.run_of_least}) to {found.most:.6g} (run {found.run_of_most}), "
             f"mean {found.mean:.6g}",
         )
-    table.add_row("file", str(outcome.path))
-    return table
+    facts.add("file", str(outcome.path))
+    return facts

@@ -50,8 +50,7 @@ def translate(
     """
     from typing import cast
 
-    from rich.console import Console
-
+    from osimlite.cli._console import plain_console
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError
     from osimlite.translate.export import Limits, to_urdf
@@ -72,7 +71,7 @@ def translate(
     )
     written = urdf.write(output)
 
-    console = Console()
+    console = plain_console()
     if len(urdf.fidelity):
         console.print(_table(urdf.fidelity))
     robot = urdf.robot

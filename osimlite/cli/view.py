@@ -61,8 +61,7 @@ def view(
 
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
-    from rich.console import Console
-
+    from osimlite.cli._console import plain_console
     from osimlite.document.reader import read
     from osimlite.meshes.folders import geometry_folders
     from osimlite.multibody import build_mechanism
@@ -73,9 +72,9 @@ def view(
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
     folders = geometry_folders(file.parent, options.mesh_folders(file, geometry))
     shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
-    console = Console(highlight=False, soft_wrap=True)
+    console = plain_console(highlight=False, soft_wrap=True)
     for remark in shown.remarks:
-        console.print(remark, markup=False)
+        console.print(remark)
     if page is not None:
         console.print(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
     if screenshot is not None:

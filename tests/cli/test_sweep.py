@@ -135,6 +135,28 @@ def test_degrees_that_are_taken_for_radians_are_doubted(folder: Path, capsys: py
     assert all(line.startswith("osimlite: warning: ") for line in told)
 
 
+def test_what_looks_like_markup_is_shown_as_it_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.py").write_text("def picky(run):\n    raise ValueError('[/x] is no [red] :bug:')\n")
+    assert (
+        run(
+            "sweep", "walker.osim", "--vary", "RHip_rz=0:1:2", "--to", "0.05", "--measure", "own.py:picky", "-o", "a[b]"
+        )
+        == 1
+    )
+    shown = " ".join(word for word in capsys.readouterr().out.split() if word != "│")
+    assert "ValueError: [/x] is no [red] :bug:" in shown and "a[b]" in shown
+
+
+def test_long_names_are_shown_whole(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+    paths = [f"/forceset/{side}FootForce/contact_parameters/static_friction" for side in "RL"]
+    ranges = [word for path in paths for word in ("--vary", f"{path}=0.5:0.9")]
+    assert run("optimize", "walker.osim", "--objective", "distance", "--to", "0.05", "--budget", "2", *ranges) == 0
+    rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if "│" in line]
+    names = "".join(row[1].strip() for row in rows)
+    assert all(path in names for path in paths) and "…" not in names
+
+
 def test_a_sweep_of_failures_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("sweep", "walker.osim", "--vary", "/bodyset/Pelvis/mass=-3:-1:3", "--to", "0.05") == 1
     told = capsys.readouterr()
