@@ -73,6 +73,10 @@ SEVERAL = {
     ),
     "scaled spline": Coupler(0, (10,), f.Scaled(-1.5, f.SimmSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3)))),
     "angle of a ball": Prescribed(7, f.Sine(0.4, 3.0, 0.2, 0.1)),
+    "polynomial of time": Prescribed(3, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2)),
+    "polynomial of time as OpenSim": Prescribed(
+        3, f.Scaled(0.7, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2, opensim_derivatives=True))
+    ),
     "the same one twice": Coupler(6, (9, 9), f.WeightedSum((0.4, 0.3), 0.1)),
 }
 

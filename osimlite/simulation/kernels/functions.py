@@ -27,9 +27,10 @@ from osimlite.simulation.kernels.layout import (
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
-PIECES, SINE, STEP, MONOMIALS, MONOMIALS_OF_OPENSIM, ARC = 0, 1, 2, 3, 4, 5
-"""Kinds: polynomials between knots, a sine, a smooth step, a sum of products of powers of several arguments; the same
-with what OpenSim 4.6 takes for its second derivatives, which is the gradient in every column; the end of a bent rod."""
+PIECES, SINE, STEP, PIECES_OF_OPENSIM, MONOMIALS, MONOMIALS_OF_OPENSIM, ARC = 0, 1, 2, 3, 4, 5, 6
+"""Kinds: polynomials between knots, a sine, a smooth step; from MONOMIALS on those of several arguments, a sum of
+products of their powers, and the end of a bent rod. Those of OpenSim have what OpenSim 4.6 takes for the second
+derivatives of a MultivariatePolynomialFunction, which is the gradient in every column."""
 
 
 def function_table(function: f.Function, where: str) -> list[float]:
@@ -74,7 +75,8 @@ def table_of_one(function: f.Function, where: str) -> list[float]:
         coefficients = [0.0] * (1 + max(power for (power,) in function.powers))
         for (power,), coefficient in zip(function.powers, function.coefficients, strict=True):
             coefficients[power] += coefficient
-        function = f.Polynomial(tuple(reversed(coefficients)))
+        kind, *rest = function_table(f.Polynomial(tuple(reversed(coefficients))), where)
+        return [PIECES_OF_OPENSIM if function.opensim_derivatives else kind, *rest]
     return function_table(function, where)
 
 
@@ -133,7 +135,7 @@ def value_at(table: Floats, z: float) -> tuple[float, float, float]:
             curvature = curvature * t + slope
             slope = slope * t + value
             value = value * t + piece[k]
-        curvature *= 2.0
+        curvature = slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
     return factor * value, factor * slope, factor * curvature
 
 

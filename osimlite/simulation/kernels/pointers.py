@@ -1,6 +1,6 @@
 """Two operations on vectors that machine code has and Python has not, each with what it means in Python.
 
-:mod:`osimlite.simulation.engines.machine_code` puts instructions in the place of these functions.
+:mod:`osimlite.simulation.engines.compiler` puts instructions in the place of these functions.
 """
 
 from __future__ import annotations
