@@ -32,6 +32,7 @@ from osimlite.multibody.joints import (
 from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
 from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.multibody.spatial import offset
+from osimlite.schema.functions import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
 
@@ -339,6 +340,22 @@ def test_massless_motion_is_refused():
     model.add(pin.between(model.ground, model.add(Body(name="b", mass=1.0))))
     with pytest.raises(SimulationError, match="'turn' moves no mass"):
         osimlite.simulate(model, to=1.0, engine="compiled")
+
+
+def test_why_there_is_no_step_is_told_late_too():
+    """Where the shortest steps are hardly longer than the rounding of the time."""
+    model = Model(name="m")
+    coordinate = Coordinate(name="turn", prescribed=True)
+    coordinate.prescribed_function = PiecewiseConstantFunction(x=(0.0, 5.5), y=(0.1, 0.4))
+    pin = osimlite.PinJoint(name="j", coordinates=[coordinate])
+    body = model.add(Body(name="b", mass=1.0, mass_center=(0, -0.1, 0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
+    model.add(pin.between(model.ground, body))
+    messages = []
+    for engine in ("compiled", "bullet"):
+        with pytest.raises(SimulationError, match=r"at t = 5\.5 s: even its smallest step of 4\.\d*e-15 s") as error:
+            osimlite.simulate(model, to=6.0, engine=engine)
+        messages.append(str(error.value))
+    assert messages[0] == messages[1]
 
 
 def test_singular_ball_is_refused():

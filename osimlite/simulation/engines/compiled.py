@@ -344,6 +344,8 @@ class CompiledMerson(RungeKuttaMerson):
     def _explain(self) -> None:
         """Raise the error that the steps in Python end with, from where the compiled ones ended."""
         self.derivative = self._evaluate(self.time, self.state)
+        # A step that failed has made the next one shorter than the shortest, and the time might not move with it.
+        self._next_step = max(self._next_step, 4.0 * 2.0**-52 * max(1.0, abs(self.time)))
         for _ in range(100):
             super().step()
         raise SimulationError(f"the motion cannot be computed beyond t = {self.time:.9g} s; ask for more accuracy")
