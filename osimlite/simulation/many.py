@@ -8,11 +8,12 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.engines.batch import NO_LIMIT, Batch
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.machine_code import entry_point
@@ -67,6 +68,7 @@ def run_many(
         threads: how many work; by default one for each core.
 
     Raises:
+        SettingError: a setting has no meaning.
         OsimliteError: the shapes do not fit, or a watch names nothing or a locked coordinate.
         ModelError: a watch names what does not exist.
     """
@@ -74,6 +76,7 @@ def run_many(
     size = 2 * len(engine.order)
     if starts.ndim != 2 or starts.shape[1] != size:
         raise OsimliteError(f"the states are one row of {size} numbers for each run; got {starts.shape}")
+    _check_settings(to, accuracy, report_times, most_events, most_tries, threads)
     vectors, count = _rows(engine, numbers), len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
         raise OsimliteError(
@@ -113,6 +116,25 @@ def run_many(
         batch.peaks,
         at_events,
     )
+
+
+def _check_settings(
+    to: float, accuracy: float, report_times: Sequence[float], most_events: int, most_tries: int, threads: int | None
+) -> None:
+    """SettingError for what has no meaning; the machine code might go on with it forever."""
+    if not 0.0 < accuracy < 1.0:
+        raise SettingError(f"the accuracy must lie between 0 and 1; {accuracy} does not")
+    if not to >= 0.0:
+        raise SettingError(f"the runs end at a time that is not negative, not at {to} s")
+    if not all(one <= other for one, other in pairwise([0.0, *report_times])):
+        raise SettingError("the report times do not increase from 0 on; sort them")
+    for number, least, what in (
+        (1 if threads is None else threads, 1, "threads"),
+        (most_events, 0, "most_events"),
+        (most_tries, 0, "most_tries"),
+    ):
+        if number < least:
+            raise SettingError(f"{what} is at least {least}, not {number}")
 
 
 def contact_places(

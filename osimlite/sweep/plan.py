@@ -182,6 +182,8 @@ def plan(
     for name, value in (("to", made.to), ("accuracy", made.accuracy), ("report_interval", made.report_interval)):
         if value is not None and not (isfinite(value) and value > 0.0):
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
+    if made.accuracy >= 1.0:
+        raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
     named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))
     given = (_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops)
     return replace(made, stops=(*given, *named))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import ModelError, OsimliteError
+from osimlite.errors import ModelError, OsimliteError, SettingError
 from osimlite.simulation import Simulation
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
@@ -145,3 +145,25 @@ def test_a_touch_ends_a_run(engine, starts):
         begins = [moment for moment, name, _ in events if name == "RHipForce"]
         assert begins == (pytest.approx([t], abs=2e-9) if end == "stopped" else [])
         assert [event for event in events if event[1] == "down"] == ([(t, "down", True)] if begins else [])
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        ({"accuracy": float("nan")}, "between 0 and 1; nan"),
+        ({"accuracy": 0.0}, "between 0 and 1; 0.0"),
+        ({"accuracy": 2.0}, "between 0 and 1; 2.0"),
+        ({"to": float("nan")}, "not negative, not at nan s"),
+        ({"to": -1.0}, "not negative, not at -1.0 s"),
+        ({"report_times": [0.5, 0.1]}, "do not increase"),
+        ({"report_times": [-0.1]}, "do not increase"),
+        ({"report_times": [float("nan")]}, "do not increase"),
+        ({"threads": -1}, "threads is at least 1, not -1"),
+        ({"most_events": -1}, "most_events is at least 0"),
+        ({"most_tries": -1}, "most_tries is at least 0"),
+    ],
+)
+def test_settings_without_meaning_are_refused(engine, starts, settings, why):
+    """The machine code would go on with some of them forever."""
+    with pytest.raises(SettingError, match=why):
+        run_many(engine, starts[:1], **{"to": 0.1, **settings})

@@ -265,6 +265,8 @@ def test_degrees_taken_for_radians_are_warned_of(walker):
 def test_what_is_wrong_is_said_before_anything_runs(walker):
     with pytest.raises(SettingError, match="'to' is a positive number"):
         plan(walker, {"RHip_rz": (0.0, 1.0)}, to=-1.0)
+    with pytest.raises(SettingError, match="'accuracy' is less than 1, not 2"):
+        plan(walker, {"RHip_rz": (0.0, 1.0)}, accuracy=2.0)
     with pytest.raises(SettingError, match="did you mean 'distance'"):
         Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, measures=("distanz",)))
     with pytest.raises(OsimliteError, match="no engine"):
