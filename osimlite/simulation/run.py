@@ -248,6 +248,10 @@ class Simulation:
                     raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
                 row[place] = float(value)
                 places[-1].append(place)
+        for what, row in (("value", q), ("speed", u)):
+            for info, number in zip(infos, row, strict=True):
+                if not isfinite(number):
+                    raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
         if self.constraints:
             # To find the nearest pose can take as long as the motion: the same start is not looked for again.
             start = (q, u, places)

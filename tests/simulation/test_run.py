@@ -207,6 +207,16 @@ def test_a_parameter_that_is_no_number(fixtures):
         osimlite.simulate(model)
 
 
+@pytest.mark.parametrize(("field", "what"), [("default_value", "value"), ("default_speed_value", "speed")])
+def test_a_start_that_is_no_number(pendulum, field, what):
+    coordinate = next(item for item in pendulum.components(osimlite.Coordinate) if item.name == "swing")
+    setattr(coordinate, field, float("nan"))
+    with pytest.raises(
+        SimulationError, match=f"default {what} of coordinate '/jointset/.*/swing' is nan; give a number"
+    ):
+        osimlite.simulate(pendulum)
+
+
 def test_constraint_is_refused(pendulum):
     pendulum.add(osimlite.CoordinateCouplerConstraint(name="coupler"))
     with pytest.raises(OsimliteError, match="coupler"):
