@@ -239,7 +239,8 @@ def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
             engine,
             batch.runs.reports[k, :kept],
         )
-        found.append(function(run))
+        # What a function forgets to return would become no number, silently.
+        found.append(float(function(run)))
     return found
 
 

@@ -18,7 +18,7 @@ from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import KEY, Partial, partial_of, schema, spare, spare_strangers
+from osimlite.sweep.results import KEY, Partial, local, partial_of, schema, spare, spare_strangers
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
@@ -184,7 +184,7 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
         spare(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        before = pq.read_table(path)
+        before = pq.read_table(local(path))
         if resume:
             partial = Partial(path, table)
             for batch in before.to_batches():
@@ -224,7 +224,7 @@ class _Evaluations:
         self.count = self.batches = 0
         self.worst = 0.0
         self.best: tuple[float, int, list[float]] | None = None
-        self.reasons: list[str] = []
+        self.reason: str | None = None
         self._history: list[tuple[list[float], str, float]] = []
 
     def remember(self, batch: Any) -> None:
@@ -232,10 +232,15 @@ class _Evaluations:
         columns = batch.to_pydict()
         values = [columns[item.name] for item in self.plan.variables]
         found = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
-        self.reasons += [word for word in columns["reason"] if word][: 10 - len(self.reasons)]
+        self._note(columns["status"], columns["reason"])
         self._history += [(list(row), status, value) for row, status, value in found]
         # What is there is not forgotten, even if fewer runs are asked for now.
         self.budget = max(self.budget, len(self._history))
+
+    def _note(self, status: Sequence[str], reasons: Sequence[str | None]) -> None:
+        """Keep the first reason of a failure."""
+        failed = (why for word, why in zip(status, reasons, strict=True) if word == FAILED)
+        self.reason = self.reason or next(failed, None)
 
     def ask(self, points: Floats) -> Floats:
         """Costs (k,) of points (k, d) of the cube of the free variables; of those that the budget allows at least."""
@@ -257,7 +262,8 @@ class _Evaluations:
             known = known + self._run(rest, self.count + len(known))
         costs = [self._cost(status, value) for _, status, value in known]
         for number, (cost, row) in enumerate(zip(costs, values.tolist(), strict=True)):
-            if known[number][1] != FAILED and (self.best is None or cost < self.best[0]):
+            _, status, value = known[number]
+            if status != FAILED and isfinite(value) and (self.best is None or cost < self.best[0]):
                 self.best = cost, self.count + number, row
         self.count += len(points)
         self.batches += 1
@@ -296,7 +302,7 @@ class _Evaluations:
                 *measures.values(),
             ]
         )
-        self.reasons += [word for word in reasons if word][: 10 - len(self.reasons)]
+        self._note(status, reasons)
         return list(zip(values.tolist(), status, measures[self.objective].tolist(), strict=True))
 
 
@@ -304,7 +310,9 @@ def _finish(
     where: Path, plan: Plan, variants: Variants, evaluations: _Evaluations, wanted: dict[str, Any], ended: str
 ) -> Optimum:
     if evaluations.best is None:
-        raise SimulationError(f"no run came to its end: {evaluations.reasons[0]}")
+        if evaluations.reason:
+            raise SimulationError(f"no run came to its end: {evaluations.reason}")
+        raise SimulationError(f"'{wanted['objective']}' is not a finite number in any run")
     cost, number, row = evaluations.best
     variants.put(row)
     variants.set_start(row)

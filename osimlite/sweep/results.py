@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite._require import require
-from osimlite.errors import OsimliteError, SettingError
+from osimlite.errors import MissingFileError, OsimliteError, SettingError
 from osimlite.text import listed
 
 KEY = b"osimlite"
@@ -48,6 +48,11 @@ def _arrow() -> Any:
     return require("pyarrow", extra="sweep", purpose="a table of results")
 
 
+def local(path: str | Path) -> str:
+    """A path of which pyarrow does not think that what is before a colon is the name of a protocol."""
+    return os.path.abspath(path)
+
+
 def schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
     """Of a table: type of each column by its name ("int64", "float64" or "string"), and the settings."""
     pa = _arrow()
@@ -59,11 +64,14 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     """The settings that a Parquet file of results was made with.
 
     Raises:
+        MissingFileError: there is no such file.
         OsimliteError: the file is none of osimlite's results.
     """
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
+    if not Path(path).exists():
+        raise MissingFileError("cannot read the file: no such file", file=str(path))
     try:
-        found: dict[str, Any] = json.loads((pq.read_schema(path).metadata or {})[KEY])
+        found: dict[str, Any] = json.loads((pq.read_schema(local(path)).metadata or {})[KEY])
     except (KeyError, ValueError):
         # What is no Parquet is an ArrowInvalid, a ValueError.
         raise OsimliteError("this file is not the results of a sweep; give them another name", file=str(path)) from None
@@ -193,7 +201,7 @@ class Partial:
         beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         waiting: list[Any] = []
         try:
-            with pq.ParquetWriter(beside, self.schema) as writer:
+            with pq.ParquetWriter(local(beside), self.schema) as writer:
 
                 def put(least: int) -> None:
                     table = pa.Table.from_batches(waiting, self.schema)
@@ -297,7 +305,7 @@ def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     found: dict[str, Range] = {}
     counts = dict.fromkeys(names, 0)
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(local(path)) as file:
         for batch in file.iter_batches(columns=["run", *names]):
             runs = batch.column("run").to_numpy()
             for name in names:

@@ -137,12 +137,8 @@ def test_degrees_that_are_taken_for_radians_are_doubted(folder: Path, capsys: py
 
 def test_what_looks_like_markup_is_shown_as_it_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("own.py").write_text("def picky(run):\n    raise ValueError('[/x] is no [red] :bug:')\n")
-    assert (
-        run(
-            "sweep", "walker.osim", "--vary", "RHip_rz=0:1:2", "--to", "0.05", "--measure", "own.py:picky", "-o", "a[b]"
-        )
-        == 1
-    )
+    words = ["sweep", "walker.osim", "--vary", "RHip_rz=0:1:2", "--to", "0.05"]
+    assert run(*words, "--measure", "own.py:picky", "-o", "a[b]") == 1
     shown = " ".join(word for word in capsys.readouterr().out.split() if word != "│")
     assert "ValueError: [/x] is no [red] :bug:" in shown and "a[b]" in shown
 

@@ -95,6 +95,15 @@ def picky(run):
     return 2.0
 
 
+def forgetful(run):
+    """Returns nothing."""
+
+
+def test_a_function_that_returns_nothing_fails(walker):
+    block = Runner(plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=(forgetful,), to=0.1)).run(ROWS)
+    assert block.status == ["failed"] * len(ROWS) and "TypeError" in block.reasons[0]
+
+
 def test_functions_of_ones_own(walker, tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text("def drop(run):\n    return run.start['Pelvis_ty'] - run.end['Pelvis_ty']\n")
     monkeypatch.chdir(tmp_path)

@@ -163,6 +163,26 @@ def test_functions_are_made_small_and_names_large_or_small(made, tmp_path):
     assert most.value == max(pq.read_table(most.history).to_pydict()["largest_force"])
 
 
+def endless(run):
+    """No number that could be the best, but for one run in the middle."""
+    return float("nan") if abs(run.values["Pelvis_tx/speed"] - 1.0) > 0.5 else run.values["Pelvis_tx/speed"]
+
+
+def never(run):
+    """No number at all."""
+    return float("inf")
+
+
+def test_only_a_finite_number_is_the_best(made, walker, tmp_path):
+    best = optimize(made, Objective(endless), tmp_path / "a", budget=40, popsize=8, method="sobol-cma")
+    assert 0.5 <= best.value <= 1.5 and best.values["Pelvis_tx/speed"] == best.value
+    with pytest.raises(SimulationError, match="never' is not a finite number in any run"):
+        optimize(made, Objective(never), tmp_path / "b", budget=8, popsize=8)
+    stopped = plan(walker, VARY, to=0.5, below={"Pelvis_ty": 0.7})
+    with pytest.raises(SimulationError, match="never' is not a finite number in any run"):
+        optimize(stopped, Objective(never), tmp_path / "c", budget=8, popsize=8)
+
+
 def test_ranges_may_be_left_if_asked(walker, tmp_path):
     made = plan(walker, {"Pelvis_tx/speed": (0.0, 0.1), "RHip_rz": (0.4, 0.6)}, to=0.3)
     found = optimize(made, DISTANCE, tmp_path, budget=40, popsize=8, is_bounded=False, sigma=1.0)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import OsimliteError, SettingError
+from osimlite.errors import MissingFileError, OsimliteError, SettingError
 from osimlite.sweep import results
 from osimlite.sweep.plan import plan
 from osimlite.sweep.results import Partial, differences, ranges, schema, settings_of
@@ -87,6 +87,16 @@ def test_an_interrupted_sweep_goes_on(made, tmp_path):
     assert counts[0] == outcome.before and counts[-1] == 80 and counts == sorted(counts)
     again = sweep(made, chosen, path, resume=True)
     assert again.before == 80 and not again.status
+
+
+def test_a_colon_in_the_name_of_a_file_is_no_protocol(made, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    chosen = samples(made.variables, "sobol", 4, 5)
+    assert sweep(made, chosen, "s3:r.parquet").count == 4
+    assert settings_of("s3:r.parquet")["samples"] == 4 and ranges("s3:r.parquet", ["distance"])
+    assert sweep(made, chosen, "s3:r.parquet", resume=True).before == 4
+    with pytest.raises(MissingFileError, match="no such file"):
+        settings_of("s3:none.parquet")
 
 
 def test_interrupted_before_anything_was_saved(made, tmp_path):
