@@ -59,7 +59,7 @@ def describe(name: str) -> str:
     function = _function(BUILT_IN[name])
     summary = (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build the ").removesuffix(".")
     parameters = ", ".join(f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values())
-    return f"{summary} ({parameters})"
+    return f"{summary} ({parameters})" if parameters else summary
 
 
 def _function(source: str) -> Callable[..., Any]:
