@@ -148,7 +148,9 @@ def find_basin(
     """
     named = basin_places(step_map.engine, x, y)
     defaults = (0, 0) if None not in named else _leg_speeds(step_map)
-    places = [other if place is None else place for place, other in zip(named, defaults, strict=True)]
+    # A default that is named for the other axis gives way to the other default.
+    free = [other[0] if other[0] not in named else other[1] for other in (defaults, defaults[::-1])]
+    places = [other if place is None else place for place, other in zip(named, free, strict=True)]
     axes = [_axis(step_map.engine, place, float(cycle.state[place]), reach, grid) for place in places]
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
     states = np.tile(cycle.state, (grid * grid, 1))
@@ -178,9 +180,12 @@ def basin_places(engine: CompiledEngine, x: str = "", y: str = "") -> tuple[int 
     """Where in a state the numbers are that a basin changes by name; None where the default is to be taken.
 
     Raises:
-        OsimliteError: there is no such coordinate, or it is locked.
+        OsimliteError: there is no such coordinate, it is locked, or both are the same.
     """
-    return _place(engine, x) if x else None, _place(engine, y) if y else None
+    places = _place(engine, x) if x else None, _place(engine, y) if y else None
+    if places[0] is not None and places[0] == places[1]:
+        raise OsimliteError(f"'{x}' and '{y}' are the same number; a basin is drawn over two")
+    return places
 
 
 def _place(engine: CompiledEngine, name: str) -> int:

@@ -44,6 +44,7 @@ def pendulum() -> osimlite.Model:
         (["-o", __file__], "this is a file, not a folder"),
         (["--basin-x", "UNKNOWN"], "UNKNOWN"),
         (["--basin-y", "RHip_rz/sped"], "RHip_rz/sped"),
+        (["--basin-x", "RHip_rz", "--basin-y", "RHip_rz"], "are the same number"),
     ],
 )
 def test_options_are_checked_before_the_walk(

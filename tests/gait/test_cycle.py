@@ -121,6 +121,8 @@ def test_a_basin_has_the_cycle_in_its_middle(steady):
     assert basin.center == pytest.approx((basin.x.values[1], basin.y.values[1]))
     with pytest.raises(OsimliteError, match="locked"):
         find_basin(steady.step_map, steady.cycle, "platform_rz", grid=3)
+    other = find_basin(steady.step_map, steady.cycle, y="RHip_rz/speed", reach=0.02, grid=2, wanted=2)
+    assert (other.x.label, other.y.label) == ("speed of LHip_rz (rad/s)", "speed of RHip_rz (rad/s)")
 
 
 def test_the_human_walker_walks_from_two_digits():
@@ -166,4 +168,4 @@ def test_the_command(tmp_path):
     assert facts["cycle"]["step_length_m"] == pytest.approx(0.624077, abs=1e-6)
     assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
     done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
-    assert done.exit_code == 0 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output
+    assert done.exit_code == 1 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output
