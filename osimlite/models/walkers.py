@@ -17,23 +17,23 @@ from osimlite.schema.geometry import Brick
 from osimlite.schema.model import Model
 
 STEADY_START = {
-    "Pelvis_ty": (0.8870825818903174, 0.06204849473790841),
-    "Pelvis_tx": (0.0, 0.32978662763705174),
-    "RHip_rz": (0.06553174347786672, -0.3884813145562898),
-    "LHip_rz": (0.5814903904437594, 3.259289619513205),
-    "RKnee_rz": (0.08461044751483902, 0.07925290918841822),
-    "LKnee_rz": (-1.3878847584730702, -1.209184775969098),
+    "Pelvis_ty": (0.8872219662750023, 0.06283788200280761),
+    "Pelvis_tx": (0.0, 0.333959771602075),
+    "RHip_rz": (0.06954992619247342, -0.39152845147416104),
+    "LHip_rz": (0.5724729243393716, 3.2637385703012387),
+    "RKnee_rz": (0.08161873769409912, 0.07572619074377035),
+    "LKnee_rz": (-1.378903217037457, -1.2290109782658898),
 }
 """Value and speed of each coordinate on the cycle of the steady walker, 0.4 of a step after a heel strike."""
 
 
 HUMAN_START = {
-    "Pelvis_ty": (0.9, 0.032),
-    "Pelvis_tx": (0.0, 0.44),
-    "RHip_rz": (0.016, -0.49),
-    "LHip_rz": (0.22, 1.0),
-    "RKnee_rz": (0.039, 0.011),
-    "LKnee_rz": (-0.73, 2.2),
+    "Pelvis_ty": (0.9, 0.033),
+    "Pelvis_tx": (0.0, 0.45),
+    "RHip_rz": (0.0021, -0.51),
+    "LHip_rz": (0.25, 1.0),
+    "RKnee_rz": (0.04, 0.014),
+    "LKnee_rz": (-0.77, 2.7),
 }
 """Value and speed of each coordinate of the human walker in the middle of a step, rounded to two digits."""
 
@@ -61,7 +61,7 @@ def furthest_walker() -> Model:
     return _ready(model, FURTHEST_START, 10.0)
 
 
-def steady_walker(shank_inertia: float = 0.0929, foot_ahead: float = 0.0758) -> Model:
+def steady_walker(shank_inertia: float = 0.0915, foot_ahead: float = 0.0732) -> Model:
     """Build the walker that differs from the exercise in two properties and never stops.
 
     Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and its feet stand out
@@ -84,7 +84,7 @@ def steady_walker(shank_inertia: float = 0.0929, foot_ahead: float = 0.0758) -> 
 
 
 def human_walker(
-    slope: float = 2.74, foot_radius: float = 0.111, foot_ahead: float = 0.0396, knee_stiffness: float = 16.8
+    slope: float = 2.84, foot_radius: float = 0.145, foot_ahead: float = 0.0523, knee_stiffness: float = 20.0
 ) -> Model:
     """Build the walker whose mass is distributed as in a human, on a gentle slope.
 

@@ -45,8 +45,8 @@ def names(simulation) -> list[str]:
 def test_the_steady_walker_walks_in_a_stable_cycle(steady):
     cycle = steady.cycle
     assert cycle.residual < 1e-9 and cycle.scuffs == 0 and not cycle.per_stride
-    assert (cycle.length, cycle.period) == pytest.approx((0.624077, 0.818950), abs=2e-6)
-    assert cycle.largest == pytest.approx(0.5567, abs=2e-3) and cycle.largest < 0.6
+    assert (cycle.length, cycle.period) == pytest.approx((0.624573, 0.814235), abs=2e-6)
+    assert cycle.largest == pytest.approx(0.5462, abs=2e-3) and cycle.largest < 0.6
     assert len(cycle.multipliers) == 11 and cycle.neutral == 3
     # Along the motion itself the section has no extent.
     assert np.abs(cycle.multipliers).min() < 1e-4
@@ -62,7 +62,8 @@ def test_a_walker_comes_back_as_the_derivative_says(steady):
     for _ in range(8):
         y, expected = step_map(y).states, slope @ expected
         found = step_map.reduce(y[0]) - step_map.reduce(cycle.state)
-        assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
+        # The push grows a hundredfold before it dies away, and may pass near zero on the way.
+        assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected) + 0.1 * np.linalg.norm(away)
 
 
 def test_neutral_directions_are_the_slope_and_the_turn_of_the_pelvis(steady):
@@ -133,7 +134,7 @@ def test_the_human_walker_walks_from_two_digits():
         (walk,) = walk_many(simulation.engine, [start], 60.0, accuracy=1e-6)
         assert walk.walks and len(walk.steps) >= 50 and not walk.scuffs
         cycle = find_cycle(StepMap(simulation.engine, walk.steps[-1].state))
-        assert cycle.residual < 1e-9 and cycle.largest == pytest.approx(0.5694, abs=2e-3)
+        assert cycle.residual < 1e-9 and cycle.largest == pytest.approx(0.5761, abs=2e-3)
 
 
 def test_the_steady_walker_differs_in_two_properties():
@@ -162,10 +163,10 @@ def test_the_command(tmp_path):
     words = "gait steady-walker --to 5 --perturb 0.05 --starts 4 --steps 3 --basin --grid 2 --reach 0.01 --no-pictures"
     done = CliRunner().invoke(app(["gait"]), [*words.split(), "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    assert "6 steps, 0 scuffs" in done.output and "stable: largest multiplier 0.5567" in done.output
+    assert "6 steps, 0 scuffs" in done.output and "stable: largest multiplier 0.546" in done.output
     assert max(len(line) for line in done.output.splitlines()) <= 80
     facts = json.loads((tmp_path / "gait.json").read_text())
-    assert facts["cycle"]["step_length_m"] == pytest.approx(0.624077, abs=1e-6)
+    assert facts["cycle"]["step_length_m"] == pytest.approx(0.624573, abs=1e-6)
     assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
     done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
     assert done.exit_code == 1 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output

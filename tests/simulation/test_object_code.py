@@ -69,6 +69,19 @@ def test_folders(monkeypatch, tmp_path):
     assert (first.parent.name, last) == ("kernels", tmp_path / "home" / "osimlite")
 
 
+def test_a_user_without_a_home(monkeypatch):
+    """As in a container that runs under a number of no user."""
+    for name in (object_code.FOLDER, "LOCALAPPDATA", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def nowhere():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(object_code.Path, "home", nowhere)
+    (only,) = object_code._folders()
+    assert only.parent.name == "kernels"
+
+
 def test_code_from_files_needs_no_compiler(walker):
     """With the machine code in files, the compiler is not even imported."""
     from osimlite.simulation import Simulation
