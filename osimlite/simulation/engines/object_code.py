@@ -116,5 +116,11 @@ def _folders() -> Iterator[Path]:
         yield Path(os.environ[FOLDER])
         return
     yield Path(__file__).parents[1] / "kernels" / "__pycache__"
-    home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    if not home:
+        try:
+            home = Path.home() / ".cache"
+        except RuntimeError:
+            # The system knows no home of this user, as in some containers.
+            return
     yield Path(home) / "osimlite"
