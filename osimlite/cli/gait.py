@@ -227,6 +227,9 @@ def _write(folder: Path, found: Found, pictures: bool) -> list[Path]:
     written = [folder / "gait.json"]
     write_atomically(written[0], (json.dumps(_facts(found), indent=1) + "\n").encode())
     basin = found.basin
+    for name in ("basin.csv", "basin.png"):
+        # Of an earlier walk, they would be taken for this one's.
+        (folder / name).unlink(missing_ok=True)
     if basin is not None:
         rows = [f"{basin.x.label},{basin.y.label},steps"]
         for y, line in zip(basin.y.values.tolist(), basin.steps.tolist(), strict=True):

@@ -81,7 +81,7 @@ def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed
     here = np.array(state, dtype=float)
     change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
     engine, footing = step_map.engine, step_map.footing
-    _, depths = along_slope(engine, here[None], step_map.numbers)
+    _, depths = along_slope(engine, here[None])
     deepest = [max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet]
     foot = int(np.argmax(deepest))
     return stood(engine, footing, here + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot)
@@ -110,7 +110,7 @@ def walks_from(
     for first in range(0, len(states), AT_ONCE):
         found += walk_many(
             step_map.engine, states[first : first + AT_ONCE], 1.5 * wanted * cycle.period, footing=step_map.footing,
-            numbers=step_map.numbers, accuracy=accuracy, threads=step_map.threads,
+            accuracy=accuracy, threads=step_map.threads,
         )  # fmt: skip
         if progress is not None:
             progress(len(found), len(states))

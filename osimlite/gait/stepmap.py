@@ -75,7 +75,6 @@ class StepMap:
         near: a state (2n,) from which it makes a step, best one at a heel strike.
         footing: its feet; looked for if left out.
         accuracy: of the integrator.
-        numbers: of a model of the same structure, instead of the engine's own.
         longest: a step takes at most so long, s.
         threads: how many work.
 
@@ -96,14 +95,12 @@ class StepMap:
         *,
         footing: Footing | None = None,
         accuracy: float = TIGHT,
-        numbers: ArrayLike | None = None,
         longest: float = LONGEST,
         threads: int | None = None,
     ) -> None:
         self.engine = engine
         self.footing = footing or find_footing(engine)
         self.accuracy = accuracy
-        self.numbers = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64)
         self.longest = longest
         self.threads = threads
         self.exchange: Ints | None = None
@@ -129,7 +126,7 @@ class StepMap:
             OsimliteError: it makes no step from there, or has more or fewer neutral directions.
         """
         other = copy(self)
-        other.engine, other.numbers = engine, engine.numbers
+        other.engine = engine
         other.start = np.array(near, dtype=float)
         other.accuracy = self.accuracy if accuracy is None else accuracy
         other.neutral = neutral_directions(engine, other._first_step(other.start)[1])
@@ -146,10 +143,10 @@ class StepMap:
     def _first_step(self, near: Floats) -> tuple[Step, Floats]:
         """The first step from a state, and states on the way there (k, 2n)."""
         runs = run_many(
-            self.engine, near[None], self.longest, numbers=self.numbers, accuracy=self.accuracy,
+            self.engine, near[None], self.longest, accuracy=self.accuracy,
             watches=falls(self.footing), most_events=room_for(self.longest), event_states=True, threads=1,
         )  # fmt: skip
-        (walk,) = walks_of(self.engine, near[None], runs, self.footing, numbers=self.numbers)
+        (walk,) = walks_of(self.engine, near[None], runs, self.footing)
         if not walk.steps:
             how = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
             raise OsimliteError(
@@ -157,9 +154,7 @@ class StepMap:
             )
         # At its ends a foot only just touches, where the force has no derivative.
         times = np.linspace(0.0, walk.steps[0].time, ALONG_A_STEP + 2)[1:-1].tolist()
-        runs = run_many(
-            self.engine, near[None], walk.steps[0].time, report_times=times, numbers=self.numbers, threads=1
-        )
+        runs = run_many(self.engine, near[None], walk.steps[0].time, report_times=times, threads=1)
         return walk.steps[0], runs.reports[0]
 
     def _other_leg(self, state: Floats) -> Floats:
@@ -174,19 +169,13 @@ class StepMap:
     def land(self, state: Floats, foot: int) -> Floats:
         """A state (2n,) a billionth of a second from a heel strike, moved onto it."""
         contacts = [self.engine.contacts.index(name) for name in self.footing.feet[foot]]
-        rate = np.array(self.engine.derivative(0.0, state.tolist())) if self._is_own else None
-        if rate is None:
-            return state
+        rate = np.array(self.engine.derivative(0.0, state.tolist()))
         dt = 1e-7
-        _, depths = along_slope(self.engine, np.array([state, state + dt * rate]), self.numbers)
+        _, depths = along_slope(self.engine, np.array([state, state + dt * rate]))
         touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
         speed = (depths[1, touching] - depths[0, touching]) / dt
         moved: Floats = state - depths[0, touching] / speed * rate
         return moved
-
-    @property
-    def _is_own(self) -> bool:
-        return bool(np.array_equal(self.numbers, self.engine.numbers))
 
     # ----------------------------------------------------------------------------------------------- images
     def __call__(self, states: ArrayLike) -> Images:
@@ -218,11 +207,11 @@ class StepMap:
         foot = self.footing.feet[trailing]
         stops = [Watch("strike", contact=foot[0], stops=1)] if len(foot) == 1 else []
         runs = run_many(
-            self.engine, states[rows], self.longest, numbers=self.numbers, accuracy=self.accuracy,
+            self.engine, states[rows], self.longest, accuracy=self.accuracy,
             watches=[*falls(self.footing), *stops], most_events=room_for(self.longest), event_states=True,
             threads=self.threads,
         )  # fmt: skip
-        walks = walks_of(self.engine, states[rows], runs, self.footing, numbers=self.numbers)
+        walks = walks_of(self.engine, states[rows], runs, self.footing)
         for row, walk in zip(rows.tolist(), walks, strict=True):
             step = next((step for step in walk.steps if step.foot == trailing), None)
             if step is not None:

@@ -97,13 +97,16 @@ def step_map_image(steady):
     return steady.step_map(steady.cycle.state[None]).states[0]
 
 
-def test_a_map_of_other_numbers_is_that_of_the_other_model(steady):
+def test_a_varied_map_is_that_of_the_other_model(steady):
+    """Its reduced states lie along nearly the same directions, where those of a new map may be turned."""
     with Simulation(steady_walker(foot_ahead=0.073), "compiled") as simulation:
-        other = StepMap(simulation.engine, simulation.initial_state({}, {}))
-        expected = other(steady.cycle.state[None]).states
-        numbers = simulation.engine.numbers.copy()
-    found = StepMap(steady.engine, steady.start, numbers=numbers)(steady.cycle.state[None]).states
-    assert found == pytest.approx(expected, abs=1e-7)
+        new = StepMap(simulation.engine, simulation.initial_state({}, {}))
+        varied = steady.step_map.varied(simulation.engine, simulation.initial_state({}, {}))
+        here = steady.cycle.state[None]
+        assert np.array_equal(varied(here).states, new(here).states)
+    assert np.abs(varied.basis - steady.step_map.basis).max() < 1e-2
+    assert varied.basis.T @ varied.basis == pytest.approx(np.eye(11), abs=1e-12)
+    assert varied.neutral @ varied.neutral.T == pytest.approx(new.neutral @ new.neutral.T, abs=1e-9)
 
 
 def test_perturbed_starts_stand_as_deep_as_before(steady):
@@ -168,5 +171,8 @@ def test_the_command(tmp_path):
     facts = json.loads((tmp_path / "gait.json").read_text())
     assert facts["cycle"]["step_length_m"] == pytest.approx(0.624573, abs=1e-6)
     assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
+    (tmp_path / "basin.png").write_bytes(b"of an earlier walk")
+    done = CliRunner().invoke(app(["gait"]), ["gait", "steady-walker", "--to", "5", "-o", str(tmp_path)])
+    assert done.exit_code == 0 and [each.name for each in tmp_path.iterdir()] == ["gait.json"]
     done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
     assert done.exit_code == 1 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output

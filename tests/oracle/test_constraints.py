@@ -198,6 +198,22 @@ CASES: dict[str, Change] = {
 }
 
 
+def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) -> None:
+    """OpenSim binds the first independent one, and leaves the dependent one free."""
+    model, bodies = _chain(np.random.default_rng(15))
+    _coupler(("pin_0",), "free_3", opensim.Constant(0.25))(model, bodies)
+    mechanism = _built(model, tmp_path)
+    model, state, coordinates = _loaded(tmp_path, mechanism)
+    pin, free = (mechanism.coordinate_index(name) for name in ("pin_0", "free_3"))
+    values = mechanism.values({})
+    for place, coordinate in enumerate(coordinates):
+        coordinate.setValue(state, float(values[place]), False)
+    model.realizePosition(state)
+    assert state.getQErr().to_numpy() == pytest.approx([0.25 - values[pin]])
+    (ours,) = (item.position_errors(mechanism.at(values)) for item in mechanism.constraints)
+    assert ours == pytest.approx([0.25 - values[free]])
+
+
 def _built(model: Any, folder: Path) -> Mechanism:
     model.finalizeConnections()
     path = folder / "model.osim"

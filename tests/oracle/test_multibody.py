@@ -10,6 +10,8 @@ import pytest
 
 import osimlite
 from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.schema.custom_joint import CustomJoint
+from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.joints import ConstantCurvatureJoint
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -179,3 +181,39 @@ def test_a_rod_that_bends_evenly_ends_where_opensims_does(tmp_path):
         placed = theirs.getBodySet().get(0).getTransformInGround(state)
         found = [[placed.R().get(row, k) for k in range(3)] + [placed.p().get(row)] for row in range(3)]
         assert np.array(found) == pytest.approx(mechanism.body_transforms(q)["tip"][:3], abs=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.2])
+def test_a_constant_turn_before_another(angle: float, tmp_path: Path) -> None:
+    """OpenSim turns the body by the angle, but not the axis after it that the angular velocity is about."""
+    model = osimlite.Model(name="m")
+    body = model.add(osimlite.Body(name="b", mass=1.0, mass_center=(0.1, 0.2, 0.3), inertia=(1.0, 1.5, 1.7, 0, 0, 0)))
+    joint = CustomJoint(name="j", coordinates=[osimlite.Coordinate(name=name) for name in ("first", "last")])
+    turns = joint.spatial_transform
+    for axis, coordinate in ((turns.rotation1, "first"), (turns.rotation3, "last")):
+        axis.coordinates, axis.function = (coordinate,), LinearFunction(coefficients=(1.0, 0.0))
+    turns.rotation2.function = Constant(value=angle)
+    model.add(joint.between(model.ground, body))
+    osimlite.write(model, tmp_path / "model.osim")
+    theirs = opensim.Model(str(tmp_path / "model.osim"))
+    state, mechanism = theirs.initSystem(), build_mechanism(model)
+    coordinates = [theirs.getCoordinateSet().get(name) for name in ("first", "last")]
+    q, u, h = np.array((0.3, 0.5)), np.array((0.7, -1.1)), 1e-5
+
+    def rotation(values: Any) -> Any:
+        for coordinate, value in zip(coordinates, values, strict=True):
+            coordinate.setValue(state, float(value), False)
+        theirs.realizePosition(state)
+        found = theirs.getBodySet().get(0).getTransformInGround(state).R()
+        return np.array([[found.get(row, column) for column in range(3)] for row in range(3)])
+
+    spin = (rotation(q + h * u) - rotation(q - h * u)) @ rotation(q).T / (2.0 * h)
+    seen = np.array((spin[2, 1], spin[0, 2], spin[1, 0]))
+    for coordinate, speed in zip(coordinates, u, strict=True):
+        coordinate.setSpeedValue(state, float(speed))
+    theirs.realizeVelocity(state)
+    told = theirs.getBodySet().get(0).getAngularVelocityInGround(state).to_numpy()
+    ours = mechanism.at(q, u)
+    assert ours.rotations[0] == pytest.approx(rotation(q), abs=1e-14)
+    assert ours.velocities[0, :3] == pytest.approx(seen, abs=1e-9)
+    assert np.abs(told - seen).max() == pytest.approx(1.1 * np.sin(angle), abs=1e-9)
