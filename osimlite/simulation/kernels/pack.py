@@ -78,7 +78,7 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
     """Pack a mechanism and its forces.
 
     Raises:
-        UnsupportedError: a joint, a function or a force that the kernels do not know.
+        UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
     """
     links: list[_Link] = []
     placements: list[Placement] = []
