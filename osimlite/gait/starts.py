@@ -25,12 +25,10 @@ class Carriers:
 
     Attributes:
         places: of those that move every contact by the same way, in the state (m,).
-        ways: how far each does, in ground (m, 3).
         lift: place of the one among them that lifts it off the ground, or None.
     """
 
     places: tuple[int, ...]
-    ways: Floats
     lift: int | None
 
 
@@ -41,7 +39,7 @@ def carriers(engine: CompiledEngine, footing: Footing) -> Carriers:
     rng = np.random.default_rng(0)
     poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
     here, depths = _centres(engine, poses)[:, contacts], along_slope(engine, poses)[1][:, contacts]
-    places, ways, lift = [], [], None
+    places, lift = [], None
     for place in range(n):
         moved = poses.copy()
         moved[:, place] += APART
@@ -49,10 +47,9 @@ def carriers(engine: CompiledEngine, footing: Footing) -> Carriers:
         if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
             continue
         places.append(place)
-        ways.append(way[0])
         if lift is None and (along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all():
             lift = place
-    return Carriers(tuple(places), np.array(ways).reshape(-1, 3), lift)
+    return Carriers(tuple(places), lift)
 
 
 def stood(
@@ -119,7 +116,14 @@ def planted(engine: CompiledEngine, footing: Footing, states: Floats, *, numbers
     back[:, :n] -= NUDGE * placed[:, n:]
     ways = _centres(engine, ahead, numbers, rows) - _centres(engine, back, numbers, rows)
     speeds = ways[count, deepest] / (2.0 * NUDGE)
-    placed[:, [n + place for place in found.places]] -= speeds @ np.linalg.pinv(found.ways)
+    carried = []
+    here = _centres(engine, placed, numbers, rows)
+    for place in found.places:
+        moved = placed.copy()
+        moved[:, place] += APART
+        carried.append((_centres(engine, moved, numbers, rows) - here)[count, deepest] / APART)
+    needed = np.einsum("wi,wij->wj", speeds, np.linalg.pinv(np.stack(carried, axis=1)))
+    placed[:, [n + place for place in found.places]] -= needed
     return placed
 
 

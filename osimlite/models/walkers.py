@@ -17,12 +17,12 @@ from osimlite.schema.geometry import Brick
 from osimlite.schema.model import Model
 
 STEADY_START = {
-    "Pelvis_ty": (0.8872219662750023, 0.06283788200280761),
-    "Pelvis_tx": (0.0, 0.333959771602075),
-    "RHip_rz": (0.06954992619247342, -0.39152845147416104),
-    "LHip_rz": (0.5724729243393716, 3.2637385703012387),
-    "RKnee_rz": (0.08161873769409912, 0.07572619074377035),
-    "LKnee_rz": (-1.378903217037457, -1.2290109782658898),
+    "Pelvis_ty": (0.8871465537538683, 0.06250295666110672),
+    "Pelvis_tx": (0.0, 0.3319889808349588),
+    "RHip_rz": (0.0677445901914954, -0.3901233055848151),
+    "LHip_rz": (0.5771152006418845, 3.2600073020755884),
+    "RKnee_rz": (0.08302322544374824, 0.07743947068366194),
+    "LKnee_rz": (-1.3832146912601972, -1.2144648371656874),
 }
 """Value and speed of each coordinate on the cycle of the steady walker, 0.4 of a step after a heel strike."""
 
@@ -39,12 +39,12 @@ HUMAN_START = {
 
 
 FURTHEST_START = {
-    "Pelvis_tx": (0.0, 0.171338),
-    "Pelvis_ty": (0.718966, 0.222891),
-    "RHip_rz": (-0.316983, -1.20538),
-    "LHip_rz": (0.165195, 3.35629),
-    "RKnee_rz": (-0.59857, 2.28733),
-    "LKnee_rz": (-1.58442, 3.04607),
+    "Pelvis_tx": (0.0, 0.0751894),
+    "Pelvis_ty": (0.723773, 0.225237),
+    "RHip_rz": (-0.344029, -0.961231),
+    "LHip_rz": (0.0945, 3.56844),
+    "RKnee_rz": (-0.547171, 2.01019),
+    "LKnee_rz": (-1.7308, 3.35975),
 }
 """Value and speed of each coordinate from which the exercise's own walker makes the most steps that were found."""
 
@@ -61,7 +61,7 @@ def furthest_walker() -> Model:
     return _ready(model, FURTHEST_START, 10.0)
 
 
-def steady_walker(shank_inertia: float = 0.0915, foot_ahead: float = 0.0732) -> Model:
+def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> Model:
     """Build the walker that differs from the exercise in two properties and never stops.
 
     Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and its feet stand out

@@ -38,22 +38,25 @@ def test_the_pelvis_carries_the_walker(walker):
     found = carriers(walker, find_footing(walker))
     forward, up = places_of(walker, "Pelvis_tx", "Pelvis_ty")
     assert found.places == (forward, up) and found.lift == up
-    # Its joint is turned with the slope of 10 degrees.
-    c, s = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
-    assert found.ways == pytest.approx(np.array([(c, -s, 0.0), (s, c, 0.0)]), abs=1e-9)
 
 
-def test_a_planted_foot_touches_and_rests(walker, states):
-    footing = find_footing(walker)
-    placed = planted(walker, footing, states)
+@pytest.mark.parametrize("slope", [None, 2.0, 25.0])
+def test_a_planted_foot_touches_and_rests(walker, states, slope):
+    """The joint of the pelvis is turned with the slope, so that other ways carry a walker on another slope."""
+    footing, numbers, rows = find_footing(walker), None, np.arange(len(states))
+    if slope is not None:
+        with Simulation(dynamic_walker(slope=slope), "compiled") as simulation:
+            numbers = np.tile(simulation.engine.numbers, (len(states), 1))
+    placed = planted(walker, footing, states, numbers=numbers)
     feet = [walker.contacts.index(foot[0]) for foot in footing.feet]
-    depths = along_slope(walker, placed)[1][:, feet]
+    which = None if numbers is None else rows
+    depths = along_slope(walker, placed, numbers, which)[1][:, feet]
     assert np.abs(depths.max(axis=1)).max() < 1e-12
     n, dt = len(walker.order), 1e-6
     later = placed.copy()
     later[:, :n] += dt * placed[:, n:]
-    moved = (contact_places(walker, later) - contact_places(walker, placed))[:, feet, 6:]
-    rows = np.arange(len(placed))
+    before, after = (contact_places(walker, moved, numbers, which) for moved in (placed, later))
+    moved = (after - before)[:, feet, 6:]
     assert np.linalg.norm(moved[rows, depths.argmax(axis=1)], axis=1).max() < 20 * dt**2
     others = [k for k in range(2 * n) if k not in places_of(walker, "Pelvis_ty") and k - n not in range(1, 3)]
     assert (placed[:, others] == states[:, others]).all()

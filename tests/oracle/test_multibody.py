@@ -51,7 +51,7 @@ def _built(model: Any, folder: Path) -> Mechanism:
     model.finalizeConnections()
     path = folder / "model.osim"
     model.printToXML(str(path))
-    return osimlite.mechanism(osimlite.read(path))
+    return build_mechanism(osimlite.read(path))
 
 
 def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:

@@ -14,7 +14,7 @@ from osimlite.document.printer import to_text
 from osimlite.document.reader import read
 from osimlite.errors import OsimliteError, SettingError, SimulationError, UnsupportedError
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.models.walkers import STEADY_START, steady_walker
+from osimlite.models.walkers import STEADY_START, human_walker, steady_walker
 from osimlite.schema.constraint_types import PointConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.simulation import Simulation
@@ -36,7 +36,7 @@ NEAR = {
     **{name: (STEADY_START[name][0] - 0.1, STEADY_START[name][0] + 0.1) for name in JOINTS},
     **{f"{name}/speed": (STEADY_START[name][1] - 0.4, STEADY_START[name][1] + 0.4) for name in JOINTS},
 }
-FEW = {"samples": 512, "tries": 3, "enough": 1, "budget": 6}
+FEW = {"samples": 512, "tries": 3, "enough": 1, "budget": 12}
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_a_walker_is_found_that_never_stops(found):
     assert sorted({title for title, _, _ in stages}) == ["closing cycles", "making it stable", "random walkers"]
     with Simulation(read(folder / "best.osim"), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    assert cycle.largest == pytest.approx(gait.found.cycle.largest, abs=1e-3)
+    assert cycle.largest == pytest.approx(gait.found.cycle.largest, abs=1e-2)
     assert (cycle.length, cycle.period) == pytest.approx((gait.found.cycle.length, gait.found.cycle.period), rel=1e-7)
 
 
@@ -142,7 +142,7 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
     with Simulation(steady_walker(), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    known = search.cycle(search.fractions({INERTIA: 0.0915, AHEAD: 0.0732}), cycle.state)
+    known = search.cycle(search.fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state)
     assert known.cycle.state == pytest.approx(cycle.state, abs=1e-4)
     assert known.walking > 0.5 and known.cost == 1.0 - known.walking
     search.stable = 0.1
@@ -155,6 +155,20 @@ def test_rounded_numbers_have_no_noise_in_the_last_bit():
     for inertia in (0.0894, 0.0673, 0.112, 0.33):
         numbers = search.numbers(search.rounded(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3))
         assert numbers == {INERTIA: inertia, AHEAD: 0.0694}
+
+
+def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
+    """Not by a rounding either: a search from the walker that it found before finds it again."""
+    ranges = {"slope": (2.0, 3.5), "foot_radius": (0.1, 0.2)} | {name: (-0.3, 0.3) for name in JOINTS}
+    found = []
+    for slope, radius in ((2.7, 0.1), (3.1, 0.17)):
+        given = {"slope": slope, "foot_radius": radius}
+        made = plan(lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given)
+        found.append(CycleSearch(made).candidates(8192, 0))
+    assert len(found[0]) > 3
+    assert [each.miss for each in found[0]] == [each.miss for each in found[1]]
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one.state, other.state) and np.array_equal(one.fractions, other.fractions)
 
 
 class Valley:
