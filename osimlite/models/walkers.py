@@ -28,12 +28,12 @@ STEADY_START = {
 
 
 HUMAN_START = {
-    "Pelvis_ty": (0.9, 0.033),
-    "Pelvis_tx": (0.0, 0.45),
-    "RHip_rz": (0.0021, -0.51),
-    "LHip_rz": (0.25, 1.0),
-    "RKnee_rz": (0.04, 0.014),
-    "LKnee_rz": (-0.77, 2.7),
+    "Pelvis_ty": (0.9, 0.031),
+    "Pelvis_tx": (0.0, 0.44),
+    "RHip_rz": (0.0081, -0.49),
+    "LHip_rz": (0.22, 0.99),
+    "RKnee_rz": (0.038, 0.011),
+    "LKnee_rz": (-0.74, 2.4),
 }
 """Value and speed of each coordinate of the human walker in the middle of a step, rounded to two digits."""
 
@@ -84,7 +84,7 @@ def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> 
 
 
 def human_walker(
-    slope: float = 2.84, foot_radius: float = 0.145, foot_ahead: float = 0.0523, knee_stiffness: float = 20.0
+    slope: float = 2.71, foot_radius: float = 0.121, foot_ahead: float = 0.0455, knee_stiffness: float = 20.1
 ) -> Model:
     """Build the walker whose mass is distributed as in a human, on a gentle slope.
 
