@@ -18,8 +18,8 @@ Vary = Annotated[
     typer.Option(
         "--vary",
         metavar="NAME=RANGE",
-        help="LOW:HIGH or LOW:HIGH:COUNT of a coordinate, COORDINATE/speed, path of a property, or parameter of the "
-        "model function.",
+        help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
+        "coordinate, COORDINATE/speed, path of a property, or parameter of the model function.",
         show_default=False,
     ),
 ]

@@ -73,6 +73,7 @@ def find_gait(
 
 
 def _told(gait: Gait) -> Facts:
+    from osimlite.sweep.cycles import STARTS, STEPS
     from osimlite.text import counted, listed
 
     cycle, walk = gait.found.cycle, gait.walk
@@ -85,7 +86,7 @@ def _told(gait: Gait) -> Facts:
     end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
     done = f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
     facts.add("walk", done)
-    facts.add("near it", f"{gait.found.walking:.0%} walk")
+    facts.add("near it", f"{round(STARTS * gait.found.walking)} of {STARTS} starts make {STEPS} steps")
     facts.add("search", f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found")
     facts.add("files", listed([str(path) for path in gait.files]))
     return facts

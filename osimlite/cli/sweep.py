@@ -22,11 +22,13 @@ def sweep(
     vary: sweeping.Vary = None,
     samples: Annotated[
         int | None,
-        typer.Option("--samples", metavar="N", help="How many runs; a grid has as many as it has.", show_default=False),
+        typer.Option("--samples", metavar="N", help="How many runs; leave it out for a grid.", show_default=False),
     ] = None,
     sampler: Annotated[
         str | None,
-        typer.Option(help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT"),
+        typer.Option(
+            help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT, else sobol"
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="The same seed, the same random samples.")] = 0,
     measure: Annotated[

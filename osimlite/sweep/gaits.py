@@ -114,7 +114,9 @@ def find_gait(
         refuse_constraints(search.variants.given.engine.mechanism)
         candidates = search.candidates(samples, seed, lambda done, of: tell("random walkers", done, of))
         if not candidates:
-            raise SimulationError(f"none of {samples} random walkers made two steps; widen the ranges or draw more")
+            raise SimulationError(
+                f"none of {samples} random walkers made two steps; widen the ranges, or draw more (--samples)"
+            )
         cycles = closed(search, candidates[:tries], enough, lambda done, of: tell("closing cycles", done, of))
         improvement = Improvement(search, min(cycles, key=cost), digits)
         if search.names:
@@ -185,8 +187,8 @@ def closed(
             break
     if not cycles:
         raise SimulationError(
-            f"none of the {len(candidates)} best random walkers comes to a cycle; draw more, try more, or vary other "
-            "numbers"
+            f"none of the {len(candidates)} best random walkers that made two steps comes to a cycle; draw more "
+            "(--samples), lead more of them on (--tries), or vary other numbers"
         )
     return cycles
 

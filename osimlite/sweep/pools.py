@@ -226,7 +226,8 @@ class ClusterPool:
                 self._submit(tag, values, losses + 1)
             except (CancelledError, OSError, TimeoutError):
                 raise self._lost() from None
-            except OsimliteError:
+            except OsimliteError as error:
+                error.message = f"on the cluster: {error.message}"
                 raise
             except Exception as error:
                 if type(error).__name__ in ("FutureCancelledError", "CommClosedError"):

@@ -153,7 +153,7 @@ class Partial:
         self.partial = partial_of(path)
         is_there = self.partial.exists()
         if is_there and not resume:
-            raise SettingError(f"an interrupted sweep is in '{self.partial}'; go on with --resume, or remove that file")
+            raise SettingError(f"interrupted work is in '{self.partial}'; go on with --resume, or remove that file")
         try:
             self._stream = self.partial.open("ab")
             try:
@@ -248,7 +248,7 @@ class Partial:
             unlike = differences(before, json.loads(self.schema.metadata[KEY]))
             if unlike or not found.equals(self.schema):
                 raise SettingError(
-                    f"the interrupted sweep in '{self.partial}' has other settings: {listed(unlike) or 'its columns'}; "
+                    f"the interrupted work in '{self.partial}' has other settings: {listed(unlike) or 'its columns'}; "
                     "ask for the same as before, or remove that file"
                 )
             stream.seek(0)
