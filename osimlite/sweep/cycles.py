@@ -30,7 +30,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.many import run_many
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.variables import Floats, Start
+from osimlite.sweep.variables import Floats, Start, refuse_counts
 from osimlite.sweep.variants import Variants
 
 ROUGH, FINE = 1e-7, 1e-9
@@ -142,6 +142,7 @@ class CycleSearch:
         threads: int | None = None,
     ) -> None:
         self.plan, self.stable, self.perturb, self.threads = plan, stable, perturb, threads
+        refuse_counts(plan.variables)
         self.variants = Variants(plan)
         free = [(place, item) for place, item in enumerate(plan.variables) if not item.is_fixed]
         self._starts = [place for place, item in free if isinstance(item.target, Start)]

@@ -22,7 +22,7 @@ from osimlite.sweep.results import KEY, Partial, local, partial_of, schema, spar
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
-from osimlite.sweep.variables import Floats
+from osimlite.sweep.variables import Floats, refuse_counts
 from osimlite.sweep.variants import Variants
 from osimlite.text import counted
 
@@ -121,6 +121,7 @@ def optimize(
         OsimliteError: as of a sweep.
     """
     look = method_named(method)
+    refuse_counts(plan.variables)
     free = [place for place, item in enumerate(plan.variables) if not item.is_fixed]
     if not free:
         raise SettingError("there is nothing to search: every variable has one value only")

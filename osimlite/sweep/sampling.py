@@ -90,6 +90,12 @@ def samples(
         SettingError: what is asked for does not go together.
     """
     varied = [item for item in variables if not item.is_fixed]
+    with_values = [item.name for item in varied if item.count]
+    if sampler is None and count is not None and with_values:
+        raise SettingError(
+            f"--samples says how many runs are drawn, the COUNT in the range of {listed(with_values)} how many values "
+            "a grid has; leave out one of the two, or name the --sampler"
+        )
     if sampler is None:
         sampler = "grid" if count is None and all(item.count for item in varied) else "sobol"
     if sampler not in SAMPLERS:

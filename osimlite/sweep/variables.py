@@ -173,6 +173,20 @@ def variables(
     return tuple(found)
 
 
+def refuse_counts(found: Sequence[Variable]) -> None:
+    """Stop at ranges with a number of values, where they are searched and not divided.
+
+    Raises:
+        SettingError: a variable has a number of values.
+    """
+    for item in found:
+        if item.count is not None and not item.is_fixed:
+            raise SettingError(
+                f"the range of '{item.name}' is to have {item.count} values, which is for the grid of a sweep; "
+                "a search takes any value of it: leave the number out"
+            )
+
+
 def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> tuple[Target, str]:
     """What a name means, and in what unit."""
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}

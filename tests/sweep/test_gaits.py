@@ -216,6 +216,8 @@ def test_a_search_that_gets_nowhere_keeps_the_first_cycle():
 def test_a_search_needs_random_starts():
     with pytest.raises(SettingError, match="vary some values and speeds"):
         CycleSearch(plan(dynamic_walker(), {INERTIA: (0.05, 0.1)}))
+    with pytest.raises(SettingError, match="'RHip_rz' is to have 3 values"):
+        CycleSearch(plan(dynamic_walker(), {"RHip_rz": "0.05:0.1:3"}))
 
 
 def test_walkers_that_only_fall_are_told_of(tmp_path):

@@ -233,6 +233,8 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
             optimize(made, DISTANCE, tmp_path, **choices)
     with pytest.raises(SettingError, match="take --method nelder-mead"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path)
+    with pytest.raises(SettingError, match=r"'RHip_rz' is to have 3 values, .*: leave the number out"):
+        optimize(plan(walker, {"RHip_rz": "0.3:0.5:3"}), DISTANCE, tmp_path)
     assert not list(tmp_path.iterdir())
     with pytest.raises(SettingError, match="nothing to search"):
         optimize(plan(walker, {"RHip_rz": 0.3}), DISTANCE, tmp_path)

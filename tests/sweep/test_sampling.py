@@ -98,6 +98,9 @@ def test_what_does_not_go_together_is_said():
         samples([free])
     with pytest.raises(SettingError, match="12 points"):
         samples(THREE, "grid", 5)
+    with pytest.raises(SettingError, match="leave out one of the two, or name the --sampler"):
+        samples(THREE, None, 5)
+    assert samples(THREE, "lhs", 5).count == 5
     with pytest.raises(SettingError, match="above zero"):
         samples([free], "random", 0)
     assert samples([Variable("slope", Slope(), 0.1, 0.1, 1)]).count == 1
