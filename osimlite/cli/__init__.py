@@ -132,6 +132,10 @@ def main(arguments: list[str] | None = None) -> None:
             from osimlite.cli._validating import run
 
             raise SystemExit(run(**asked))
+        if sys.stderr.isatty():
+            from osimlite.cli._progress import tell_of_compiling
+
+            tell_of_compiling()
         with warnings.catch_warnings():
             # Commands say themselves what is odd about what was typed.
             warnings.simplefilter("ignore", DoubtfulWarning)

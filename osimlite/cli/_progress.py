@@ -59,6 +59,21 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
         yield tell
 
 
+def tell_of_compiling() -> None:
+    """Let people on a terminal know why the first use of the compiled engine takes so long."""
+    import logging
+
+    class Once(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            log.removeHandler(self)
+            words = "compiling the engine, which this machine keeps; it takes some ten seconds"
+            print(f"osimlite: {words}", file=sys.stderr, flush=True)
+
+    log = logging.getLogger("osimlite.simulation.engines.machine_code")
+    log.setLevel(logging.INFO)
+    log.addHandler(Once())
+
+
 def _silent(*_: float) -> None:
     """Before the first bar."""
 

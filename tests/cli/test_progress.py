@@ -1,8 +1,11 @@
-"""The bar shows on a terminal, once the work has taken a second, and nowhere else."""
+"""What long work tells on a terminal, and nowhere else."""
 
 from __future__ import annotations
 
 import io
+import os
+import pty
+import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -34,3 +37,25 @@ def test_bar(monkeypatch, stream, second, shows):
     # Two calls within a tenth of a second draw once.
     assert "75 %" not in text
     assert shows or not text
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_who_waits_for_the_compiler_is_told_once(tmp_path, is_terminal):
+    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+    ours, theirs = pty.openpty()
+    script = (
+        "import sys; from osimlite.cli import main; sys.argv = ['osimlite', 'build', 'dynamic-walker', '-o', '-']\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "from osimlite.simulation.engines.machine_code import address_of\n"
+        "address_of('drive'), address_of('coordinate_spring')\n"
+    )
+    run = [sys.executable, "-c", script]
+    kept = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    for words in (["compiling the engine"] if is_terminal else [], []):
+        done = subprocess.run(
+            run, env=kept, stdout=subprocess.PIPE, stderr=theirs if is_terminal else subprocess.PIPE, check=True
+        )
+        os.write(theirs, b"end\n")
+        text = os.read(ours, 10_000).decode() + (done.stderr or b"").decode()
+        assert text.count("osimlite: ") == len(words) and all(word in text for word in words), text

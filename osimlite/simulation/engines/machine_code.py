@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import logging
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
@@ -29,6 +30,8 @@ def _compiler_version() -> str:
     return str(require("numba", extra="fast", purpose="the compiled engine").__version__)
 
 
+_log = logging.getLogger(__name__)
+
 VERSION = f"numba {_compiler_version()}"
 
 
@@ -41,6 +44,7 @@ def address_of(name: str) -> int:
     if found is None:
         from osimlite.simulation.engines.compiler import compiled
 
+        _log.info("compiling '%s'", name)
         found = store(name, _digest(), *compiled(law_function(name)))
     return found
 
