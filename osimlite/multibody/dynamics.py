@@ -176,20 +176,28 @@ def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array 
     try:
         pivots = np.linalg.cholesky(matrix).diagonal() ** 2
     except np.linalg.LinAlgError:
-        raise SimulationError(_massless(mechanism, matrix, directions, order)) from None
+        raise massless(_name_of_massless(mechanism, matrix, directions, order)) from None
     if np.min(pivots / matrix.diagonal()) < 1e-13:
-        raise SimulationError(_massless(mechanism, matrix, directions, order))
+        raise massless(_name_of_massless(mechanism, matrix, directions, order))
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
-def _massless(mechanism: Mechanism, matrix: Array, directions: Array | None, order: Sequence[int]) -> str:
+def massless(coordinate: str) -> SimulationError:
+    """The error of a motion that can be as fast as it likes.
+
+    Args:
+        coordinate: name of the one that moves most in it.
+    """
+    return SimulationError(
+        f"coordinate '{coordinate}' moves no mass, or a negative inertia, or its axis lies in this pose along another "
+        "of the same joint; give the bodies beyond its joint mass and inertia, lock it, or start in another pose"
+    )
+
+
+def _name_of_massless(mechanism: Mechanism, matrix: Array, directions: Array | None, order: Sequence[int]) -> str:
     scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
     _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
     motion = vectors[:, 0] / scale
     if directions is not None:
         motion = directions @ motion
-    name = mechanism.coordinates[order[int(np.argmax(np.abs(motion)))]].name
-    return (
-        f"coordinate '{name}' moves no mass, or a negative inertia; "
-        "give the bodies beyond its joint mass and inertia, or lock it"
-    )
+    return mechanism.coordinates[order[int(np.argmax(np.abs(motion)))]].name

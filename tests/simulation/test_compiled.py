@@ -342,6 +342,16 @@ def test_massless_motion_is_refused():
         osimlite.simulate(model, to=1.0, engine="compiled")
 
 
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_gimbal_lock_is_named(engine):
+    model = Model(name="m")
+    turns = [Coordinate(name="a"), Coordinate(name="b", default_value=np.pi / 2), Coordinate(name="c")]
+    body = model.add(Body(name="body", mass=1.0, inertia=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0)))
+    model.add(osimlite.GimbalJoint(name="j", coordinates=turns).between(model.ground, body))
+    with pytest.raises(SimulationError, match=r"'a' moves no mass.*or its axis lies in this pose along another"):
+        osimlite.simulate(model, to=0.1, engine=engine)
+
+
 def test_why_there_is_no_step_is_told_late_too():
     """Where the shortest steps are hardly longer than the rounding of the time."""
     model = Model(name="m")

@@ -16,6 +16,7 @@ import numpy as np
 
 from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
 from osimlite.multibody.constraints import Lock
+from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
@@ -217,11 +218,7 @@ class BulletEngine:
         wrong = [value for value in y if not np.isfinite(value)]
         if wrong:
             return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
-        name = self.mechanism.coordinates[self.order[error.joint]].name
-        return SimulationError(
-            f"coordinate '{name}' moves no mass, or a negative inertia; "
-            "give the bodies beyond its joint mass and inertia, or lock it"
-        )
+        return massless(self.mechanism.coordinates[self.order[error.joint]].name)
 
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: list[float]) -> int:

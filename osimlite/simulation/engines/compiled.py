@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SimulationError
+from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.constrained import Constrained
 from osimlite.simulation.contact_elements import PairContact
@@ -126,11 +127,7 @@ class CompiledEngine:
             except SimulationError as error:
                 return error
         elif status == layout.SINGULAR_MASS:
-            name = self.mechanism.coordinates[self.order[int(self._f[0])]].name
-            return SimulationError(
-                f"coordinate '{name}' moves no mass, or a negative inertia; "
-                "give the bodies beyond its joint mass and inertia, or lock it"
-            )
+            return massless(self.mechanism.coordinates[self.order[int(self._f[0])]].name)
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
 
     # ---------------------------------------------------------------------------------------------- reports
