@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from osimlite.document.reader import read_text as read_text
     from osimlite.errors import OsimliteError as OsimliteError
     from osimlite.lint import validate as validate
-    from osimlite.multibody import mechanism as mechanism
+    from osimlite.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
     from osimlite.translate import to_urdf as to_urdf
@@ -44,7 +44,7 @@ _FUNCTIONS = {
     "write": "osimlite.document.printer",
     "to_text": "osimlite.document.printer",
     "validate": "osimlite.lint",
-    "mechanism": "osimlite.multibody",
+    "mechanism": "osimlite.multibody:build_mechanism",
     "to_urdf": "osimlite.translate",
     "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",
@@ -56,12 +56,12 @@ def __getattr__(name: str) -> Any:
         from osimlite.schema.registry import MODULES
 
         return sorted({*_FUNCTIONS, *MODULES})
-    module = _FUNCTIONS.get(name)
-    if module is None and not name.startswith("_"):
+    module, _, inner = _FUNCTIONS.get(name, "").partition(":")
+    if not module and not name.startswith("_"):
         from osimlite.schema.registry import MODULES
 
-        module = MODULES.get(name)
-    if module is None:
+        module = MODULES.get(name, "")
+    if not module:
         near = ""
         if not name.startswith("_"):
             from osimlite.schema.registry import MODULES
@@ -69,7 +69,7 @@ def __getattr__(name: str) -> Any:
 
             near = did_you_mean(name, [*_FUNCTIONS, *MODULES])
         raise AttributeError(f"module 'osimlite' has no attribute '{name}'{near}")
-    return getattr(import_module(module), name)
+    return getattr(import_module(module), inner or name)
 
 
 def __dir__() -> list[str]:
