@@ -62,3 +62,13 @@ def bushing_load(x: float, v: float, k: float, c: float) -> float:
         c: damping, N.m/(rad/s) (N/(m/s)).
     """
     return -k * x - c * v
+
+
+def bushing_dissipation(v: float, c: float) -> float:
+    """Power that one of the six dampers takes up, in W.
+
+    Args:
+        v: rate of its deviation, rad/s (m/s).
+        c: damping, N.m/(rad/s) (N/(m/s)).
+    """
+    return c * v * v

@@ -83,6 +83,23 @@ def limit_force(q: float, u: float, Ku: float, qu: float, Kl: float, ql: float, 
     return Q
 
 
+def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: float) -> float:
+    """Power that the damper takes up, (su + sl) D u^2, in W.
+
+    Args: as `limit_force`.
+    """
+    if ql <= q <= qu:
+        return 0.0
+    part = 0.0
+    if q > qu:
+        x = (q - qu) / t if q - qu < t else 1.0
+        part += x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    if q < ql:
+        x = (ql - q) / t if ql - q < t else 1.0
+        part += x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    return D * part * u * u
+
+
 def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float) -> float:
     """Potential energy of the spring, in J.
 

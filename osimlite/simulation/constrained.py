@@ -134,15 +134,15 @@ class Constrained:
         if not self.constraints:
             return y, errors
         size = len(self._order)
-        x, u = np.array(y[:size]), np.array(y[size:])
-        off = None if errors is None else (np.array(errors[:size]), np.array(errors[size:]))
+        x, u, others = np.array(y[:size]), np.array(y[size : 2 * size]), y[2 * size :]
+        off = None if errors is None else (np.array(errors[:size]), np.array(errors[size : 2 * size]))
         if not (
             self._project_values(t, x, off and off[0], tolerance, limit)
             and self._project_speeds(t, x, u, off and off[1], tolerance, limit)
         ):
             return None
-        rest = None if off is None else off[0].tolist() + off[1].tolist()
-        return x.tolist() + u.tolist(), rest
+        rest = None if errors is None or off is None else [*off[0].tolist(), *off[1].tolist(), *errors[2 * size :]]
+        return x.tolist() + u.tolist() + others, rest
 
     def _project_values(self, t: float, x: Array, off: Array | None, tolerance: float, limit: float) -> bool:
         """Change x, and the errors with it; tell whether that worked."""

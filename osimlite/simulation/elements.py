@@ -25,6 +25,7 @@ from osimlite.text import listed
 
 if TYPE_CHECKING:
     from osimlite.simulation.field import Writer
+    from osimlite.simulation.script import Scalar
 
 Triple = tuple[float, float, float]
 
@@ -64,6 +65,7 @@ class CoordinateLimit:
     name: str
     coordinate: int
     constants: tuple[float, float, float, float, float, float]
+    dissipates: bool = False
 
     def write(self, writer: Writer) -> None:
         """Write the force on the coordinate."""
@@ -85,6 +87,18 @@ class CoordinateLimit:
             writer.keep(0, value, writer.call("limit_energy", q, Ku, qu, Kl, ql, t))
 
     @property
+    def state(self) -> str:
+        """Path of the energy that the damper has taken up."""
+        return f"{self.path}/dissipatedEnergy"
+
+    def write_power(self, writer: Writer) -> Scalar:
+        """Write the power of the damper, W."""
+        q, u = writer.coordinate(self.coordinate)
+        _, qu, _, ql, D, t = self.constants
+        power: Scalar = writer.call("limit_dissipation", q, u, qu, ql, D, t)
+        return power
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """The generalized force, and the energy."""
         return self.name, f"{self.name}.PotentialEnergy"
@@ -95,12 +109,51 @@ class CoordinateLimit:
         return [0.0, 0.0] if value is None else [value[0], value[-1]]
 
 
+class Dissipating(Protocol):
+    """A force element with an auxiliary state: the energy (J) that its dampers have taken up.
+
+    Nothing depends on it, but its error counts in the control of the steps, as it does in OpenSim.
+    """
+
+    @property
+    def dissipates(self) -> bool:
+        """Whether it has the state."""
+
+    @property
+    def state(self) -> str:
+        """Path of the state in OpenSim."""
+
+    def write_power(self, writer: Writer) -> Scalar:
+        """Write the code of the state's derivative, W."""
+
+
+def dissipating(elements: Sequence[Any]) -> list[Dissipating]:
+    """The elements with an auxiliary state, in the order of OpenSim's states: first those that are not Simbody's."""
+    found = [element for element in elements if getattr(element, "dissipates", False)]
+    return sorted(found, key=lambda element: not isinstance(element, CoordinateLimit))
+
+
 @dataclass(frozen=True)
 class Forces:
     """The force elements of a model in its order, and the forces that were left out, as ``path (class)``."""
 
     elements: tuple[ForceElement, ...]
     skipped: tuple[str, ...] = ()
+
+
+def auxiliary_states(forces: Forces, states: Sequence[Sequence[float]], plain: int) -> dict[str, list[float]]:
+    """Columns of the auxiliary states of a motion by path, in the order of the forces; none after fixed steps.
+
+    Args:
+        forces: of the model.
+        states: one row for each moment.
+        plain: how many numbers stand before them in a row.
+    """
+    found = dissipating(forces.elements)
+    if not found or len(states[0]) == plain:
+        return {}
+    known = {element.state: [row[plain + place] for row in states] for place, element in enumerate(found)}
+    return {path: known[path] for path in (getattr(item, "state", "") for item in forces.elements) if path in known}
 
 
 def force_elements(
@@ -260,7 +313,7 @@ class ElementBuilder:
             self.mechanism.coordinates[place].motion_type == "rotational",
         )
         self.check(force, constants)
-        return CoordinateLimit(self.path(force), force.name, place, constants)
+        return CoordinateLimit(self.path(force), force.name, place, constants, force.compute_dissipation_energy)
 
     def check(self, component: Any, numbers: Sequence[float]) -> None:
         """Raise a ModelError if a number is not finite."""

@@ -31,7 +31,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.chain import Chain, Column
 from osimlite.simulation.contact_elements import PairContact
-from osimlite.simulation.elements import ForceElement, Triple
+from osimlite.simulation.elements import ForceElement, Triple, dissipating
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
 
 _MODULES = (
@@ -213,6 +213,15 @@ class ForceField:
         writer.write(self.elements)
         script.line("loads[-1] = touching")
         script.line(f"return ({''.join(name + ', ' for name in names)})")
+        return script.function(writer.names)
+
+    @cached_property
+    def powers(self) -> Callable[..., list[float]]:
+        """The function of a state, as `generalized` takes it, that gives the derivatives of all auxiliary states."""
+        script = self._script("powers")
+        writer = Writer(self, script, reporting=False)
+        found = [element.write_power(writer) for element in dissipating(self.elements)]
+        script.line(f"return [{', '.join(map(str, found))}]")
         return script.function(writer.names)
 
     @cached_property

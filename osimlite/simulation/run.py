@@ -16,7 +16,7 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import Constrained, kept_state
-from osimlite.simulation.elements import force_elements
+from osimlite.simulation.elements import auxiliary_states, force_elements
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
@@ -289,7 +289,8 @@ class Simulation:
             lambda: [engine.energies(*moment) for moment in zip(times, states, strict=True)],
             summary,
         )
-        return Trajectory(self.mechanism, times, *self.state.histories(states), report)
+        auxiliary = auxiliary_states(self.forces, states, 2 * len(engine.order))
+        return Trajectory(self.mechanism, times, *self.state.histories(states), report, auxiliary)
 
 
 LONGEST_STEP = 0.1

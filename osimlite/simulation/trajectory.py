@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ class Trajectory:
         coordinates: names of the k coordinates, in the mechanism's order.
         values: coordinate values (n, k), rad or m.
         speeds: generalized speeds (n, k).
+        auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
+            a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it. Empty with fixed steps.
     """
 
     def __init__(
@@ -37,6 +40,7 @@ class Trajectory:
         values: Sequence[Sequence[float]],
         speeds: Sequence[Sequence[float]],
         report: Report,
+        auxiliary: Mapping[str, Sequence[float]] = MappingProxyType({}),
     ) -> None:
         count = len(mechanism.coordinates)
         self.mechanism = mechanism
@@ -44,6 +48,7 @@ class Trajectory:
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
         self.speeds: Array = np.array(speeds, dtype=float).reshape(len(self.times), count)
+        self.auxiliary: dict[str, Array] = {path: np.array(row, dtype=float) for path, row in auxiliary.items()}
         self._report: Report | None = report
 
     def __repr__(self) -> str:
@@ -99,7 +104,7 @@ class Trajectory:
     def to_frame(self) -> Any:
         """All values, speeds and forces as a pandas DataFrame over time (s); units are SI and radians.
 
-        Columns are called ``<coordinate>``, ``<coordinate>/speed``, and as in `forces`.
+        Columns are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary` and `forces`.
 
         Raises:
             MissingDependency: pandas is not installed.
@@ -109,13 +114,17 @@ class Trajectory:
         for place, name in enumerate(self.coordinates):
             columns[name] = self.values[:, place]
             columns[f"{name}/speed"] = self.speeds[:, place]
-        return pandas.DataFrame({**columns, **self.forces}, index=pandas.Index(self.times, name="time"))
+        return pandas.DataFrame(
+            {**columns, **self.auxiliary, **self.forces}, index=pandas.Index(self.times, name="time")
+        )
 
     def states_text(self) -> str:
-        """The text of states.sto: value and speed of every coordinate, in the order of OpenSim's states."""
+        """The text of states.sto: value and speed of every coordinate, then `auxiliary`, in the order of OpenSim."""
         paths = [info.path for info in self.mechanism.coordinates]
         columns = [f"{path}/{what}" for path in paths for what in ("value", "speed")]
+        columns += self.auxiliary
         rows = np.stack([self.values, self.speeds], axis=2).reshape(len(self.times), -1)
+        rows = np.column_stack([rows, *self.auxiliary.values()])
         return sto_text(self.mechanism.name, self.times.tolist(), columns, rows.tolist())
 
     def forces_text(self) -> str:

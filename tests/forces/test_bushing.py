@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.forces.bushing import bushing_load, xyz_angles, xyz_moment, xyz_rates
+from osimlite.forces.bushing import bushing_dissipation, bushing_load, xyz_angles, xyz_moment, xyz_rates
 
 TURNS = st.floats(-3.0, 3.0)
 TILTS = st.floats(-1.5, 1.5)
@@ -51,3 +51,9 @@ def test_rates_and_moment(a, b, c, rates):
 
 def test_load():
     assert bushing_load(0.5, 2.0, 3.0, 0.25) == -2.0
+
+
+@given(TURNS, TURNS, st.floats(0.0, 10.0))
+def test_dissipation_is_what_the_damper_takes(v, x, c):
+    taken = -v * (bushing_load(x, v, 3.0, c) - bushing_load(x, 0.0, 3.0, c))
+    assert bushing_dissipation(v, c) == pytest.approx(taken, abs=1e-12)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from osimlite.forces.coordinate_limit import limit_constants, limit_energy, limit_force
+from osimlite.forces.coordinate_limit import limit_constants, limit_dissipation, limit_energy, limit_force
 
 PROPERTIES = "upper_stiffness", "upper_limit", "lower_stiffness", "lower_limit", "damping", "transition"
 
@@ -82,6 +82,7 @@ def test_damper_takes_power_and_is_the_rest_of_the_force(law, q, u):
     share = 10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5
     spring = limit_force(q, 0.0, *law)
     assert spring - limit_force(q, u, *law) == pytest.approx(share * D * u, rel=1e-9, abs=1e-9 * (1.0 + abs(spring)))
+    assert limit_dissipation(q, u, qu, ql, D, t) == pytest.approx(share * D * u * u, rel=1e-9, abs=1e-12)
 
 
 @given(laws(), angle, speed)

@@ -22,7 +22,7 @@ from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
 from osimlite.robot.names import legal_names
 from osimlite.robot.robot import Robot
-from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements import Forces, dissipating
 from osimlite.simulation.engines.bullet_file import require_masses
 from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.bullet_world import World, bullet
@@ -223,7 +223,7 @@ class BulletEngine:
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: list[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
-        q, u = y[: self._count], y[self._count :]
+        q, u = y[: self._count], y[self._count : 2 * self._count]
         self._joint_forces(t, q, self._speeds.rates(q, u), u)
         return int(self.loads[-1])
 
@@ -237,7 +237,7 @@ class BulletEngine:
 
     def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
         """Values and rates of the joints, and the state where it is told apart from these."""
-        q, u = y[: self._count], y[self._count :]
+        q, u = y[: self._count], y[self._count : 2 * self._count]
         rates = self._speeds.rates(q, u)
         return (q, rates, q, u) if self.field.separate else (q, rates)
 
@@ -253,18 +253,24 @@ class BulletEngine:
     ) -> RungeKuttaMerson:
         # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
         spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
+        auxiliary = dissipating(self.field.elements)
         return RungeKuttaMerson(
-            self.derivative,
+            self._with_powers if auxiliary else self.derivative,
             t,
-            y,
+            y + [0.0] * len(auxiliary),
             self._count,
+            nu=self._count,
             accuracy=settings.accuracy,
             count_q=len(self.mechanism.coordinates) + spare,
             count_u=len(self.mechanism.coordinates),
             observe=observe,
-            names=self._names,
+            names=self._names + [element.state for element in auxiliary],
             projection=projection,
         )
+
+    def _with_powers(self, t: float, y: list[float]) -> list[float]:
+        """(qdot, udot, zdot) at a state with its auxiliary part."""
+        return [*self.derivative(t, y[: 2 * self._count]), *self.field.powers(t, *self._joints(y))]
 
     @property
     def _names(self) -> list[str]:

@@ -121,7 +121,7 @@ class ReducedBulletEngine(BulletEngine):
 
     def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
         """Values and rates of the joints, values and speeds of the state."""
-        x, u = y[: self._count], y[self._count :]
+        x, u = y[: self._count], y[self._count : 2 * self._count]
         joints = self.reduction.at(np.array(x), np.array(u))
         return joints.values.tolist(), joints.rates.tolist(), x, u
 

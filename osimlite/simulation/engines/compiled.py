@@ -16,7 +16,7 @@ from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.constrained import Constrained
 from osimlite.simulation.contact_elements import PairContact
-from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements import Forces, dissipating
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
 from osimlite.simulation.engines.protocol import FreeState, Settings
@@ -84,7 +84,7 @@ class CompiledEngine:
         self._links = self._w[start : start + layout.LINK_WORK * links].reshape(links, layout.LINK_WORK)
         start = self.structure[layout.WORK_CONTACT]
         self._pairs = self._w[start : start + layout.CONTACT_WORK * len(self.contacts)].reshape(-1, layout.CONTACT_WORK)
-        self._y, self._f = np.zeros(2 * len(self.order)), np.zeros(2 * len(self.order))
+        self._y, self._f = (np.zeros(self.structure[layout.STATE_SIZE]) for _ in range(2))
         self._evaluate = entry_point("evaluate")
         self._addresses = tuple(part.ctypes.data for part in (self._w, self._y, self._f))
         self.program_address: int = self.program.ctypes.data
@@ -95,17 +95,17 @@ class CompiledEngine:
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
-        """(qdot, udot) at a state."""
+        """(qdot, udot) at a state (q, u); (qdot, udot, zdot) at one with its auxiliary part."""
         status = self._at(t, y, layout.WHOLE)
         if status != layout.FINE:
             raise self._refusal(status, t, y)
         self._note_loads(self._pairs[:, :3])
-        found: list[float] = self._f.tolist()
+        found: list[float] = self._f[: len(y)].tolist()
         return found
 
     def _at(self, t: float, y: Sequence[float], how_far: int) -> int:
         self._w[layout.TIME] = t
-        self._y[:] = y
+        self._y[: len(y)] = y
         return self._evaluate(self.program_address, self.numbers.ctypes.data, *self._addresses, how_far)
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
@@ -216,7 +216,9 @@ class CompiledEngine:
                 names=names,
                 projection=self.constrained,
             )
-        return CompiledMerson(self, t, y, settings.accuracy, observe, names)
+        auxiliary = dissipating(self.forces.elements)
+        names += [element.state for element in auxiliary]
+        return CompiledMerson(self, t, [*y, *[0.0] * len(auxiliary)], settings.accuracy, observe, names)
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
         return self.derivative(0.0, q + u)[: len(self.order)]
@@ -265,6 +267,7 @@ class CompiledMerson(RungeKuttaMerson):
             t,
             y,
             len(engine.order),
+            nu=len(engine.order),
             accuracy=accuracy,
             count_q=count + spare,
             count_u=count,
@@ -281,7 +284,7 @@ class CompiledMerson(RungeKuttaMerson):
             yield from zip(moments, rows.tolist(), strict=True)
 
     def table(self, times: Sequence[float], progress: Callable[[float], object] | None = None) -> Sequence[Any]:
-        """The states at times that do not decrease (s) as an array (k, 2n)."""
+        """The states at times that do not decrease (s) as an array."""
         found = []
         for moments, rows in self._blocks(times):
             found.append(rows)
@@ -315,12 +318,12 @@ class CompiledMerson(RungeKuttaMerson):
             (ending,), logged = batch.endings.tolist(), count[merson.LOGGED]
             self._put_off.append((batch.log[:logged].copy(), batch.forces[:logged].copy()))
             self.time, self._next_step = batch.clocks[0].tolist()
-            self.state = batch.states[0].tolist()
+            self.state = batch.whole_states[0].tolist()
             self.taken, self.attempted, self.evaluations = count[: merson.REPORTED].tolist()
             if ending == merson.FAILED:
                 self._explain()
             reached = int(count[merson.REPORTED])
-            yield times[done:reached], batch.reports[0, done:reached]
+            yield times[done:reached], batch.whole_reports[0, done:reached]
             done = reached
 
     def catch_up(self) -> None:

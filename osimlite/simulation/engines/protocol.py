@@ -93,7 +93,7 @@ EngineFactory = Callable[[Mechanism, Forces, Settings], Engine]
 
 
 class FreeState:
-    """The part of a mechanism's state that an engine integrates.
+    """The part of a mechanism's state that an engine integrates: y = (q, u), which auxiliary states may follow.
 
     Args:
         mechanism: whose state.
@@ -121,12 +121,13 @@ class FreeState:
 
     def histories(self, states: Sequence[Sequence[float]]) -> tuple[Any, Any]:
         """Values and speeds (k, n) of all coordinates at k states."""
-        rows, count = np.array(states, dtype=float).reshape(len(states), 2 * len(self.order)), len(self.order)
+        rows, count = np.array(states, dtype=float).reshape(len(states), -1), len(self.order)
         values, speeds = np.empty((len(states), len(self._q))), np.zeros((len(states), len(self._q)))
         values[:] = self._q
-        values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count:]
+        values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]
         return values, speeds
 
     def speeds(self, y: Sequence[float]) -> list[float]:
         """Generalized speeds of all coordinates, in the mechanism's order."""
-        return self.spread(y[len(self.order) :], [0.0] * len(self._q))
+        count = len(self.order)
+        return self.spread(y[count : 2 * count], [0.0] * len(self._q))

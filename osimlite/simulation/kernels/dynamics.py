@@ -47,6 +47,7 @@ from osimlite.simulation.kernels.layout import (
     ROTATION,
     ROW,
     SINGULAR_MASS,
+    STATE_SIZE,
     TOUCHED,
     VELOCITY,
     WORK_COLUMN,
@@ -63,7 +64,7 @@ SMALLEST_PIVOT = 1e-13
 
 
 def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, how_far: int) -> int:
-    """The derivative f of the state y = (q, u); what else there is to know stays in `w`.
+    """The derivative f of the state y = (q, u, z); what else there is to know stays in `w`. Nothing depends on z.
 
     Returns:
         FINE or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
@@ -140,10 +141,10 @@ def weigh(s: Ints, x: Floats, w: Floats) -> None:
 
 
 def push_all(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
-    """Add what all items push to the wrenches, or to the generalized forces in the second half of f."""
+    """Add what all items push to the wrenches, or to the generalized forces behind the rates in f."""
     size = s[FREEDOMS]
-    for freedom in range(size, 2 * size):
-        f[freedom] = 0.0
+    for number in range(size, s[STATE_SIZE]):
+        f[number] = 0.0
     for number in range(s[CONTACTS]):
         found = at(w, s[WORK_CONTACT] + CONTACT_WORK * number)
         found[0], found[1], found[2], found[DEPTH_OF] = 0.0, 0.0, 0.0, 0.0

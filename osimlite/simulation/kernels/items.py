@@ -42,6 +42,7 @@ class Item:
         room: length of its record, if it is not that of a contact.
         is_contact: whether its record is that of a contact.
         is_part: whether another item of the element calls its law.
+        has_state: whether it has an auxiliary state, whose place in y follows its integers.
     """
 
     kept: Kept
@@ -51,6 +52,7 @@ class Item:
     room: int = 0
     is_contact: bool = False
     is_part: bool = False
+    has_state: bool = False
 
 
 @dataclass(frozen=True)

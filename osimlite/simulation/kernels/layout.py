@@ -33,7 +33,9 @@ CONTACT_AT = 18
 """Where the places of the records of the pairs stand, by contact."""
 HELD = 19
 """Place of the record of all constraints, 0 if there are none."""
-LAWS = 20
+STATE_SIZE = 20
+"""Length of a state: values, speeds, and auxiliary states, on which nothing depends but the step control."""
+LAWS = 21
 """From here on the addresses of the laws, by their number."""
 
 LINK_INTS = 5

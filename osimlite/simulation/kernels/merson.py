@@ -20,6 +20,7 @@ from osimlite.simulation.kernels.layout import (
     PROJECT,
     SCRATCH,
     SINGULAR_MASS,
+    STATE_SIZE,
     TIME,
     TOUCHED,
     WHOLE,
@@ -59,6 +60,8 @@ START_HOLDS, SIZES = 8, 9
 class Motion(NamedTuple):
     """What a run works on and writes down; any of the records may have no rows.
 
+    A state has y numbers, see STATE_SIZE.
+
     Attributes:
         s: the mechanism.
         x: its numbers.
@@ -69,11 +72,11 @@ class Motion(NamedTuple):
         counts: steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room
             for them are counted only.
         times: of the reports, s (r,).
-        reports: states at these times (r, 2n).
-        log: of each step the time, y, f (k, 1 + 4n).
+        reports: states at these times (r, y).
+        log: of each step the time, y, f (k, 1 + 2y).
         forces: of each step the force on surface 2 of each pair (k, P, 3).
         events: time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if
-            there is room the state (e, 3 or 3 + 2n).
+            there is room the state (e, 3 or 3 + y).
         peaks: largest force of each pair at the end of a step, and its time (P, 2).
         watches: kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level ends the
             run, 0 if neither (w, 3).
@@ -124,7 +127,7 @@ def run_several(
     Args: as of `Motion`, one row for each run; a log, `w` and what tells how to run serve them all. `each` is the
     length of a row of numbers, 0 if one serves them all.
     """
-    size, pairs = 2 * s[FREEDOMS], s[CONTACTS]
+    size, pairs = s[STATE_SIZE], s[CONTACTS]
     for k in range(first, last):
         m = Motion(
             s,
@@ -163,7 +166,7 @@ def projected(m: Motion, t: float, y: Floats, off: Floats, has_errors: int, limi
 def run(m: Motion, y: Floats) -> int:
     """Go on from the state y, which is changed, until something ends the run."""
     s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
-    size = 2 * s[FREEDOMS]
+    size = s[STATE_SIZE]
     room = at(m.w, s[WORK_STATE])
     y0, f0, y1, f1 = room, at(room, size), at(room, 2 * size), at(room, 3 * size)
     before = at(room, STATES * size)
@@ -226,8 +229,8 @@ def run(m: Motion, y: Floats) -> int:
 
 def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
-    counts, clock, settings, sizes, n = m.counts, m.clock, m.settings, m.sizes, m.s[FREEDOMS]
-    companion = at(m.w, m.s[WORK_STATE] + 8 * 2 * n)
+    counts, clock, settings, sizes, size = m.counts, m.clock, m.settings, m.sizes, m.s[STATE_SIZE]
+    companion = at(m.w, m.s[WORK_STATE] + 8 * size)
     limit, accuracy = settings[LIMIT], settings[ACCURACY]
     smallest = max(settings[SMALLEST_STEP], 4.0 * 2.0**-52 * max(1.0, abs(t0)))
     while True:
@@ -243,9 +246,9 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         if status == SINGULAR_MASS:
             return t0 - 1.0
         # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
-        for k in range(2 * n):
+        for k in range(size):
             companion[k] = 0.2 * (y1[k] - companion[k])
-        error = norm(n, y0, companion, sizes[COUNT_Q], sizes[COUNT_U]) if status == FINE else inf
+        error = norm(m, y0, companion) if status == FINE else inf
         # As in Simbody: what half a step would not mend, neither does the projection.
         if m.s[HELD] > 0 and error <= 16.0 * accuracy:
             error = held_error(m, t1, y0, y1, companion)
@@ -259,17 +262,17 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
 
 def held_error(m: Motion, t1: float, y0: Floats, y1: Floats, errors: Floats) -> float:
     """Move the end of a step to where the constraints hold; the norm of the error there."""
-    n, tolerance = m.s[FREEDOMS], m.settings[ACCURACY] / 10.0
-    for k in range(2 * n):
+    tolerance = m.settings[ACCURACY] / 10.0
+    for k in range(m.s[STATE_SIZE]):
         errors[k] = abs(errors[k])
     if not projected(m, t1, y1, errors, 1, max(2.0 * tolerance, sqrt(tolerance))):
         return inf
-    return norm(n, y0, errors, m.sizes[COUNT_Q], m.sizes[COUNT_U])
+    return norm(m, y0, errors)
 
 
 def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) -> int:
     """One step of Merson's method; the companion of y1 is the last of the stages."""
-    size = 2 * m.s[FREEDOMS]
+    size = m.s[STATE_SIZE]
     room = at(m.w, m.s[WORK_STATE] + 4 * size)
     ya, fa, fb, fc, companion = room, at(room, size), at(room, 2 * size), at(room, 3 * size), at(room, 4 * size)
     h = t1 - t0
@@ -306,25 +309,34 @@ def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) 
     return status
 
 
-def norm(n: int, y0: Floats, errors: Floats, count_q: int, count_u: int) -> float:
-    """Larger of two root mean squares: errors of q as they are, of u relative to u at the start where |u| > 1."""
-    of_q = of_u = 0.0
+def norm(m: Motion, y0: Floats, errors: Floats) -> float:
+    """Largest of three root mean squares: errors of q as they are, of u and z relative to y0 where |y0| > 1."""
+    n, size = m.s[FREEDOMS], m.s[STATE_SIZE]
+    of_q = of_u = of_z = 0.0
     for k in range(n):
         of_q += errors[k] * errors[k]
     for k in range(n, 2 * n):
-        size = abs(y0[k])
-        weighted = (1.0 / size if size > 1.0 else 1.0) * errors[k]
+        weighted = weight(y0[k]) * errors[k]
         of_u += weighted * weighted
-    of_q /= max(count_q, 1)
-    of_u /= max(count_u, 1)
-    return sqrt(max(of_q, of_u)) if isfinite(of_q + of_u) else inf
+    for k in range(2 * n, size):
+        weighted = weight(y0[k]) * errors[k]
+        of_z += weighted * weighted
+    of_q /= max(m.sizes[COUNT_Q], 1)
+    of_u /= max(m.sizes[COUNT_U], 1)
+    of_z /= max(size - 2 * n, 1)
+    return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf
+
+
+def weight(value: float) -> float:
+    """What the error of a number counts that is as large as this at the start of the step."""
+    return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
 
 def inside(
     m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
 ) -> None:
     """State y at a time within a step, where the constraints hold if it can be moved there."""
-    cubic(2 * m.s[FREEDOMS], t0, y0, f0, t1, y1, f1, t, y)
+    cubic(m.s[STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
     if m.s[HELD] > 0:
         projected(m, t, y, y, 0, inf)
 
@@ -340,7 +352,7 @@ def note_peaks(m: Motion, t: float) -> None:
 
 def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     """Write a step into the log."""
-    size, row = 2 * m.s[FREEDOMS], m.counts[LOGGED]
+    size, row = m.s[STATE_SIZE], m.counts[LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
     copy(size, y, at(log, 1))
@@ -380,7 +392,7 @@ def note_events(
 ) -> float:
     """Write down what began and ended within a step; returns the time at which the run is to stop, or infinity."""
     counts, events = m.counts, m.events
-    size, pairs = 2 * m.s[FREEDOMS], m.s[CONTACTS]
+    size, pairs = m.s[STATE_SIZE], m.s[CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
     ya = at(m.w, m.s[WORK_STATE] + 4 * size)
     fa, found = at(ya, size), at(after, total)

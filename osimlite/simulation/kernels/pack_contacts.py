@@ -106,7 +106,7 @@ def _kept(pair: ContactPair) -> Any:
 
 
 def pack_limit(element: CoordinateLimit, places: Places) -> list[Item]:
-    """One item; without a law if the coordinate is locked."""
+    """The force, and its power where that is a state; without laws if the coordinate is locked."""
 
     def kept(record: Sequence[float], values: Sequence[float], speeds: Sequence[float]) -> list[Any]:
         q, (Ku, qu, Kl, ql, _, t) = values[element.coordinate], element.constants
@@ -114,6 +114,8 @@ def pack_limit(element: CoordinateLimit, places: Places) -> list[Item]:
         return [(force, limit_energy(q, Ku, qu, Kl, ql, t))]
 
     freedom = places.freedom(element.coordinate)
-    if freedom < 0:
-        return [Item(kept)]
-    return [Item(kept, "limit", (freedom,), element.constants)]
+    force, power = (None, None) if freedom < 0 else ("limit", "limit_power")
+    items = [Item(kept, force, (freedom,), element.constants)]
+    if element.dissipates:
+        items.append(Item(lambda *_: [], power, (freedom,), element.constants, has_state=True))
+    return items

@@ -137,7 +137,8 @@ def pack_bushing(element: Bushing, places: Places) -> list[Item]:
         tables.append(len(numbers))
         if isinstance(law, Function):
             numbers += table_of_one(law, f"{DEVIATIONS[number]} of '{element.path}'")
-    return [Item(kept, "bushing", (*links, *kinds, *tables), tuple(numbers), room=BUSHING_REGISTERS)]
+    ints = *links, *kinds, *tables, *(() if element.dissipates else (0,))
+    return [Item(kept, "bushing", ints, tuple(numbers), room=BUSHING_REGISTERS, has_state=element.dissipates)]
 
 
 def _frame(frame: BushingFrame, places: Places) -> tuple[int, list[float]]:

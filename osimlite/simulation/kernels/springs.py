@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.forces.bushing import bushing_load, xyz_angles, xyz_moment, xyz_rates
+from osimlite.forces.bushing import bushing_dissipation, bushing_load, xyz_angles, xyz_moment, xyz_rates
+from osimlite.forces.coordinate_limit import limit_dissipation
 from osimlite.forces.smooth_contact import smooth_contact_energy, smooth_contact_force, smooth_hertz
 from osimlite.forces.springs import coordinate_spring_force, point_spring_tension, spring_energy
 from osimlite.forces.station_contact import station_contact_force
@@ -25,6 +26,14 @@ def coordinate_spring(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item:
     found[0], found[1] = coordinate_spring_force(q, u, p[0], p[1], p[2]), spring_energy(q - p[1], p[0])
     if freedom >= 0:
         f[s[FREEDOMS] + freedom] += found[0]
+    return FINE
+
+
+def limit_power(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """What the damper of a limit takes up."""
+    i = at(s, item)
+    freedom, p = i[OWN], at(x, i[NUMBERS])
+    f[i[OWN + 1]] = limit_dissipation(y[freedom], y[s[FREEDOMS] + freedom], p[1], p[3], p[4], p[5])
     return FINE
 
 
@@ -86,6 +95,11 @@ def bushing(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> i
             value, _, _ = value_at(at(p, kinds[6 + k]), deviation)
             loads[k] = -value - damping * rate
     load_bushing(s, w, i[OWN], i[OWN + 1], p, found)
+    if i[OWN + 14] > 0:
+        power = 0.0
+        for k in range(6):
+            power += bushing_dissipation(found[BUSHING_RATES + k], p[24 + k])
+        f[i[OWN + 14]] = power
     return FINE
 
 

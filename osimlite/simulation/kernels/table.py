@@ -31,6 +31,7 @@ LAW_MODULES = {
     "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",
     "touch_mesh": "meshes",
+    "limit_power": "springs",
     "coordinate_spring": "springs",
     "point_spring": "springs",
     "bushing": "springs",

@@ -1,0 +1,29 @@
+"""Dampers that keep count of energy against a live OpenSim 4.6: the same steps, the same table of states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.simulation import read_sto
+from tests.oracle.opensim_runs import simulated
+from tests.simulation.damped import damped
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytestmark = pytest.mark.oracle
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-8])
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_states_and_steps(engine, accuracy, tmp_path):
+    osimlite.write(damped(), tmp_path / "model.osim")
+    theirs = simulated(tmp_path / "model.osim", 0.5, accuracy)
+    trajectory = osimlite.simulate(damped(), 0.5, accuracy=accuracy, engine=engine)
+    trajectory.to_sto(tmp_path / "states.sto")
+    ours = read_sto(tmp_path / "states.sto")
+    assert ours.columns == theirs.columns
+    assert trajectory.summary["steps"] == len(theirs.rows) - 1
+    assert np.abs(ours.rows[-1] - theirs.rows[-1]).max() < 1e-12
