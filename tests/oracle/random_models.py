@@ -92,9 +92,13 @@ class RandomModel:
             axis.coordinates = [] if driver is None else [driver]
 
     def spring(self, name: str) -> SpringGeneralizedForce:
-        coordinate = self.choice(self.coordinates).name
-        numbers = {"stiffness": self.number(1.0, 200.0), "viscosity": self.number(0.0, 2.0)}
-        return SpringGeneralizedForce(name=name, coordinate=coordinate, rest_length=self.number(-0.3, 0.3), **numbers)
+        return SpringGeneralizedForce(
+            name=name,
+            coordinate=self.choice(self.coordinates).name,
+            stiffness=self.number(1.0, 200.0),
+            viscosity=self.number(0.0, 2.0),
+            rest_length=self.number(-0.3, 0.3),
+        )
 
     def band(self, name: str) -> PointToPointSpring:
         return PointToPointSpring(
