@@ -88,16 +88,7 @@ def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: flo
 
     Args: as `limit_force`.
     """
-    if ql <= q <= qu:
-        return 0.0
-    part = 0.0
-    if q > qu:
-        x = (q - qu) / t if q - qu < t else 1.0
-        part += x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    if q < ql:
-        x = (ql - q) / t if ql - q < t else 1.0
-        part += x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    return D * part * u * u
+    return -u * limit_force(q, u, 0.0, qu, 0.0, ql, D, t)
 
 
 def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float) -> float:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array
 from osimlite.schema.springs import BushingForce, ExpressionBasedBushingForce, FunctionBasedBushingForce
-from osimlite.simulation.chain import Column
 from osimlite.simulation.elements import ElementBuilder, Triple, triple
 from osimlite.simulation.field import Writer, integral
 from osimlite.simulation.formula import Formula
@@ -41,16 +40,6 @@ class BushingFrame:
     origin: Triple
 
 
-class _Deviations(NamedTuple):
-    """How far the second frame has moved from the first, in code: both in ground, columns, deviations and rates."""
-
-    rotations: tuple[Matrix, Matrix]
-    origins: tuple[Vector, Vector]
-    columns: Sequence[Column]
-    deviations: Sequence[Scalar]
-    rates: Sequence[Scalar]
-
-
 @dataclass(frozen=True)
 class Bushing:
     """One bushing between two frames.
@@ -59,7 +48,7 @@ class Bushing:
         laws: for the six deviations, angles first.
         damping: N.m/(rad/s), N/(m/s).
         about_bodies: whether the torques of the record are about the origins of the bodies instead of the frames.
-        dissipates: whether the energy that the dampers take up is a state.
+        state: path of the energy that the dampers have taken up, if that is a state.
     """
 
     path: str
@@ -69,14 +58,15 @@ class Bushing:
     laws: tuple[Law, ...]
     damping: tuple[float, ...]
     about_bodies: bool = False
-    dissipates: bool = False
+    state: str = ""
 
     @classmethod
     def linear(cls, builder: ElementBuilder, force: BushingForce) -> Bushing:
         """The element of a BushingForce."""
         stiffness = *force.rotational_stiffness, *force.translational_stiffness
         builder.check(force, stiffness)
-        return cls._of(builder, force, stiffness, is_simbodys=True)
+        path = f"{builder.path(force)}/dissipated_energy"
+        return cls._of(builder, force, stiffness, about_bodies=True, state=path)
 
     @classmethod
     def by_functions(cls, builder: ElementBuilder, force: FunctionBasedBushingForce) -> Bushing:
@@ -93,7 +83,7 @@ class Bushing:
         return cls._of(builder, force, tuple(laws))
 
     @classmethod
-    def _of(cls, builder: ElementBuilder, force: Any, laws: tuple[Law, ...], *, is_simbodys: bool = False) -> Bushing:
+    def _of(cls, builder: ElementBuilder, force: Any, laws: tuple[Law, ...], **more: Any) -> Bushing:
         damping = *force.rotational_damping, *force.translational_damping
         builder.check(force, damping)
         frames = []
@@ -101,39 +91,10 @@ class Bushing:
             frame = builder.target(force, field, getattr(force, field))
             body, placed = builder.placement(frame)
             frames.append(BushingFrame(frame.name, body, matrix(placed[:3, :3]), triple(placed[:3, 3])))
-        return cls(builder.path(force), force.name, frames[0], frames[1], laws, damping, is_simbodys, is_simbodys)
+        return cls(builder.path(force), force.name, frames[0], frames[1], laws, damping, **more)
 
     def write(self, writer: Writer) -> None:
         """Write the deviations, their rates, and the load."""
-        script, found = writer.script, self._deviate(writer)
-        angles, rates = found.deviations[:3], found.rates
-        loads = [self._load(writer, place, found.deviations, rates[place]) for place in range(6)]
-        moment = _triple(writer.call("xyz_moment", angles[1], angles[2], *loads[:3], results=3))
-        moment = script.apply(found.rotations[1], moment)
-        force = script.apply(found.rotations[0], _triple(loads[3:]))
-        writer.push(found.columns, force)
-        writer.turn(found.columns, moment)
-        if writer.reporting:
-            start, end = found.origins
-            writer.keep(0, *force, *moment, *start, *end, self._energy(writer, found.deviations))
-
-    @property
-    def state(self) -> str:
-        """Path of the energy that the dampers have taken up."""
-        return f"{self.path}/dissipated_energy"
-
-    def write_power(self, writer: Writer) -> Scalar:
-        """Write the power of the dampers, W."""
-        rates = self._deviate(writer).rates
-        powers = [
-            (writer.call("bushing_dissipation", rate, c),)
-            for rate, c in zip(rates, self.damping, strict=True)
-            if c != 0.0
-        ]
-        return writer.script.sum(*powers)
-
-    def _deviate(self, writer: Writer) -> _Deviations:
-        """Write the deviations, and their rates if there is any damping."""
         script, chain = writer.script, writer.chain
         r1 = script.multiply(chain.body(script, self.one.body).rotation, self.one.rotation)
         r2 = script.multiply(chain.body(script, self.two.body).rotation, self.two.rotation)
@@ -151,7 +112,16 @@ class Bushing:
             turning = script.apply(to2, chain.velocity(script, columns, turning=True))
             rates = writer.call("xyz_rates", angles[1], angles[2], *turning, results=3)
             rates += script.apply(to1, chain.velocity(script, columns))
-        return _Deviations((r1, r2), (start, end), columns, deviations, rates)
+        loads = [self._load(writer, place, deviations, rates[place]) for place in range(6)]
+        moment = script.apply(r2, _triple(writer.call("xyz_moment", angles[1], angles[2], *loads[:3], results=3)))
+        force = script.apply(r1, _triple(loads[3:]))
+        writer.push(columns, force)
+        writer.turn(columns, moment)
+        if self.state:
+            damped = [(rate, c) for rate, c in zip(rates, self.damping, strict=True) if c != 0.0]
+            writer.dissipate(self.state, script.sum(*((writer.call("bushing_dissipation", *each),) for each in damped)))
+        if writer.reporting:
+            writer.keep(0, *force, *moment, *start, *end, self._energy(writer, deviations))
 
     def _load(self, writer: Writer, place: int, deviations: Sequence[Scalar], rate: Scalar) -> Scalar:
         law, c = self.laws[place], self.damping[place]

@@ -25,7 +25,6 @@ from osimlite.text import listed
 
 if TYPE_CHECKING:
     from osimlite.simulation.field import Writer
-    from osimlite.simulation.script import Scalar
 
 Triple = tuple[float, float, float]
 
@@ -59,13 +58,18 @@ class ForceElement(Protocol):
 
 @dataclass(frozen=True)
 class CoordinateLimit:
-    """One CoordinateLimitForce; `constants` are Ku, qu, Kl, ql, D, t of the law."""
+    """One CoordinateLimitForce.
+
+    Attributes:
+        constants: Ku, qu, Kl, ql, D, t of the law.
+        state: path of the energy that the damper has taken up, if that is a state.
+    """
 
     path: str
     name: str
     coordinate: int
     constants: tuple[float, float, float, float, float, float]
-    dissipates: bool = False
+    state: str = ""
 
     def write(self, writer: Writer) -> None:
         """Write the force on the coordinate."""
@@ -74,7 +78,11 @@ class CoordinateLimit:
         if isinstance(q, str):
             # The law is called beyond the limits only; where they are crossed (ql > qu), always.
             outside = f"if {q} > {qu!r} or {q} < {ql!r}:" if ql <= qu else "if True:"
+            if self.state:
+                writer.dissipate(self.state, 0.0)
             with writer.script.block(outside):
+                if self.state:
+                    writer.dissipate(self.state, writer.call("limit_dissipation", q, u, qu, ql, D, t))
                 value = writer.call("limit_force", q, u, Ku, qu, Kl, ql, D, t)
                 writer.push_coordinate(self.coordinate, value)
                 self._keep(writer, value, q)
@@ -87,18 +95,6 @@ class CoordinateLimit:
             writer.keep(0, value, writer.call("limit_energy", q, Ku, qu, Kl, ql, t))
 
     @property
-    def state(self) -> str:
-        """Path of the energy that the damper has taken up."""
-        return f"{self.path}/dissipatedEnergy"
-
-    def write_power(self, writer: Writer) -> Scalar:
-        """Write the power of the damper, W."""
-        q, u = writer.coordinate(self.coordinate)
-        _, qu, _, ql, D, t = self.constants
-        power: Scalar = writer.call("limit_dissipation", q, u, qu, ql, D, t)
-        return power
-
-    @property
     def columns(self) -> tuple[str, ...]:
         """The generalized force, and the energy."""
         return self.name, f"{self.name}.PotentialEnergy"
@@ -109,28 +105,19 @@ class CoordinateLimit:
         return [0.0, 0.0] if value is None else [value[0], value[-1]]
 
 
-class Dissipating(Protocol):
-    """A force element with an auxiliary state: the energy (J) that its dampers have taken up.
+def state_of(element: Any) -> str:
+    """Path of the auxiliary state of a force element, empty if it has none."""
+    return getattr(element, "state", "")
 
-    Nothing depends on it, but its error counts in the control of the steps, as it does in OpenSim.
+
+def state_paths(elements: Sequence[Any]) -> list[str]:
+    """Paths of the auxiliary states: energies (J) that dampers have taken up.
+
+    Nothing depends on them, but their errors count in the control of the steps, as they do in OpenSim. They are in its
+    order: first those that are not Simbody's.
     """
-
-    @property
-    def dissipates(self) -> bool:
-        """Whether it has the state."""
-
-    @property
-    def state(self) -> str:
-        """Path of the state in OpenSim."""
-
-    def write_power(self, writer: Writer) -> Scalar:
-        """Write the code of the state's derivative, W."""
-
-
-def dissipating(elements: Sequence[Any]) -> list[Dissipating]:
-    """The elements with an auxiliary state, in the order of OpenSim's states: first those that are not Simbody's."""
-    found = [element for element in elements if getattr(element, "dissipates", False)]
-    return sorted(found, key=lambda element: not isinstance(element, CoordinateLimit))
+    in_order = sorted(elements, key=lambda element: not isinstance(element, CoordinateLimit))
+    return [path for path in map(state_of, in_order) if path]
 
 
 @dataclass(frozen=True)
@@ -149,11 +136,10 @@ def auxiliary_states(forces: Forces, states: Sequence[Sequence[float]], plain: i
         states: one row for each moment.
         plain: how many numbers stand before them in a row.
     """
-    found = dissipating(forces.elements)
-    if not found or len(states[0]) == plain:
+    places = {path: plain + number for number, path in enumerate(state_paths(forces.elements))}
+    if len(states[0]) == plain:
         return {}
-    known = {element.state: [row[plain + place] for row in states] for place, element in enumerate(found)}
-    return {path: known[path] for path in (getattr(item, "state", "") for item in forces.elements) if path in known}
+    return {path: [row[places[path]] for row in states] for path in map(state_of, forces.elements) if path}
 
 
 def force_elements(
@@ -313,7 +299,9 @@ class ElementBuilder:
             self.mechanism.coordinates[place].motion_type == "rotational",
         )
         self.check(force, constants)
-        return CoordinateLimit(self.path(force), force.name, place, constants, force.compute_dissipation_energy)
+        path = self.path(force)
+        state = f"{path}/dissipatedEnergy" if force.compute_dissipation_energy else ""
+        return CoordinateLimit(path, force.name, place, constants, state)
 
     def check(self, component: Any, numbers: Sequence[float]) -> None:
         """Raise a ModelError if a number is not finite."""

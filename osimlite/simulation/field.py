@@ -31,7 +31,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.chain import Chain, Column
 from osimlite.simulation.contact_elements import PairContact
-from osimlite.simulation.elements import ForceElement, Triple, dissipating
+from osimlite.simulation.elements import ForceElement, Triple, state_paths
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
 
 _MODULES = (
@@ -73,6 +73,7 @@ class Writer:
         self.reporting = reporting
         self.names: dict[str, Any] = {
             **LAWS,
+            "powers": field.powers,
             "value_of": value_of,
             "inf": math.inf,
             "nan": math.nan,
@@ -144,6 +145,11 @@ class Writer:
         if self.reporting:
             self.script.line(f"kept[{self._slot + place}] = ({', '.join(map(str, values))},)")
 
+    def dissipate(self, state: str, power: Scalar) -> None:
+        """Note the derivative (W) of the auxiliary state of a path."""
+        if not self.reporting:
+            self.script.line(f"powers[{self.field.states.index(state)}] = {power}")
+
     def touch(self, place: int, force: Vector) -> None:
         """Note that a contact touches, and its force."""
         if not self.reporting:
@@ -171,6 +177,8 @@ class ForceField:
         number_of: the number in the state of each coordinate that moves.
         separate: whether the state is told apart from the values and rates of the joints.
         contacts: names of the contacts, by their number.
+        states: paths of the auxiliary states.
+        powers: their derivatives where `generalized` was last called.
     """
 
     def __init__(
@@ -185,6 +193,8 @@ class ForceField:
         self.elements = tuple(elements)
         self.separate = order is not None
         self.order = tuple(own_coordinates(joints) if order is None else order)
+        self.states = state_paths(self.elements)
+        self.powers = [0.0] * len(self.states)
         self.number_of = {place: number for number, place in enumerate(self.order)}
         self.contacts = tuple(
             element.pair_name(place)
@@ -213,15 +223,6 @@ class ForceField:
         writer.write(self.elements)
         script.line("loads[-1] = touching")
         script.line(f"return ({''.join(name + ', ' for name in names)})")
-        return script.function(writer.names)
-
-    @cached_property
-    def powers(self) -> Callable[..., list[float]]:
-        """The function of a state, as `generalized` takes it, that gives the derivatives of all auxiliary states."""
-        script = self._script("powers")
-        writer = Writer(self, script, reporting=False)
-        found = [element.write_power(writer) for element in dissipating(self.elements)]
-        script.line(f"return [{', '.join(map(str, found))}]")
         return script.function(writer.names)
 
     @cached_property

@@ -108,13 +108,12 @@ def sweep(
         raise SettingError(f"the results are a Parquet file, not '{path.name}'; name the file '{better}'")
     wanted = settings(plan, samples)
     table = schema(columns(plan), wanted)
-    # A plan that cannot be run is told of first.
+    # Who goes on with an interrupted sweep was asked before it began.
+    if path.is_file() and not force and not (resume and partial_of(path).exists()):
+        spare(path, wanted)
+        if resume:
+            return Outcome(path, samples.count, samples.count)
     with pool(plan, workers=workers, cluster=cluster) as workforce:
-        # Who goes on with an interrupted sweep was asked before it began.
-        if path.is_file() and not force and not (resume and partial_of(path).exists()):
-            spare(path, wanted)
-            if resume:
-                return Outcome(path, samples.count, samples.count)
         partial = Partial(path, table, resume=resume)
         outcome = Outcome(path, samples.count, partial.rows)
         try:

@@ -124,13 +124,6 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
         sweep(made, samples(made.variables, "sobol", 41, 5), path, resume=True)
 
 
-def test_what_is_misspelt_is_told_before_other_settings(made, walker, tmp_path):
-    path, chosen = tmp_path / "r.parquet", samples(made.variables, "sobol", 4, 5)
-    sweep(made, chosen, path)
-    with pytest.raises(SettingError, match="did you mean 'distance'"):
-        sweep(plan(walker, VARY, measures=("distanc",), to=0.3), chosen, path)
-
-
 def test_finished_results_are_spared_unless_forced(made, tmp_path):
     path = tmp_path / "r.parquet"
     few, more = (samples(made.variables, "sobol", count, 5) for count in (6, 8))

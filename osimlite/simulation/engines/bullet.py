@@ -22,7 +22,7 @@ from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
 from osimlite.robot.names import legal_names
 from osimlite.robot.robot import Robot
-from osimlite.simulation.elements import Forces, dissipating
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet_file import require_masses
 from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.bullet_world import World, bullet
@@ -253,24 +253,24 @@ class BulletEngine:
     ) -> RungeKuttaMerson:
         # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
         spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
-        auxiliary = dissipating(self.field.elements)
+        states = self.field.states
         return RungeKuttaMerson(
-            self._with_powers if auxiliary else self.derivative,
+            self._with_powers if states else self.derivative,
             t,
-            y + [0.0] * len(auxiliary),
+            y + [0.0] * len(states),
             self._count,
             nu=self._count,
             accuracy=settings.accuracy,
             count_q=len(self.mechanism.coordinates) + spare,
             count_u=len(self.mechanism.coordinates),
             observe=observe,
-            names=self._names + [element.state for element in auxiliary],
+            names=self._names + states,
             projection=projection,
         )
 
     def _with_powers(self, t: float, y: list[float]) -> list[float]:
         """(qdot, udot, zdot) at a state with its auxiliary part."""
-        return [*self.derivative(t, y[: 2 * self._count]), *self.field.powers(t, *self._joints(y))]
+        return self.derivative(t, y[: 2 * self._count]) + self.field.powers
 
     @property
     def _names(self) -> list[str]:

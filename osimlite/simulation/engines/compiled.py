@@ -16,7 +16,7 @@ from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.constrained import Constrained
 from osimlite.simulation.contact_elements import PairContact
-from osimlite.simulation.elements import Forces, dissipating
+from osimlite.simulation.elements import Forces, state_paths
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
 from osimlite.simulation.engines.protocol import FreeState, Settings
@@ -216,9 +216,8 @@ class CompiledEngine:
                 names=names,
                 projection=self.constrained,
             )
-        auxiliary = dissipating(self.forces.elements)
-        names += [element.state for element in auxiliary]
-        return CompiledMerson(self, t, [*y, *[0.0] * len(auxiliary)], settings.accuracy, observe, names)
+        states = state_paths(self.forces.elements)
+        return CompiledMerson(self, t, [*y, *[0.0] * len(states)], settings.accuracy, observe, names + states)
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
         return self.derivative(0.0, q + u)[: len(self.order)]

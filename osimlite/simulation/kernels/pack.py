@@ -15,7 +15,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyDrift, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.constrained import Constrained, free_coordinates
-from osimlite.simulation.elements import Forces, dissipating
+from osimlite.simulation.elements import Forces, state_of, state_paths
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.items import Item, Placement, Places, items_of
@@ -100,8 +100,8 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
     items = [items_of(element, places) for element in forces.elements]
-    numbers = {id(element): number for number, element in enumerate(forces.elements)}
-    states = [numbers[id(element)] for element in dissipating(forces.elements)]
+    paths = state_paths(forces.elements)
+    states = [paths.index(path) if path else -1 for path in map(state_of, forces.elements)]
     return _Packer(places, links, ends, items, states).packed(tuple(order))
 
 
@@ -200,7 +200,7 @@ class _Packer:
         self.links = links
         self.ends = ends
         self.items = items
-        self.states = states  # numbers of the elements with an auxiliary state
+        self.states = states  # number of the auxiliary state of each element, -1 without one
         self.operations = [operation for link in links for operation in link.operations]
         self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
@@ -227,7 +227,7 @@ class _Packer:
         self.operation_records()
         self.bond_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
-        ints[at.STATE_SIZE] = 2 * size + len(self.states)
+        ints[at.STATE_SIZE] = 2 * size + sum(number >= 0 for number in self.states)
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
         ints[at.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
@@ -349,9 +349,9 @@ class _Packer:
         records: list[int] = []
         pairs: list[int] = []
         found: list[list[tuple[Item, int]]] = []
-        for number, group in enumerate(self.items):
+        for number, group in zip(self.states, self.items, strict=True):
             found.append([])
-            state = (2 * self.ints[at.FREEDOMS] + self.states.index(number),) if number in self.states else ()
+            state = 2 * self.ints[at.FREEDOMS] + number
             first = len(pairs)
             for item in group:
                 place = contact + at.CONTACT_WORK * len(pairs) if item.is_contact else self.room(item.room)
@@ -363,7 +363,7 @@ class _Packer:
                 if not item.is_part:
                     records.append(len(self.ints))
                 law = at.WITHIN[item.law] if item.law in at.WITHIN else self.law(item.law)
-                self.ints += [law, len(self.numbers), place, first, *item.ints, *(state if item.has_state else ())]
+                self.ints += [law, len(self.numbers), place, first, *item.ints, *([state] if item.has_state else [])]
                 self.numbers += item.numbers
         self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)
         self.ints += records
