@@ -118,7 +118,8 @@ def examine(name: str) -> Package:
     # Some bring more than the module that bears their name; a few have none of it (PIL of pillow, yaml of pyyaml).
     named = name.lower().replace("-", "_")
     main = named if named in modules else next(module for module in modules if not module.startswith("_"))
-    done = subprocess.run([sys.executable, "-c", f"import {main}"], capture_output=True, text=True, check=False)
+    # -P: what lies in the current folder is not what was installed.
+    done = subprocess.run([sys.executable, "-P", "-c", f"import {main}"], capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return Package(name, version, "")
     words = done.stderr.strip().splitlines() or [f"its process ended with {done.returncode}"]

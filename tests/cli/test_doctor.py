@@ -39,6 +39,12 @@ def test_what_is_examined() -> None:
     assert examine("no-such-package-of-ours") == Package("no-such-package-of-ours", "", "")
 
 
+def test_what_lies_in_the_current_folder_is_not_executed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "lxml.py").write_text("raise SystemExit('executed')")
+    monkeypatch.chdir(tmp_path)
+    assert examine("lxml") == Package("lxml", metadata.version("lxml"), "")
+
+
 def test_a_package_that_cannot_be_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "torn.py").write_text("raise OSError('libtorn.so: wrong ELF class')\n")
     info = tmp_path / "torn-1.0.dist-info"

@@ -46,21 +46,84 @@ def test_the_guide_names_hooks_and_inputs_that_exist(repo: Path, guide: str) -> 
     assert step["with"].keys() <= inputs
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="the action runs bash")
+on_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action runs bash")
+
+
+def steps(repo: Path) -> list[dict[str, Any]]:
+    found = yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["runs"]["steps"]
+    return [step for step in found if "run" in step]
+
+
+def act(repo: Path, folder: Path, paths: str, fail_on: str = "") -> subprocess.CompletedProcess[str]:
+    """Run the last step of the action in a folder, as GitHub does."""
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    given = {"PATHS": paths, "FORMAT": "github", "FAIL_ON": fail_on, "BASELINE": "", "PATH": path}
+    return subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", steps(repo)[-1]["run"]],
+        env={**os.environ, **given}, capture_output=True, text=True, cwd=folder,
+    )  # fmt: skip
+
+
+def checked(done: subprocess.CompletedProcess[str]) -> list[str]:
+    """The files that the action found something in."""
+    return sorted(set(re.findall(r",file=([^,]+),", done.stdout)))
+
+
+@on_bash
 def test_the_action_validates(repo: Path, fixtures: Path, tmp_path: Path) -> None:
-    steps: list[dict[str, Any]] = yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["runs"]["steps"]
-    assert all(step["shell"] == "bash" for step in steps if "run" in step)
-    script = steps[-1]["run"].replace("python -m", f"'{sys.executable}' -m")
+    assert all(step["shell"] == "bash" for step in steps(repo))
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
-    given = {"FORMAT": "github", "BASELINE": "", "XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": str(repo)}
     for fail_on, code in (("", 0), ("error", 0), ("info", 1)):
-        done = subprocess.run(
-            ["bash", "-e", "-c", script],
-            env={**os.environ, **given, "PATHS": str(walker), "FAIL_ON": fail_on},
-            capture_output=True, text=True, cwd=tmp_path,
-        )  # fmt: skip
+        done = act(repo, tmp_path, str(walker), fail_on)
         assert done.returncode == code, done.stderr
         assert done.stdout.startswith("::notice title=OSIM508 limit-outside-range,file=")
+
+
+@on_bash
+@pytest.mark.parametrize(
+    ("paths", "found"),
+    [
+        ("a.osim b.osim", ["a.osim", "b.osim"]),
+        ("a.osim\nb.osim\n  sub/c.osim\n", ["a.osim", "b.osim", "sub/c.osim"]),
+        ("*.osim", ["--fix.osim", "a.osim", "b.osim"]),
+        ("**/*.osim", ["--fix.osim", "a.osim", "b.osim", "sub/c.osim", "sub/deep/d e.osim"]),
+        ("sub/deep/d?e.osim\tsub", ["sub/c.osim", "sub/deep/d e.osim"]),
+        ("-v", ["-v"]),
+        ("--fix.osim", ["--fix.osim"]),
+    ],
+)
+def test_the_action_checks_every_path(repo: Path, tmp_path: Path, paths: str, found: list[str]) -> None:
+    wrong = '<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>'
+    for name in ("a.osim", "b.osim", "-v", "--fix.osim", "sub/c.osim", "sub/deep/d e.osim"):
+        place = tmp_path / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(wrong)
+    done = act(repo, tmp_path, paths)
+    assert (done.returncode, checked(done)) == (1, found), done.stderr
+
+
+@on_bash
+@pytest.mark.parametrize("paths", ["gone.osim", "a.osim\ngone.osim", "a.osim gone/*.osim"])
+def test_what_the_action_does_not_find_fails_it(repo: Path, tmp_path: Path, paths: str) -> None:
+    (tmp_path / "a.osim").write_text('<OpenSimDocument Version="40600"><Model /></OpenSimDocument>')
+    done = act(repo, tmp_path, paths)
+    assert done.returncode == 2 and "gone" in done.stderr
+
+
+@on_bash
+def test_the_action_executes_nothing_of_what_was_checked_out(repo: Path, tmp_path: Path) -> None:
+    """Whatever the program imports could lie there: modules of it, of its libraries, of Python itself."""
+    for name in ("osimlite", "lxml", "pip", "typer", "multiprocessing", "json", "sitecustomize"):
+        (tmp_path / f"{name}.py").write_text("print('executed'); raise SystemExit(0)")
+        (tmp_path / name).mkdir()
+        for module in ("__init__", "__main__"):
+            (tmp_path / name / f"{module}.py").write_text("print('executed'); raise SystemExit(0)")
+    (tmp_path / "a.osim").write_text('<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>')
+    done = act(repo, tmp_path, "a.osim")
+    assert (done.returncode, checked(done)) == (1, ["a.osim"]) and "executed" not in done.stdout + done.stderr
+    assert not (tmp_path / ".osimlite_cache").exists()
+    pythons = [line for step in steps(repo) for line in step["run"].splitlines() if line.strip().startswith("python")]
+    assert len(pythons) == 2 and all(line.strip().startswith("python -I -m ") for line in pythons)
 
 
 def test_the_settings_of_the_guide_are_settings(guide: str, tmp_path: Path, fixtures: Path) -> None:
