@@ -140,14 +140,14 @@ def _show_places(console: Console, model: Path | None) -> None:
     """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
     from osimlite.files import GEOMETRY_VARIABLE
     from osimlite.lint.settings import settings_for
-    from osimlite.meshes.folders import geometry_folders
+    from osimlite.meshes.folders import MeshFolders
 
     folder = Path.cwd() if model is None else model.resolve() if model.is_dir() else model.resolve().parent
     settings = settings_for(folder)
     where = settings.file or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
     console.print(f"settings: {where}", soft_wrap=True)
     console.print("mesh folders, in the order of the search:")
-    for place in geometry_folders(folder, [Path(path) for path in settings.mesh_paths]):
+    for place in MeshFolders(folder, [Path(path) for path in settings.mesh_paths]).searched:
         console.print(f"  {place}: {_meshes(place)}", soft_wrap=True)
     if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
         console.print(

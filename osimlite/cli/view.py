@@ -63,14 +63,13 @@ def view(
     """
     from osimlite.cli._console import plain_console
     from osimlite.document.reader import read
-    from osimlite.meshes.folders import geometry_folders
     from osimlite.multibody import build_mechanism
     from osimlite.view.shown import Shown
 
     model = read(file)
     mechanism = build_mechanism(model)
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
-    folders = geometry_folders(file.parent, options.mesh_folders(file, geometry))
+    folders = options.mesh_folders(file, geometry)
     shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
     console = plain_console(highlight=False, soft_wrap=True)
     for remark in shown.remarks:

@@ -2,39 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from osimlite.files import named_mesh_folders
+from osimlite.errors import OsimliteError
+from osimlite.files import GEOMETRY_VARIABLE, named_mesh_folders
 
 
-def geometry_folders(beside: Path | None, more: Sequence[Path] = ()) -> tuple[Path, ...]:
-    """Folders of mesh files in the order of the search.
+class OutsideError(OsimliteError):
+    """A model names a file outside the folders that its meshes may come from."""
 
-    OpenSim's order: the model's folder, its folder ``Geometry``, then those that the user adds.
 
-    Args:
+@dataclass(frozen=True)
+class MeshFolders:
+    """Where the mesh files of a model may be.
+
+    Attributes:
         beside: the folder of the model's file; None if it has none.
-        more: folders that the user names; those in the environment variable follow them.
+        named: folders that the user names; those in the environment variable follow them.
     """
-    own = () if beside is None else (beside, beside / "Geometry")
-    return (*own, *more, *named_mesh_folders())
+
+    beside: Path | None = None
+    named: Sequence[Path] = ()
+
+    @property
+    def searched(self) -> tuple[Path, ...]:
+        """In OpenSim's order: the model's folder, its folder ``Geometry``, then those that the user names."""
+        own = () if self.beside is None else (self.beside, self.beside / "Geometry")
+        return (*own, *self._trusted_elsewhere)
+
+    @property
+    def _trusted_elsewhere(self) -> tuple[Path, ...]:
+        return (*self.named, *named_mesh_folders())
+
+    def find(self, name: str) -> Path | None:
+        """The first file of this name; failing that, one spelled with other capitals or slashes; None without any.
+
+        A model is not to be trusted with what else is on the machine: wherever an absolute name, ``..`` or a link
+        leads, the file itself is in the model's folder or in one that the user names.
+
+        Args:
+            name: relative to a folder, or absolute.
+
+        Raises:
+            OutsideError: there is such a file, but it is elsewhere.
+        """
+        elsewhere = None
+        for path in _candidates(name, self.searched):
+            if self._holds(path):
+                return path
+            elsewhere = elsewhere or path
+        if elsewhere is not None:
+            raise OutsideError(
+                f"the file '{name}' is in '{elsewhere.resolve().parent}', outside the model's folder; if you trust the "
+                f"model, name that folder (--geometry, or {GEOMETRY_VARIABLE})"
+            )
+        return None
+
+    def _holds(self, path: Path) -> bool:
+        roots = self._trusted_elsewhere if self.beside is None else (self.beside, *self._trusted_elsewhere)
+        return any(path.resolve().is_relative_to(root.resolve()) for root in roots)
 
 
-def find_file(name: str, folders: Sequence[Path]) -> Path | None:
-    """The first file of this name, in any of the folders; failing that, one spelled with other capitals or slashes.
-
-    Args:
-        name: relative to a folder, or absolute.
-        folders: looked into in this order.
-    """
+def _candidates(name: str, folders: Sequence[Path]) -> Iterator[Path]:
     if Path(name).is_absolute():
-        return Path(name) if _is_file(Path(name)) else None
-    exact = next((folder / name for folder in folders if _is_file(folder / name)), None)
-    if exact is not None:
-        return exact
-    parts = Path(name.replace("\\", "/")).parts
-    return next((found for folder in folders for found in [_descend(folder, parts)] if found is not None), None)
+        folders = (Path(),)
+    yield from (folder / name for folder in folders if _is_file(folder / name))
+    if not Path(name).is_absolute():
+        parts = Path(name.replace("\\", "/")).parts
+        yield from (found for folder in folders for found in _descend(folder, parts))
 
 
 def _is_file(path: Path) -> bool:
@@ -45,14 +82,19 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _descend(folder: Path, parts: Sequence[str]) -> Path | None:
-    """The file below a folder whose path has these parts, in any capitals."""
+def _descend(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
+    """The files below a folder whose path has these parts, in any capitals."""
     if not parts:
-        return folder if _is_file(folder) else None
+        if _is_file(folder):
+            yield folder
+        return
+    if parts[0] == "..":
+        yield from _descend(folder / "..", parts[1:])
+        return
     try:
         entries = sorted(folder.iterdir())
     except OSError:
-        return None
-    near = [entry for entry in entries if entry.name.casefold() == parts[0].casefold()]
-    near = near or [folder / part for part in parts[:1] if part == ".."]
-    return next((found for entry in near for found in [_descend(entry, parts[1:])] if found is not None), None)
+        return
+    for entry in entries:
+        if entry.name.casefold() == parts[0].casefold():
+            yield from _descend(entry, parts[1:])

@@ -18,7 +18,7 @@ _CORNER = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re.IG
 
 
 def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.0)) -> bytes:
-    """A text or binary STL file as an exact binary one.
+    """The triangles of a text or binary STL file as a binary one.
 
     Args:
         content: of the file.
@@ -26,14 +26,11 @@ def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.
         signs: (3,) of 1 and -1 that multiply the coordinates; the outside remains outside.
 
     Raises:
-        OsimliteError: it is not an STL file, is cut off, or has no triangle.
+        OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a place.
     """
-    mirrored = any(sign < 0.0 for sign in signs)
-    binary = _from_binary(content)
-    if binary is not None and len(content) == 84 + 50 * len(binary) and not mirrored:
-        return content
+    binary = _from_binary(content, name)
     triangles = binary if binary is not None else _from_text(content, name)
-    if mirrored:
+    if any(sign < 0.0 for sign in signs):
         triangles["corners"] *= np.array(signs, dtype="<f4")
         triangles["normal"] *= np.array(signs, dtype="<f4")
         if np.prod(signs) < 0.0:
@@ -43,17 +40,29 @@ def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.
 
 def stl_corners(content: bytes, name: str) -> Array:
     """The corners (t, 3, 3) of the triangles in a text or binary STL file; errors as those of :func:`binary_stl`."""
-    binary = _from_binary(content)
+    binary = _from_binary(content, name)
     return _text_corners(content, name) if binary is None else binary["corners"].astype(np.float64)
 
 
-def _from_binary(content: bytes) -> _Triangles | None:
+def is_binary(content: bytes) -> bool:
+    """Whether a file has the binary form.
+
+    Some programs begin binary files with the word that text files begin with, so the length decides.
+    """
+    return 84 < 84 + 50 * _count(content) <= len(content)
+
+
+def _count(content: bytes) -> int:
+    return int.from_bytes(content[80:84], "little")
+
+
+def _from_binary(content: bytes, name: str) -> _Triangles | None:
     """The triangles of a binary file; None if it is no such file."""
-    count = int.from_bytes(content[80:84], "little")
-    # Some programs begin binary files with the word that text files begin with, so the length decides.
-    if len(content) >= 84 and count and len(content) >= 84 + 50 * count:
-        return np.frombuffer(content, _TRIANGLE, count, 84).copy()
-    return None
+    if not is_binary(content):
+        return None
+    triangles = np.frombuffer(content, _TRIANGLE, _count(content), 84).copy()
+    _require_finite(triangles["corners"], name)
+    return triangles
 
 
 def _text_corners(content: bytes, name: str) -> Array:
@@ -63,7 +72,13 @@ def _text_corners(content: bytes, name: str) -> Array:
     corners_said = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
     if not len(numbers) or len(numbers) % 3 or len(numbers) != corners_said or b"endsolid" not in content.lower():
         raise OsimliteError("its triangles are damaged or cut off; save it again", file=name)
+    _require_finite(numbers, name)
     return numbers.reshape(-1, 3, 3)
+
+
+def _require_finite(numbers: Array, name: str) -> None:
+    if not np.isfinite(numbers).all():
+        raise OsimliteError("a corner is not three finite numbers; save it again", file=name)
 
 
 def _from_text(content: bytes, name: str) -> _Triangles:

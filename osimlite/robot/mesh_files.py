@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
 from osimlite.files import GEOMETRY_VARIABLE
-from osimlite.meshes.folders import find_file
-from osimlite.meshes.stl import binary_stl
-from osimlite.meshes.vtp import read_vtp
+from osimlite.meshes.folders import MeshFolders
+from osimlite.meshes.read import mesh_content, read_surface
+from osimlite.meshes.stl import binary_stl, is_binary
 from osimlite.robot.names import legal
 
 MESH_FOLDER = "meshes"
@@ -34,27 +33,25 @@ class MeshCopy:
         file: relative to the robot's own file.
         source: where it was found.
         converted: what was done to it, or "".
-        mirrored: whether the negative signs asked for are in the file.
         misspelt: whether its name has other capitals or slashes than the model says.
     """
 
     file: str
     source: Path
     converted: str
-    mirrored: bool
     misspelt: bool
 
 
 @dataclass
 class MeshFiles:
-    """Mesh files for a robot, each once.
+    """Mesh files for a robot, each once, and each written from what was read of it.
 
     Attributes:
-        folders: where files are looked for.
+        folders: where files may be.
         files: contents by name relative to the robot's own file.
     """
 
-    folders: Sequence[Path] = ()
+    folders: MeshFolders = field(default_factory=MeshFolders)
     files: dict[str, bytes] = field(default_factory=dict)
     _made: dict[tuple[object, ...], str] = field(default_factory=dict)
 
@@ -63,7 +60,7 @@ class MeshFiles:
 
         Args:
             name: as in the model.
-            signs: of the scale factors, to be put into the file if it has to be written anew anyway.
+            signs: of the scale factors; negative ones are put into the file.
 
         Raises:
             MeshProblem: it is not there, or nothing can be made of it.
@@ -71,27 +68,19 @@ class MeshFiles:
         kind = Path(name.replace("\\", "/")).suffix.lower()
         if kind not in _WRITTEN:
             raise MeshProblem(f"left out: osimlite, like OpenSim, does not read {kind or 'such'} files")
-        source = find_file(name, self.folders)
-        if source is None:
-            raise MeshProblem(
-                "left out: the file is neither beside the model, nor in its folder Geometry, nor in the folders "
-                f"named by --geometry or {GEOMETRY_VARIABLE}"
-            )
         try:
-            content, converted = source.read_bytes(), ""
-            if kind == ".vtp":
-                content, converted = _obj(content, source.name, signs), "written as an OBJ file of triangles"
-            elif kind == ".stl":
-                binary = binary_stl(content, source.name, signs)
-                content, converted = binary, "" if binary is content else "written as a binary STL file"
-        except OSError as error:
-            raise MeshProblem(f"left out: {error.strerror}") from None
+            source = self.folders.find(name)
+            if source is None:
+                raise MeshProblem(
+                    "left out: the file is neither beside the model, nor in its folder Geometry, nor in the folders "
+                    f"named by --geometry or {GEOMETRY_VARIABLE}"
+                )
+            content, converted = _written(source, kind, signs)
         except OsimliteError as error:
             raise MeshProblem(f"left out: {error}") from None
-        as_it_is = kind == ".obj"
-        file = self.add((str(source), () if as_it_is else signs), source.stem, _WRITTEN[kind], content)
+        file = self.add((str(source), signs), source.stem, _WRITTEN[kind], content)
         misspelt = not source.as_posix().endswith(Path(name).as_posix().removeprefix("./"))
-        return MeshCopy(file, source, converted, mirrored=not as_it_is, misspelt=misspelt)
+        return MeshCopy(file, source, converted, misspelt)
 
     def add(self, key: tuple[object, ...], stem: str, kind: str, content: bytes) -> str:
         """Relative name of a mesh file, the same for the same key and unlike any other, whatever the capitals."""
@@ -107,6 +96,12 @@ class MeshFiles:
         return self._made[key]
 
 
-def _obj(content: bytes, name: str, signs: Signs) -> bytes:
-    surface = read_vtp(content, name)
-    return (surface.mirrored(signs) if min(signs) < 0.0 else surface).obj().encode()
+def _written(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
+    """What is written of a file, and what was done to it."""
+    if kind == ".stl":
+        content = mesh_content(source)
+        binary = binary_stl(content, source.name, signs)
+        return binary, "" if is_binary(content) else "written as a binary STL file"
+    surface = read_surface(source)
+    text = (surface.mirrored(signs) if min(signs) < 0.0 else surface).obj().encode()
+    return text, "written as an OBJ file of triangles" if kind == ".vtp" else ""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import copysign
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -48,7 +46,6 @@ def collect_visuals(
     model: Model,
     mechanism: Mechanism,
     note: Note = _unheard,
-    folders: Sequence[Path] = (),
     mesh_files: MeshFiles | None = None,
 ) -> Visuals:
     """Gather the shapes of a model, each placed in the frame of the body that carries it.
@@ -57,10 +54,9 @@ def collect_visuals(
         model: where the geometry is.
         mechanism: of the same model; knows where frames are.
         note: is told of what cannot be drawn.
-        folders: where mesh files are looked for.
-        mesh_files: takes the mesh files up, and knows the folders, instead.
+        mesh_files: takes the mesh files up, and knows the folders; without it there are none.
     """
-    return _Collector(model, mechanism, note, mesh_files or MeshFiles(folders)).collect()
+    return _Collector(model, mechanism, note, mesh_files or MeshFiles()).collect()
 
 
 class _Collector:
@@ -187,7 +183,5 @@ def mesh_shape(
             "the file taken",
             f"{name} as {copy.source.name}",
         )
-    if min(scale) < 0.0 and not copy.mirrored:
-        note("mesh", path, "a mirrored mesh", "a negative scale, which not every program understands")
-    x, y, z = (abs(factor) for factor in scale) if copy.mirrored else scale
+    x, y, z = (abs(factor) for factor in scale)
     return MeshFile(copy.file, (x, y, z))

@@ -24,6 +24,7 @@ from osimlite.schema.model import Model
 from osimlite.text import listed
 
 if TYPE_CHECKING:
+    from osimlite.meshes.folders import MeshFolders
     from osimlite.simulation.field import Writer
 
 Triple = tuple[float, float, float]
@@ -220,11 +221,11 @@ class ElementBuilder:
         self.folder = folder
 
     @property
-    def mesh_folders(self) -> tuple[Path, ...]:
-        """Where mesh files are looked for."""
-        from osimlite.meshes.folders import geometry_folders
+    def mesh_folders(self) -> MeshFolders:
+        """Where mesh files may be."""
+        from osimlite.meshes.folders import MeshFolders
 
-        return geometry_folders(self.folder)
+        return MeshFolders(self.folder)
 
     def forces(self) -> Iterator[Any]:
         """Yield everything that applies a force, known or not."""

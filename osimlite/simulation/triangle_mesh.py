@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.errors import ModelError, OsimliteError
-from osimlite.meshes.folders import find_file
+from osimlite.errors import ModelError
+from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.obj import obj_polygons
+from osimlite.meshes.read import mesh_content
 from osimlite.meshes.stl import stl_corners
 from osimlite.meshes.surface import Indices, Polygons
 from osimlite.meshes.vtp import vtp_polygons
@@ -44,20 +43,17 @@ class TriangleMesh:
     triangles: Indices
 
     @classmethod
-    def read(cls, name: str, folders: Sequence[Path]) -> TriangleMesh:
-        """The surface in a file (.vtp, .stl, .stla or .obj) in one of some folders.
+    def read(cls, name: str, folders: MeshFolders) -> TriangleMesh:
+        """The surface in a file (.vtp, .stl, .stla or .obj) in one of the folders of a model.
 
         Raises:
             ModelError: there is no such file, it is of another kind, or it is not a closed surface.
-            OsimliteError: the file cannot be read.
+            OsimliteError: the file cannot be read, or is outside the folders.
         """
-        path = find_file(name, folders)
+        path = folders.find(name)
         if path is None:
             raise ModelError(f"the mesh file '{name}' is not there; put it beside the model's file")
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise OsimliteError(f"cannot read the file: {error.strerror}", file=str(path)) from None
+        content = mesh_content(path)
         match path.suffix.lower():
             case ".vtp":
                 return cls.of_polygons(vtp_polygons(content, str(path)), str(path))

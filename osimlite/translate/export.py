@@ -10,7 +10,7 @@ from typing import Literal
 
 from osimlite.errors import OsimliteError
 from osimlite.files import make_folder, write_atomically
-from osimlite.meshes.folders import geometry_folders
+from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
@@ -115,7 +115,7 @@ def to_urdf(
             raise OsimliteError(f"a limit of {what} is a positive number, not {limit:g}; leave it out for no limit")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
-    places = geometry_folders(None if folder is None else Path(folder), [Path(place) for place in geometry])
+    places = MeshFolders(None if folder is None else Path(folder), [Path(place) for place in geometry])
     mesh_files = MeshFiles(places)
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files=mesh_files) if visuals else Visuals()
     touching = collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}

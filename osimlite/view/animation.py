@@ -12,6 +12,7 @@ import numpy as np
 from osimlite._require import require
 from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
+from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -118,7 +119,7 @@ class _Film:
             raise OsimliteError(f"a picture shows the plane 'xy', 'yz' or 'xz', not '{plane}'")
         self.right, self.up = _AXES[plane]
         self.mechanism = build_mechanism(model)
-        self.scene = build_scene(model, self.mechanism, folders)
+        self.scene = build_scene(model, self.mechanism, MeshFolders(None, folders))
         recorded = np.asarray(motion.times, dtype=float)
         count = int(np.floor((recorded[-1] - recorded[0]) * fps / speed + 1e-9)) + 1
         self.times = recorded[0] + np.arange(count) * speed / fps

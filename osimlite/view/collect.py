@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
-from osimlite.meshes.folders import find_file
+from osimlite.meshes.folders import MeshFolders
+from osimlite.meshes.read import read_surface
 from osimlite.meshes.surface import Surface
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.schema_functions import numeric
@@ -49,19 +50,19 @@ _ENDLESS = 1.0
 _MARKER_RADIUS = 0.008
 
 
-def build_scene(model: Model, mechanism: Mechanism, folders: Sequence[Path] = ()) -> Scene:
+def build_scene(model: Model, mechanism: Mechanism, folders: MeshFolders | None = None) -> Scene:
     """Everything that can be drawn of a model; what cannot is a remark.
 
     Args:
         model: what to draw.
         mechanism: of the same model.
-        folders: where its mesh files are looked for.
+        folders: where its mesh files may be.
     """
-    return _Collector(model, mechanism, folders).scene()
+    return _Collector(model, mechanism, folders or MeshFolders()).scene()
 
 
 class _Collector:
-    def __init__(self, model: Model, mechanism: Mechanism, folders: Sequence[Path]) -> None:
+    def __init__(self, model: Model, mechanism: Mechanism, folders: MeshFolders) -> None:
         self.model, self.mechanism, self.folders = model, mechanism, folders
         self.tree = model.tree()
         self.surfaces: list[Surface] = []
@@ -311,11 +312,11 @@ class _Collector:
 
     def _mesh(self, name: str) -> Surface:
         """The mesh in a file; the same for the same file."""
-        found = find_file(name, self.folders)
+        found = self.folders.find(name)
         if found is None:
             raise ModelError(f"the mesh file {name} is in none of the folders searched; name one by --geometry")
         if found not in self.meshes:
-            self.meshes[found] = surfaces.read_surface(found)
+            self.meshes[found] = read_surface(found)
         return self.meshes[found]
 
     def _place(self, owner: Component, socket: str) -> tuple[int, Array]:

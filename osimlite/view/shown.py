@@ -12,6 +12,7 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.lint import Config, Finding, validate
+from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
@@ -70,7 +71,7 @@ class Shown:
         Args:
             model: which.
             mechanism: of the same model, if it is at hand.
-            folders: where its mesh files are looked for.
+            folders: where its mesh files are looked for besides the folder of `file`, as of `to_urdf`.
             file: that the model was read from, so that findings know their lines; None: the model itself is checked.
             motion: how it moves, or the file (.sto, .mot) that says so.
             forces: a file with contact forces, for a motion from a file.
@@ -80,8 +81,9 @@ class Shown:
             OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
         """
         mechanism = build_mechanism(model) if mechanism is None else mechanism
-        scene = build_scene(model, mechanism, folders)
-        config = Config(mesh_paths=tuple(str(folder.resolve()) for folder in folders))
+        places = MeshFolders(None if file is None else file.parent, folders)
+        scene = build_scene(model, mechanism, places)
+        config = Config(mesh_paths=tuple(str(folder.resolve()) for folder in places.searched))
         findings = validate(model if file is None else file, config=config).findings
         remarks = []
         if scene.remarks:

@@ -1,18 +1,13 @@
-"""Surfaces to draw: unit shapes of triangles, and the mesh files of a model."""
+"""Surfaces to draw: unit shapes of triangles, and normals."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
-from osimlite.errors import OsimliteError
-from osimlite.meshes.obj import obj_polygons
-from osimlite.meshes.stl import stl_corners
-from osimlite.meshes.surface import Indices, Surface, triangulated
-from osimlite.meshes.vtp import read_vtp
+from osimlite.meshes.surface import Indices, Surface
 from osimlite.multibody.spatial import Array
 
 SLICES, STACKS = 48, 24
@@ -110,28 +105,6 @@ def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
         triangles += [np.column_stack((a, b, b + slices)), np.column_stack((a, b + slices, a + slices))]
         first += len(strip) * slices
     return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals))
-
-
-def read_surface(path: Path) -> Surface:
-    """The surface in a file of the kinds that OpenSim reads (.vtp, .stl, .obj).
-
-    Raises:
-        OsimliteError: it cannot be read, or holds no surface.
-    """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise OsimliteError(f"cannot read the file: {error.strerror}", file=path.name) from None
-    match path.suffix.lower():
-        case ".vtp":
-            return read_vtp(content, path.name)
-        case ".stl":
-            points = stl_corners(content, path.name).reshape(-1, 3)
-            return Surface(points, np.arange(len(points)).reshape(-1, 3))
-        case ".obj":
-            polygons = obj_polygons(content, path.name)
-            return Surface(polygons.points, triangulated(*polygons))
-    raise OsimliteError(f"osimlite does not read {path.suffix or 'such'} files", file=path.name)
 
 
 def normals_of(surface: Surface) -> Array:

@@ -9,6 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.view.collect import build_scene
 from osimlite.view.page import page_data
@@ -21,7 +22,7 @@ def test_a_page_can_be_made(corpus_model) -> None:
         q = mechanism.assemble({})
     except OsimliteError as error:
         pytest.skip(f"no mechanism: {error.message}")
-    scene = build_scene(model, mechanism, [corpus_model.path.parent])
+    scene = build_scene(model, mechanism, MeshFolders(corpus_model.path.parent))
     data = page_data(model, scene, None, (), q)
     assert json.loads(json.dumps(data, allow_nan=False))["tree"]
     assert data["size"] > 0.0 and np.isfinite(data["center"]).all()

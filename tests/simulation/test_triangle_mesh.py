@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import ModelError, OsimliteError
+from osimlite.meshes.folders import MeshFolders
 from osimlite.simulation.triangle_mesh import TriangleMesh
 from tests.simulation.meshes import WRITERS, ball, block, triangles
 
@@ -20,7 +21,7 @@ def test_files_of_all_kinds(kind, shape, tmp_path):
     points, faces = shape((0.5, 0.4, 0.6))
     # An inside-out surface is turned.
     WRITERS[kind](tmp_path / f"mesh{kind}", points, [face[::-1] for face in faces])
-    mesh = TriangleMesh.read(f"mesh{kind}", [tmp_path])
+    mesh = TriangleMesh.read(f"mesh{kind}", MeshFolders(tmp_path))
     corners = triangles(points, faces)
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     assert mesh.areas.sum() == pytest.approx(area, rel=1e-6)
@@ -38,7 +39,7 @@ def test_corners_of_stl_files_that_are_nearly_in_one_place(tmp_path):
 
 def test_many_corners_make_a_fan_about_their_middle(tmp_path):
     WRITERS[".obj"](tmp_path / "block.obj", *block((1.0, 1.0, 1.0)))
-    mesh = TriangleMesh.read("block.obj", [tmp_path])
+    mesh = TriangleMesh.read("block.obj", MeshFolders(tmp_path))
     # Two hexagons and six quadrilaterals.
     assert len(mesh.triangles) == 2 * 6 + 6 * 2
     assert mesh.points[-2:] == pytest.approx(np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]))
@@ -77,18 +78,22 @@ def test_surfaces_that_cross():
 
 def test_what_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"the mesh file 'none.obj' is not there; put it beside the model's file"):
-        TriangleMesh.read("none.obj", [tmp_path])
+        TriangleMesh.read("none.obj", MeshFolders(tmp_path))
+    (tmp_path / "inner").mkdir()
+    WRITERS[".obj"](tmp_path / "block.obj", *block((1.0, 1.0, 1.0)))
+    with pytest.raises(OsimliteError, match=r"'\.\./block\.obj' is in .* outside the model's folder"):
+        TriangleMesh.read("../block.obj", MeshFolders(tmp_path / "inner"))
     (tmp_path / "mesh.ply").write_text("ply\n")
     with pytest.raises(ModelError, match=r"does not read \.ply files"):
-        TriangleMesh.read("mesh.ply", [tmp_path])
+        TriangleMesh.read("mesh.ply", MeshFolders(tmp_path))
     points, faces = block((1.0, 1.0, 1.0))
     WRITERS[".obj"](tmp_path / "open.obj", points, faces[1:])
     with pytest.raises(ModelError, match="is not a closed surface: 6 edges") as caught:
-        TriangleMesh.read("open.obj", [tmp_path])
+        TriangleMesh.read("open.obj", MeshFolders(tmp_path))
     assert caught.value.file == str(tmp_path / "open.obj")
     WRITERS[".obj"](tmp_path / "flat.obj", points * (1.0, 1.0, 0.0), faces)
     with pytest.raises(ModelError, match="triangles without area"):
-        TriangleMesh.read("flat.obj", [tmp_path])
+        TriangleMesh.read("flat.obj", MeshFolders(tmp_path))
     for text, line, words in (
         ("v 0 0 0\nv 0 one 0\n", 2, "this is no point"),
         ("v 0 0 0\nf 1 x 1\n", 2, "this is no face"),
@@ -98,5 +103,5 @@ def test_what_is_refused(tmp_path):
     ):
         (tmp_path / "bad.obj").write_text(text)
         with pytest.raises(OsimliteError, match=words) as caught:
-            TriangleMesh.read("bad.obj", [tmp_path])
+            TriangleMesh.read("bad.obj", MeshFolders(tmp_path))
         assert caught.value.line == line

@@ -239,7 +239,7 @@ def test_what_cannot_be_drawn_is_told():
 def test_mesh_files_come_along(tmp_path):
     (tmp_path / "Geometry").mkdir()
     (tmp_path / "Geometry" / "bone.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    binary = bytes(80) + (1).to_bytes(4, "little") + bytes(50)
+    binary = b"binary STL".ljust(80) + (1).to_bytes(4, "little") + bytes(50)
     (tmp_path / "bone.stl").write_bytes(binary)
     shapes = [
         Mesh(mesh_file="bone.obj", scale_factors=(1.0, 2.0, 1.0)),

@@ -11,6 +11,7 @@ import pytest
 
 from osimlite.errors import OsimliteError
 from osimlite.meshes.stl import binary_stl
+from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Appearance, Mesh
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
@@ -30,12 +31,19 @@ def stl_text() -> bytes:
     return "\n".join([*lines, "endsolid bone"]).encode()
 
 
+def obj_text() -> str:
+    lines = ["v {:g} {:g} {:g}".format(*corner) for corner in CORNERS]
+    lines += ["f {} {} {}".format(*(corner + 1 for corner in triangle)) for triangle in TETRAHEDRON]
+    return "\n".join([*lines, ""])
+
+
 @pytest.fixture
 def bones(tmp_path: Path, fixtures: Path) -> Path:
     """A folder with a folder Geometry in it."""
     (tmp_path / "Geometry").mkdir()
     shutil.copy(fixtures / "meshes" / "appended-raw-zlib.vtp", tmp_path / "Geometry" / "Femur.vtp")
     (tmp_path / "pelvis.stl").write_bytes(stl_text())
+    (tmp_path / "rib.obj").write_text(obj_text())
     return tmp_path
 
 
@@ -72,7 +80,7 @@ def test_vtk_surfaces_become_obj_files_that_others_read_alike(bones):
     assert seen.geom_rgba[-1] == pytest.approx((0.8, 0.1, 0.1, 0.5), abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["Femur.vtp", "pelvis.stl"])
+@pytest.mark.parametrize("name", ["Femur.vtp", "pelvis.stl", "rib.obj"])
 def test_mirrored_meshes_are_written_mirrored_and_face_outwards(bones, name):
     urdf = to_urdf(one_body(Mesh(mesh_file=name, scale_factors=(1.0, 1.0, -2.0)), Mesh(mesh_file=name)), folder=bones)
     mirrored, plain = meshes(urdf)
@@ -92,12 +100,18 @@ def test_text_stl_becomes_binary_which_bullet_reads(bones):
     assert load(urdf, "meshes/pelvis.stl").volume == pytest.approx(1 / 6)
     with in_bullet(urdf.text, urdf.files) as bullet:
         assert len(bullet.pb.getVisualShapeData(bullet.body, physicsClientId=bullet.client)) == 1
-    # What is binary already stays as it is, but for what follows its last triangle.
-    assert binary_stl(content, "x.stl") is content
-    assert binary_stl(content + b"\0\0", "x.stl")[80:] == content[80:]
+    # What is binary already keeps its triangles, and nothing else.
+    assert binary_stl(b"secret".ljust(80) + content[80:] + b"secret", "x.stl") == content
 
 
-@pytest.mark.parametrize("content", [b"", b"solid", stl_text()[:300], stl_text().replace(b"1.000", b"one"), bytes(90)])
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(b"", b"solid", bytes(90), stl_text()[:300]),
+        *(stl_text().replace(b"1.000", word) for word in (b"one", b"1e999")),
+        bytes(80) + (1).to_bytes(4, "little") + b"\xff" * 50,
+    ],
+)
 def test_damaged_stl_files_are_refused(content):
     with pytest.raises(OsimliteError, match=r"bone\.stl: .*save it again"):
         binary_stl(content, "bone.stl")
@@ -106,15 +120,41 @@ def test_damaged_stl_files_are_refused(content):
 def test_damaged_meshes_are_told(bones):
     (bones / "Geometry" / "Femur.vtp").write_bytes(b"solid bone")
     (bones / "pelvis.stl").write_bytes(b"")
-    shapes = [Mesh(mesh_file=name) for name in ("Femur.vtp", "pelvis.stl", "bone.ply", "")]
+    (bones / "rib.obj").write_text("root:x:0:0:root:/root:/bin/bash")
+    shapes = [Mesh(mesh_file=name) for name in ("Femur.vtp", "pelvis.stl", "bone.ply", "", "rib.obj")]
     urdf = to_urdf(one_body(*shapes), folder=bones)
     done = [record.done for record in urdf.fidelity if record.kind == "mesh"]
-    assert len(done) == 4 and visuals(urdf) == []
+    assert len(done) == 5 and visuals(urdf) == [] and urdf.files == {}
     assert "Femur.vtp: it is not a VTK file" in done[0] and "pelvis.stl: it is not an STL file" in done[1]
     assert "does not read .ply files" in done[2] and "such files" in done[3]
+    assert "rib.obj: it is not an OBJ file with faces" in done[4]
+
+
+def test_only_what_was_read_is_written(bones):
+    (bones / "rib.obj").write_text("# secret\nmtllib ../../secret.mtl\n" + obj_text() + "l 1 2\n")
+    urdf = to_urdf(one_body(Mesh(mesh_file="rib.obj")), folder=bones)
+    assert {line.split()[0] for line in urdf.files["meshes/rib.obj"].decode().splitlines()} == {"v", "f"}
+    assert load(urdf, "meshes/rib.obj").volume == pytest.approx(1 / 6)
 
 
 # ------------------------------------------------------------------------------------------------ where they are
+def test_files_outside_the_folders_are_refused_by_name(bones):
+    (bones / "model").mkdir()
+    (bones / "model" / "own.obj").symlink_to(bones / "rib.obj")
+    names = [str(bones / "rib.obj"), "../rib.obj", "own.obj", "../pelvis.stl", "../Geometry/Femur.vtp"]
+    model = one_body(*(Mesh(mesh_file=name) for name in names))
+    model.contact_geometry_set.objects.append(
+        ContactMesh(name="shell", socket_frame=model.body_set.objects[0], filename=names[0])
+    )
+    urdf = to_urdf(model, folder=bones / "model", collision=True)
+    done = [record.done for record in urdf.fidelity if record.kind == "mesh"]
+    assert len(done) == 6 and visuals(urdf) == [] and urdf.files == {}
+    for name, told in zip([*names, names[0]], done, strict=True):
+        assert f"'{name}'" in told and "outside the model's folder" in told and "--geometry" in told
+    trusted = to_urdf(model, folder=bones / "model", geometry=[bones], collision=True)
+    assert "mesh" not in kinds(trusted) and len(visuals(trusted)) == 5
+
+
 def test_a_file_spelled_alike_is_taken_and_reported(bones):
     urdf = to_urdf(one_body(Mesh(mesh_file="geometry\\femur.VTP"), Mesh(mesh_file="PELVIS.stl")), folder=bones)
     assert [item["filename"] for item in meshes(urdf)] == ["meshes/Femur.obj", "meshes/pelvis.stl"]
@@ -125,7 +165,7 @@ def test_a_file_spelled_alike_is_taken_and_reported(bones):
 def test_names_of_two_files_are_kept_apart_and_legal(tmp_path):
     for folder in ("a", "b", "c"):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / ("os coxæ.obj" if folder == "c" else "bone.obj")).write_text("v 0 0 0\n" * len(folder))
+        (tmp_path / folder / ("os coxæ.obj" if folder == "c" else "bone.obj")).write_text(obj_text())
     shapes = [Mesh(mesh_file=name) for name in ("a/bone.obj", "b/bone.obj", "a/bone.obj", "c/os coxæ.obj")]
     urdf = to_urdf(one_body(*shapes), folder=tmp_path)
     wanted = ["meshes/bone.obj", "meshes/bone_2.obj", "meshes/bone.obj", "meshes/os_cox_.obj"]

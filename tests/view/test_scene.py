@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
+from osimlite.meshes.folders import MeshFolders
+from osimlite.meshes.read import read_surface
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus
@@ -14,12 +16,12 @@ from osimlite.view import surfaces
 from osimlite.view.collect import build_scene
 
 
-def scene_of(model, folders=()):
+def scene_of(model, folders=None):
     mechanism = build_mechanism(model)
     return build_scene(model, mechanism, folders), mechanism
 
 
-def with_shape(shape, folders=()):
+def with_shape(shape, folders=None):
     """The pelvis with one shape: the scene, and the shape's points in the frame of the body."""
     model = dynamic_walker()
     pelvis = model.body_set.objects[1]
@@ -74,7 +76,7 @@ def test_meshes_are_read_from_files_of_every_kind(repo: Path):
     for path in sorted(folder.rglob("*")):
         if path.suffix.lower() in (".vtp", ".stl", ".obj"):
             try:
-                surface = surfaces.read_surface(path)
+                surface = read_surface(path)
             except OsimliteError:
                 continue
             kinds.add(path.suffix.lower())
@@ -85,17 +87,21 @@ def test_meshes_are_read_from_files_of_every_kind(repo: Path):
 
 def test_a_mesh_is_found_scaled_and_shared(tmp_path: Path):
     (tmp_path / "corner.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n")
-    scene, points = with_shape(Mesh(mesh_file="corner.obj", scale_factors=(2.0, 1.0, -1.0)), [tmp_path])
+    scene, points = with_shape(Mesh(mesh_file="corner.obj", scale_factors=(2.0, 1.0, -1.0)), MeshFolders(tmp_path))
     assert points.min(axis=0).tolist() == [0.0, 0.0, -1.0] and points.max(axis=0).tolist() == [2.0, 1.0, 0.0]
     assert not scene.remarks
 
 
-def test_what_cannot_be_drawn_is_said_and_the_body_becomes_a_stick():
+def test_what_cannot_be_drawn_is_said_and_the_body_becomes_a_stick(tmp_path):
     scene, points = with_shape(Mesh(mesh_file="nowhere.vtp"))
     assert points is None
     ((path, said),) = scene.remarks
     assert path == "/bodyset/Pelvis/Pelvis_geom_1" and "nowhere.vtp" in said and "--geometry" in said
     assert [line.path for line in scene.lines] == ["/bodyset/Pelvis"] * 2
+    corner = tmp_path / "corner.obj"
+    corner.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scene, points = with_shape(Mesh(mesh_file=str(corner)), MeshFolders(tmp_path / "inner"))
+    assert points is None and "outside the model's folder" in scene.remarks[0][1]
     scene, points = with_shape(Torus())
     assert points is None and "Torus" in scene.remarks[0][1]
 
