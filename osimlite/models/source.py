@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
-from osimlite._load import errors_placed, module_named, module_of_file
+from osimlite._load import errors_placed, imports_beside, module_named, module_of_file
 from osimlite.document.data import SUFFIXES, read_data
 from osimlite.errors import OsimliteError
 from osimlite.models import BUILT_IN
@@ -36,7 +37,7 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     function = _function(source)
     arguments = _arguments(function, parameters or {}, source)
     file = inspect.getsourcefile(function)
-    with errors_placed(str(file)):
+    with errors_placed(str(file)), nullcontext() if source in BUILT_IN else imports_beside(str(file)):
         model = function(**arguments)
     if not isinstance(model, Model):
         raise OsimliteError(f"'{source}' returned a {type(model).__name__}, not an osimlite.Model")
