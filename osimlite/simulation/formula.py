@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 from osimlite.errors import ModelError
 from osimlite.simulation.script import Scalar
-from osimlite.text import did_you_mean, listed
+from osimlite.text import counted, did_you_mean, listed
 
 if TYPE_CHECKING:
     from osimlite.simulation.field import Writer
@@ -49,29 +49,42 @@ FUNCTIONS = {
 """The law for each of Lepton's functions."""
 
 OF_TWO = ("min", "max")
+LAWS = {"/": "divide", "^": "power"}
+"""The law for a sign, where that is not called like it."""
 PRECEDENCE = {"+": 0, "-": 0, "*": 1, "/": 1, "^": 3}
-SIGN = 2
-DEEPEST = 100
-"""Nesting beyond this is refused."""
+SIGN, OPEN = 2, -1
+"""Of a sign before an operand, and of what only a parenthesis closes."""
 
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[^-+*/^(),\d.][^-+*/^(),]*)|(?P<sign>.)"
 )
 
 
-@dataclass(frozen=True)
-class Formula:
-    """A formula: a number, the name of a variable, or a law applied to formulas.
+class Step(NamedTuple):
+    """One number of a formula.
 
     Attributes:
-        head: name of the law, "+", "-", "*", "variable", "number" or "negative".
-        parts: its arguments.
+        law: "number", "negative", "+", "-", "*", or the name of a law.
+        arguments: registers that it is applied to.
+        value: the number, if it is one.
     """
 
-    head: str
-    parts: tuple[Formula, ...] = ()
-    name: str = ""
+    law: str
+    arguments: tuple[int, ...] = ()
     value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula as a list of steps, so that neither its length nor its depth has a limit.
+
+    Attributes:
+        variables: names of what it is computed from, in the first registers.
+        steps: each gives the number of the next register; the last one gives the result.
+    """
+
+    variables: tuple[str, ...]
+    steps: tuple[Step, ...]
 
     @classmethod
     def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:
@@ -86,116 +99,144 @@ class Formula:
             ModelError: it is no formula.
         """
         main, *definitions = re.sub(r"\s", "", text).split(";")
-        known = {name: cls("variable", name=name) for name in variables}
+        reader = _Reader(variables)
         try:
             for definition in reversed([item for item in definitions if item]):
                 name, equals, body = definition.partition("=")
                 if not name or not equals:
                     raise _Wrong(f"'{definition}' has no name; write name = formula")
-                known[name] = _Reader(body, known).all()
-            return _Reader(main, known).all()
+                reader.known[name] = reader.read(body)
+            result = reader.read(main)
         except _Wrong as wrong:
             raise ModelError(f"{where} is '{text}': {wrong}") from None
+        if result < len(variables) + len(reader.steps) - 1 or not reader.steps:
+            reader.add("+", result, reader.add("number", value=0.0))
+        return cls(tuple(variables), tuple(reader.steps))
 
     def write(self, writer: Writer, variables: Mapping[str, Scalar]) -> Scalar:
         """Write the code; `variables` are the scalars of their names."""
-        if self.head == "number":
-            return self.value
-        if self.head == "variable":
-            return variables[self.name]
-        # What a definition names is computed once, however often it is used.
-        key = ("formula", id(self), *variables.values())
-        scalar: Scalar = writer.script.once(key, lambda: self._apply(writer, variables))
-        return scalar
+        registers = [variables[name] for name in self.variables]
+        for step in self.steps:
+            registers.append(_written(writer, step, [registers[place] for place in step.arguments]))
+        return registers[-1]
 
-    def _apply(self, writer: Writer, variables: Mapping[str, Scalar]) -> Scalar:
-        parts = [part.write(writer, variables) for part in self.parts]
-        if self.head in "+-":
-            return writer.script.sum((parts[0],), (1.0 if self.head == "+" else -1.0, parts[1]))
-        if self.head == "*":
-            return writer.script.sum(tuple(parts))
-        if self.head == "negative":
-            return writer.script.sum((-1.0, parts[0]))
-        called: Scalar = writer.call(self.head, *parts)
-        return called
+
+def _written(writer: Writer, step: Step, parts: Sequence[Scalar]) -> Scalar:
+    if step.law == "number":
+        return step.value
+    if step.law in ("+", "-"):
+        return writer.script.sum((parts[0],), (1.0 if step.law == "+" else -1.0, parts[1]))
+    if step.law == "*":
+        return writer.script.sum(tuple(parts))
+    if step.law == "negative":
+        return writer.script.sum((-1.0, parts[0]))
+    called: Scalar = writer.call(step.law, *parts)
+    return called
 
 
 class _Wrong(Exception):
     """What is wrong with a formula."""
 
 
-@dataclass
+class _Waiting(NamedTuple):
+    """What waits for an operand: a law of one or two numbers, or what a parenthesis opened."""
+
+    law: str
+    precedence: int
+    before: int
+    """Count of the operands that were there before its own."""
+    name: str = ""
+    """Of the function, if it is a call."""
+
+
 class _Reader:
-    """Reads one formula by climbing precedences."""
+    """Reads formulas of the same variables, with a stack of operands and one of what waits for them.
 
-    text: str
-    known: Mapping[str, Formula]
-    tokens: list[re.Match[str]] = field(init=False)
-    place: int = 0
-    depth: int = 0
+    Attributes:
+        known: registers of the names that may be used.
+        steps: of all formulas so far.
+    """
 
-    def __post_init__(self) -> None:
-        self.tokens = list(_TOKEN.finditer(self.text))
+    def __init__(self, variables: Sequence[str]) -> None:
+        self.known = {name: place for place, name in enumerate(variables)}
+        self.steps: list[Step] = []
+        self._first = len(variables)
+        self._operands: list[int] = []
+        self._waiting: list[_Waiting] = []
 
-    def all(self) -> Formula:
-        found = self.formula(0)
-        if self.place < len(self.tokens):
-            raise _Wrong(f"there is an unexpected '{self.next}'; remove it")
-        return found
+    def add(self, law: str, *arguments: int, value: float = 0.0) -> int:
+        """Add a step: its register."""
+        self.steps.append(Step(law, arguments, value))
+        return self._first + len(self.steps) - 1
 
-    @property
-    def next(self) -> str:
-        return self.tokens[self.place].group() if self.place < len(self.tokens) else ""
-
-    def formula(self, least: int) -> Formula:
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise _Wrong(f"it is nested more than {DEEPEST} deep; name its parts after a semicolon")
-        found = self.operand()
-        while self.next in PRECEDENCE and self.next and PRECEDENCE[self.next] >= least:
-            sign = self.next
-            self.place += 1
-            other = self.formula(PRECEDENCE[sign] + (sign != "^"))
-            found = Formula({"/": "divide", "^": "power"}.get(sign, sign), (found, other))
-        self.depth -= 1
-        return found
-
-    def operand(self) -> Formula:
-        if self.place >= len(self.tokens):
+    def read(self, text: str) -> int:
+        """The register of a formula."""
+        called, wants_operand = "", True
+        for token in _TOKEN.finditer(text):
+            word = token.group()
+            if wants_operand and token["name"] and text.startswith("(", token.end()):
+                called = word
+            elif wants_operand and word == "(":
+                self._open(called)
+                called = ""
+            elif wants_operand and word == "-":
+                self._wait("negative", SIGN, 0)
+            elif wants_operand and not token["sign"]:
+                self._operands.append(self._number_of(token))
+                wants_operand = False
+            elif not wants_operand and word in PRECEDENCE:
+                # ^ takes what stands right of it first, the others what stands left.
+                self._apply(PRECEDENCE[word] + (word == "^"))
+                self._wait(LAWS.get(word, word), PRECEDENCE[word], 1)
+                wants_operand = True
+            elif not wants_operand and word in (",", ")"):
+                wants_operand = self._end_part(word)
+            else:
+                raise _Wrong(f"there is an unexpected '{word}'; remove it")
+        if wants_operand:
             raise _Wrong("it ends too early; complete it")
-        token = self.tokens[self.place]
-        self.place += 1
-        if token["number"]:
-            return Formula("number", value=float(token.group()))
-        if token["name"]:
-            if self.next == "(":
-                return self.call(token.group())
-            if token.group() not in self.known:
-                near = did_you_mean(token.group(), self.known)
-                raise _Wrong(f"there is no '{token.group()}'{near}; there is {listed(list(self.known))}")
-            return self.known[token.group()]
-        if token.group() == "(":
-            found = self.formula(0)
-            self.close()
-            return found
-        if token.group() == "-":
-            return Formula("negative", (self.formula(SIGN),))
-        raise _Wrong(f"there is an unexpected '{token.group()}'; remove it")
-
-    def call(self, name: str) -> Formula:
-        if name not in FUNCTIONS:
-            raise _Wrong(f"there is no function '{name}'{did_you_mean(name, FUNCTIONS)}")
-        parts: list[Formula] = []
-        while self.next == ("," if parts else "("):
-            self.place += 1
-            parts.append(self.formula(0))
-        self.close()
-        wanted = 2 if name in OF_TWO else 1
-        if len(parts) != wanted:
-            raise _Wrong(f"'{name}' takes {wanted} argument{'s' * (wanted > 1)}, not {len(parts)}")
-        return Formula(FUNCTIONS[name], tuple(parts))
-
-    def close(self) -> None:
-        if self.next != ")":
+        self._apply(0)
+        if self._waiting:
             raise _Wrong("its parentheses do not match; close them")
-        self.place += 1
+        return self._operands.pop()
+
+    def _number_of(self, token: re.Match[str]) -> int:
+        word = token.group()
+        if token["number"]:
+            return self.add("number", value=float(word))
+        if word not in self.known:
+            near = did_you_mean(word, self.known)
+            raise _Wrong(f"there is no '{word}'{near}; there is {listed(list(self.known))}")
+        return self.known[word]
+
+    def _wait(self, law: str, precedence: int, taken: int, name: str = "") -> None:
+        self._waiting.append(_Waiting(law, precedence, len(self._operands) - taken, name))
+
+    def _open(self, called: str) -> None:
+        if called and called not in FUNCTIONS:
+            raise _Wrong(f"there is no function '{called}'{did_you_mean(called, FUNCTIONS)}")
+        self._wait(FUNCTIONS.get(called, ""), OPEN, 0, called)
+
+    def _apply(self, least: int) -> None:
+        """Apply what binds at least as closely as this to the operands it waits for."""
+        while self._waiting and self._waiting[-1].precedence >= least:
+            self._take(self._waiting.pop())
+
+    def _take(self, waiting: _Waiting) -> None:
+        arguments = self._operands[waiting.before :]
+        self._operands[waiting.before :] = [self.add(waiting.law, *arguments)]
+
+    def _end_part(self, sign: str) -> bool:
+        """End an argument or a parenthesis; whether another operand must follow."""
+        self._apply(0)
+        if not self._waiting or (sign == "," and not self._waiting[-1].name):
+            raise _Wrong(f"there is an unexpected '{sign}'; remove it")
+        if sign == ",":
+            return True
+        opened = self._waiting.pop()
+        if name := opened.name:
+            wanted, given = 2 if name in OF_TWO else 1, len(self._operands) - opened.before
+            if given != wanted:
+                raise _Wrong(f"'{name}' takes {counted(wanted, 'argument')}, not {given}")
+            self._take(opened)
+        return False

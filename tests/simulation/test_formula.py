@@ -63,6 +63,29 @@ def test_definitions_that_double_are_written_once():
     assert value(text) == pytest.approx(0.7)
 
 
+LONG = 20_000
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("+".join(["q"] * LONG), LONG * 0.7),
+        ("-".join(["q"] * LONG), 0.7 - (LONG - 1) * 0.7),
+        ("^".join(["q"] * LONG), None),
+        ("(" * LONG + "q" + ")" * LONG, 0.7),
+        ("-" * LONG + "q", 0.7),
+        ("min(q, " * LONG + "q" + ")" * LONG, 0.7),
+        ("q+(" * LONG + "q" + ")" * LONG, (LONG + 1) * 0.7),
+        (";".join(["a0", *(f"a{k}=a{k + 1}+1" for k in range(LONG)), f"a{LONG}=q"]), LONG + 0.7),
+    ],
+    ids=["sum", "difference", "power", "parentheses", "signs", "calls", "nested sums", "definitions"],
+)
+def test_no_length_and_no_depth_is_too_much(text, expected):
+    found = value(text)
+    # The power has a limit, where x = 0.7^x.
+    assert found == pytest.approx(0.7**found if expected is None else expected)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -77,7 +100,10 @@ def test_definitions_that_double_are_written_once():
         ("+q", r"unexpected '\+'"),
         ("q;3", "has no name"),
         ("2q", "unexpected 'q'"),
-        ("(" * 300 + "q", "nested more than"),
+        ("(" * 300 + "q", "parentheses"),
+        ("q, u", "unexpected ','"),
+        ("(q, u)", "unexpected ','"),
+        ("min()", r"unexpected '\)'"),
         ("__import__('os')", "there is no function"),
         ("q.real", "there is no 'q.real'"),
     ],

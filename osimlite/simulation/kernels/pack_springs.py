@@ -38,7 +38,7 @@ def pack_coordinate_spring(element: CoordinateSpring, places: Places) -> list[It
 def pack_coordinate_formula(element: CoordinateFormula, places: Places) -> list[Item]:
     """Force; the energy is not known."""
     freedom, value = places.freedom(element.coordinate), places.locked_value(element.coordinate)
-    steps, constants = program(element.formula, ("q", "qdot"))
+    steps, constants = program(element.formula)
     kept, count = of_record(lambda record: (record[0], 0.0)), len(steps) // 3
     ints = freedom, count, *steps
     return [Item(kept, "coordinate_formula", ints, (value, *constants), room=3 + count)]
@@ -56,43 +56,22 @@ def pack_point_spring(element: PointSpring, places: Places) -> list[Item]:
     if not isinstance(element.law, Formula):
         kept = of_record(lambda record: tuple(record[:13]))
         return [Item(kept, "point_spring", tuple(links[:2]), (*numbers, *element.law), room=13)]
-    steps, constants = program(element.law, ("d", "ddot"))
+    steps, constants = program(element.law)
     count = len(steps) // 3
     kept = of_record(lambda record: (*record[:12], 0.0))
     return [Item(kept, "point_formula", (*links[:2], count, *steps), (*numbers, *constants), room=14 + count)]
 
 
-def program(formula: Formula, variables: Sequence[str], first: int = 0) -> tuple[list[int], list[float]]:
-    """Steps and constants of a formula, as `programs.compute` takes them.
-
-    Args:
-        formula: the formula.
-        variables: their names, in the order of the registers.
-        first: place of the first constant.
-    """
+def program(formula: Formula) -> tuple[list[int], list[float]]:
+    """Steps and constants of a formula, as `programs.compute` takes them."""
     steps: list[int] = []
     constants: list[float] = []
-    known: dict[int, int] = {}
-
-    def register(part: Formula) -> int:
-        if part.head == "variable":
-            return variables.index(part.name)
-        # What a definition names is computed once, however often it is used.
-        if id(part) not in known:
-            one, two = first + len(constants), 0
-            if part.head == "number":
-                constants.append(part.value)
-            else:
-                one, two, *_ = *(register(item) for item in part.parts), 0
-            known[id(part)] = len(variables) + len(steps) // 3
-            steps.extend((STEPS.index(part.head), one, two))
-        return known[id(part)]
-
-    last = register(formula)
-    if formula.head == "variable":
-        # The result is that of the last step.
-        constants.append(0.0)
-        steps.extend((STEPS.index("number"), first, 0, STEPS.index("+"), last, len(variables)))
+    for step in formula.steps:
+        one, two, *_ = *step.arguments, 0, 0
+        if step.law == "number":
+            one = len(constants)
+            constants.append(step.value)
+        steps += STEPS.index(step.law), one, two
     return steps, constants
 
 
@@ -122,7 +101,7 @@ def pack_bushing(element: Bushing, places: Places) -> list[Item]:
         most = 0
         for law in element.laws:
             assert isinstance(law, Formula)
-            own, constants = program(law, DEVIATIONS)
+            own, constants = program(law)
             heads += 2 + 18 + len(steps), len(own) // 3, len(numbers)
             steps += own
             numbers += constants
@@ -164,7 +143,7 @@ def pack_path_spring(element: PathSpringElement, places: Places) -> list[Item]:
 def pack_path_formula(element: PathFormula, places: Places) -> list[Item]:
     """Tension; the energy is not known."""
     links, points = path_numbers(element, places)
-    steps, constants = program(element.formula, ("s", "ldot"))
+    steps, constants = program(element.formula)
     numbers = (*points, element.resting_length, 1.0 if element.clamped else 0.0, *constants)
     count = len(steps) // 3
     kept = of_record(lambda record: (record[2], 0.0))
