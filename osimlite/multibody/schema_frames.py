@@ -21,29 +21,45 @@ class Placements:
         self.found: dict[str, tuple[str, Array]] = {}
         """The body (or ground) that each frame is fixed to so far, and where it is there (4, 4)."""
 
-    def frame(self, frame: PhysicalFrame, followed: tuple[str, ...] = ()) -> tuple[str, Array]:
+    def frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
         """The body (or ground) that a frame is fixed to, and the frame's transform (4, 4) there.
 
         Raises:
             ModelError: frames are fixed to each other in a circle, or stations do not define a frame.
             UnsupportedError: a frame of another class.
         """
-        path = self.path(frame)
-        if path in self.found:
-            return self.found[path]
-        if path in followed:
-            raise ModelError(f"the frame '{path}' is fixed to itself, through {listed(followed)}; fix it to a body")
+        # Each frame that waits is fixed to the next one; a chain of them may be of any length.
+        wanted = self.path(frame)
+        waiting = {} if wanted in self.found else {wanted: frame}
+        while waiting:
+            path, last = next(reversed(waiting.items()))
+            below = next((item for item in self._below(last) if self.path(item) not in self.found), None)
+            if below is None:
+                self.found[path] = self._placed(last, path)
+                del waiting[path]
+            elif (place := self.path(below)) in waiting:
+                raise ModelError(f"the frame '{place}' is fixed to itself, through {listed(waiting)}; fix it to a body")
+            else:
+                waiting[place] = below
+        return self.found[wanted]
+
+    def _below(self, frame: PhysicalFrame) -> list[PhysicalFrame]:
+        """The frames that a frame is laid on."""
+        if isinstance(frame, PhysicalOffsetFrame):
+            return [self.named(frame, "socket_parent")]
+        if isinstance(frame, StationDefinedFrame):
+            return [self.named(station, "socket_parent_frame") for station in self._stations(frame)]
+        return []
+
+    def _placed(self, frame: PhysicalFrame, path: str) -> tuple[str, Array]:
         if isinstance(frame, Body | Ground):
-            found = (path, np.eye(4))
-        elif isinstance(frame, PhysicalOffsetFrame):
-            base, matrix = self.frame(self.named(frame, "socket_parent"), (*followed, path))
-            found = (base, matrix @ offset(frame.translation, frame.orientation))
-        elif isinstance(frame, StationDefinedFrame):
-            found = self._through_stations(frame, path, (*followed, path))
-        else:
-            raise UnsupportedError(f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place")
-        self.found[path] = found
-        return found
+            return path, np.eye(4)
+        if isinstance(frame, PhysicalOffsetFrame):
+            base, matrix = self.frame(self.named(frame, "socket_parent"))
+            return base, matrix @ offset(frame.translation, frame.orientation)
+        if isinstance(frame, StationDefinedFrame):
+            return self._through_stations(frame, path)
+        raise UnsupportedError(f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place")
 
     def named(self, owner: Component, socket: str) -> PhysicalFrame:
         """The frame that a socket of `owner` leads to."""
@@ -56,9 +72,9 @@ class Placements:
             )
         return target
 
-    def station(self, station: Station, followed: tuple[str, ...] = ()) -> tuple[str, Array]:
+    def station(self, station: Station) -> tuple[str, Array]:
         """The body (or ground) that a station is fixed to, and its place (3,) there."""
-        base, matrix = self.frame(self.named(station, "socket_parent_frame"), followed)
+        base, matrix = self.frame(self.named(station, "socket_parent_frame"))
         return base, matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
 
     def path(self, component: Component) -> str:
@@ -67,18 +83,21 @@ class Placements:
         assert path is not None
         return path
 
-    def _through_stations(self, frame: StationDefinedFrame, path: str, followed: tuple[str, ...]) -> tuple[str, Array]:
-        bases, points = [], []
+    def _stations(self, frame: StationDefinedFrame) -> list[Station]:
+        """Points a, b, c and the origin of a frame."""
+        stations = []
         for socket in ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"):
             target = self.tree.target(frame, socket, getattr(frame, socket))
             if not isinstance(target, Station):
                 raise ModelError(
-                    f"the frame '{path}': {socket} names '{self.path(target)}', a {type(target).__name__}; "
+                    f"the frame '{self.path(frame)}': {socket} names '{self.path(target)}', a {type(target).__name__}; "
                     "name a Station"
                 )
-            base, point = self.station(target, followed)
-            bases.append(base)
-            points.append(point)
+            stations.append(target)
+        return stations
+
+    def _through_stations(self, frame: StationDefinedFrame, path: str) -> tuple[str, Array]:
+        bases, points = zip(*map(self.station, self._stations(frame)), strict=True)
         if len(set(bases)) > 1:
             raise ModelError(
                 f"the stations of the frame '{path}' are fixed to {listed(sorted(set(bases)))}; fix all to one body"

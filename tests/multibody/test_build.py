@@ -9,7 +9,8 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody import Mechanism, Wrench, build_mechanism
-from osimlite.multibody.spatial import inverse, offset
+from osimlite.multibody.schema_frames import Placements
+from osimlite.multibody.spatial import inverse, offset, transform
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
@@ -17,6 +18,7 @@ from osimlite.schema.functions import ExpressionBasedFunction
 from osimlite.schema.joints import BallJoint, FreeJoint, Joint, PinJoint, PlanarJoint, WeldJoint
 from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
+from osimlite.schema.tree import Tree
 from tests.multibody.cases import load
 
 WALKER = load("walker_dynamics_cases.json")
@@ -243,6 +245,28 @@ def _pendulum() -> tuple[Model, Body, Joint]:
 
 def _second(model: Model, joint: Joint, parent, child) -> None:
     model.add(_named(joint).between(parent, child))
+
+
+@pytest.mark.parametrize("through_stations", [False, True])
+def test_a_chain_of_frames_may_be_of_any_length(through_stations):
+    model, body, _ = _pendulum()
+    base: Any = body
+    for number in range(1500):
+        if through_stations:
+            points = [
+                Station(name=f"{name}{number}", location=place, socket_parent_frame=base)
+                for name, place in zip("abco", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 0.01)], strict=True)
+            ]
+            names = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
+            sockets: Any = dict(zip(names, points, strict=True))
+            base = StationDefinedFrame(name=f"f{number}", ab_x_ac_axis="+z", **sockets)
+            model.component_set.objects += points
+        else:
+            base = PhysicalOffsetFrame(name=f"f{number}", socket_parent=base, translation=(0, 0, 0.01))
+        model.component_set.objects.append(base)
+    path, matrix = Placements(Tree(model)).frame(base)
+    assert path == "/bodyset/rod"
+    np.testing.assert_allclose(matrix, transform(np.eye(3), np.array([0, 0, 15.0])), atol=1e-12)
 
 
 def _loop(model: Model, body: Body, joint: Joint) -> None:
