@@ -66,14 +66,14 @@ class Basin:
 
 
 def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int) -> Floats:
-    """Random starts (count, 2n) near a state.
+    """Random starts (count, y) near a state.
 
     Every value and every speed, as far as it is not neutral, is multiplied by a number that lies within `part` of 1;
     then the walker is lifted or lowered until the foot that stands is as deep in the ground as it was.
 
     Args:
         step_map: of the walker.
-        state: best one at which a single foot stands (2n,).
+        state: best one at which a single foot stands (y,).
         part: 0.05 for five per cent.
         count: how many starts.
         seed: of the random numbers.
@@ -101,7 +101,7 @@ def walks_from(
     Args:
         step_map: of the walker.
         cycle: its cycle.
-        states: starts (W, 2n).
+        states: starts (W, y).
         wanted: number of steps.
         accuracy: of the integrator.
         progress: called now and then.

@@ -24,7 +24,7 @@ class Cycle:
     """A walk that repeats itself with every step, or every stride if the legs differ.
 
     Attributes:
-        state: at the heel strike of the first foot, in the engine's order (2n,).
+        state: at the heel strike of the first foot, in the engine's order (y,).
         length: of a step along the slope, m.
         period: of a step, s.
         multipliers: Floquet multipliers (of a step, or of a stride if the legs differ) without those of the neutral
@@ -79,7 +79,7 @@ def find_cycle(
 
     Args:
         step_map: of the walker.
-        state: where to begin (2n,), at a heel strike of the first foot; by default where the map was made.
+        state: where to begin (y,), at a heel strike of the first foot; by default where the map was made.
         converged: largest residual.
         most_steps: Newton steps.
         settle: walk so many steps first.

@@ -61,7 +61,7 @@ def stood(
     *,
     numbers: Floats | None = None,
 ) -> Floats:
-    """States (W, 2n) lifted or lowered until one foot is so deep (m) in the ground.
+    """States (W, y) lifted or lowered until one foot is so deep (m) in the ground.
 
     Args:
         engine: of the model.
@@ -87,7 +87,7 @@ def stood(
 
 
 def planted(engine: CompiledEngine, footing: Footing, states: Floats, *, numbers: Floats | None = None) -> Floats:
-    """States (W, 2n) put on the ground with the deeper foot, which is at rest there.
+    """States (W, y) put on the ground with the deeper foot, which is at rest there.
 
     The walker is lifted or lowered until that foot only just touches; then the speeds of the coordinates that carry it
     as a whole are those with which the centre of this foot's deepest contact does not move.
@@ -128,7 +128,7 @@ def planted(engine: CompiledEngine, footing: Footing, states: Floats, *, numbers
 
 
 def upright(states: Floats, neutral: Floats) -> Floats:
-    """States (..., 2n) moved along the neutral directions (2n, m) until the first entries that can be are zero.
+    """States (..., y) moved along the neutral directions (y, m) until the first entries that can be are zero.
 
     A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin and not turned.
     """

@@ -55,7 +55,7 @@ class Images:
     """Where the step map takes W states.
 
     Attributes:
-        states: on the section (W, 2n); not a number where there was no step.
+        states: on the section (W, y); not a number where there was no step.
         lengths: of the step, m (W,); of a stride of two steps, the mean.
         times: that the step takes, s (W,); of a stride of two steps, the mean.
         scuffs: how many there were on the way (W,).
@@ -72,17 +72,17 @@ class StepMap:
 
     Args:
         engine: of the model.
-        near: a state (2n,) from which it makes a step, best one at a heel strike.
+        near: a state (y,) from which it makes a step, best one at a heel strike.
         footing: its feet; looked for if left out.
         accuracy: of the integrator.
         longest: a step takes at most so long, s.
         threads: how many work.
 
     Attributes:
-        start: the first heel strike after `near`, written for the first foot (2n,).
+        start: the first heel strike after `near`, written for the first foot (y,).
         exchange: see `leg_exchange`.
-        neutral: orthonormal directions in which nothing acts (2n, m).
-        basis: orthonormal directions of all others (2n, 2n - m).
+        neutral: orthonormal directions in which nothing acts (y, m).
+        basis: orthonormal directions of all others (y, y - m).
 
     Raises:
         OsimliteError: there are no two feet, or the walker makes no step from there.
@@ -119,7 +119,7 @@ class StepMap:
 
         Args:
             engine: of that model, of the same structure.
-            near: a state from which it makes a step, and where reduced states are along the neutral directions (2n,).
+            near: a state from which it makes a step, and where reduced states are along the neutral directions (y,).
             accuracy: of the integrator; by default the same.
 
         Raises:
@@ -141,7 +141,7 @@ class StepMap:
         return other
 
     def _first_step(self, near: Floats) -> tuple[Step, Floats]:
-        """The first step from a state, and states on the way there (k, 2n)."""
+        """The first step from a state, and states on the way there (k, y)."""
         runs = run_many(
             self.engine, near[None], self.longest, accuracy=self.accuracy,
             watches=falls(self.footing), most_events=room_for(self.longest), event_states=True, threads=1,
@@ -167,7 +167,7 @@ class StepMap:
         return second
 
     def land(self, state: Floats, foot: int) -> Floats:
-        """A state (2n,) a billionth of a second from a heel strike, moved onto it."""
+        """A state (y,) a billionth of a second from a heel strike, moved onto it."""
         contacts = [self.engine.contacts.index(name) for name in self.footing.feet[foot]]
         rate = np.array(self.engine.derivative(0.0, state.tolist()))
         dt = 1e-7
@@ -179,7 +179,7 @@ class StepMap:
 
     # ----------------------------------------------------------------------------------------------- images
     def __call__(self, states: ArrayLike) -> Images:
-        """Map states (W, 2n) in which the first foot has just touched down."""
+        """Map states (W, y) in which the first foot has just touched down."""
         first = self._single(np.asarray(states, dtype=float), 0)
         if self.exchange is not None:
             return Images(first.states[:, self.exchange], first.lengths, first.times, first.scuffs)
@@ -223,11 +223,11 @@ class StepMap:
 
     # -------------------------------------------------------------------------------------------- coordinates
     def reduce(self, states: ArrayLike) -> Floats:
-        """States without the neutral directions (..., 2n - m)."""
+        """States without the neutral directions (..., y - m)."""
         reduced: Floats = np.asarray(states, dtype=float) @ self.basis
         return reduced
 
     def expand(self, reduced: ArrayLike) -> Floats:
-        """States (..., 2n) from reduced ones; along the neutral directions they are where `start` is."""
+        """States (..., y) from reduced ones; along the neutral directions they are where `start` is."""
         states: Floats = np.asarray(reduced) @ self.basis.T + self.start @ self.neutral @ self.neutral.T
         return states

@@ -41,7 +41,7 @@ class Step(NamedTuple):
         foot: that touches down.
         length: how far ahead of the other foot, along the slope, m.
         air: how long it was in the air, s.
-        state: at touch-down, in the engine's order (2n,).
+        state: at touch-down, in the engine's order (y,).
     """
 
     time: float
@@ -117,7 +117,7 @@ def walk_many(
 
     Args:
         engine: of the model.
-        states: where they start (W, 2n), in the engine's order.
+        states: where they start (W, y), in the engine's order.
         to: how long they walk, s, if they do not fall.
         footing: their feet; looked for if left out.
         numbers: of models of the same structure, one row for each walker, see `run_many`.
@@ -149,7 +149,7 @@ def walks_of(
 
     Args:
         engine: of the model.
-        states: where the runs started (W, 2n).
+        states: where the runs started (W, y).
         runs: made with the watches of `falls`, among others.
         footing: their feet.
         numbers: as given to `run_many`.
@@ -248,7 +248,7 @@ def along_slope(
 
     Args:
         engine: of the model.
-        states: (k, 2n).
+        states: (k, y).
         vectors: numbers of models of the same structure (v, m); by default the engine's own.
         rows: which of them each state goes with (k,).
 

@@ -22,15 +22,15 @@ UNEVEN = 10.0
 
 
 def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) -> Ints | None:
-    """The places (2n,) from which the state is taken when the legs change parts, or None if they are not alike.
+    """The places (y,) from which the state is taken when the legs change parts, or None if they are not alike.
 
-    The coordinates of one leg, from where the legs part to the foot, change places with those of the other. Whether
-    that makes no difference to the motion is tried out.
+    The coordinates of one leg, from where the legs part to the foot, change places with those of the other, and
+    auxiliary states with those that do the same there. Whether that makes no difference to the motion is tried out.
 
     Args:
         engine: of the model.
         footing: with two feet.
-        states: at which to try (k, 2n).
+        states: at which to try (k, y).
     """
     mechanism = engine.mechanism
     body_of = {
@@ -61,9 +61,10 @@ def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) ->
     if len(freedoms[0]) != len(freedoms[1]):
         return None
     n = len(places)
-    source = np.arange(2 * n)
+    source = np.arange(engine.state.size)
     for one, two in zip(*freedoms, strict=True):
         source[[one, two, n + one, n + two]] = two, one, n + two, n + one
+    _exchange_auxiliary(engine, source, np.asarray(states, dtype=float))
     for state in np.asarray(states, dtype=float):
         here, there = (np.array(engine.derivative(0.0, y.tolist())) for y in (state, state[source]))
         if not np.allclose(here[source], there, rtol=SAME, atol=SAME * np.abs(here).max()):
@@ -71,15 +72,44 @@ def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) ->
     return source
 
 
+def _exchange_auxiliary(engine: CompiledEngine, source: Ints, states: Floats) -> None:
+    """Complete the places, which are known for values and speeds."""
+    first = 2 * len(engine.order)
+    if first == engine.state.size:
+        return
+    # Those that belong together have equal values where all have just started.
+    states = engine.state.started(states)
+    columns = [*source[:first], first, first + 1]
+    before = np.stack([_effects(engine, state)[:, columns] for state in states], axis=1)
+    after = np.stack([_effects(engine, state[source]) for state in states], axis=1)
+    tolerances = SAME * np.abs(before).max(axis=(0, 1))
+    for place, effects in enumerate(after):
+        alike = np.flatnonzero((np.abs(before - effects) <= tolerances).all(axis=(1, 2)))
+        if len(alike) and place not in alike:
+            source[first + place] = first + alike[0]
+
+
+def _effects(engine: CompiledEngine, state: Floats) -> Floats:
+    """What each auxiliary state (z) does: by how much it changes the other rates (2n) and its own, and that rate."""
+    first, here = 2 * len(engine.order), np.array(engine.derivative(0.0, state.tolist()))
+    rows = []
+    for place in range(first, len(state)):
+        moved = state.copy()
+        moved[place] += NUDGE
+        slope = (np.array(engine.derivative(0.0, moved.tolist())) - here) / NUDGE
+        rows.append([*slope[:first], slope[place], here[place]])
+    return np.array(rows)
+
+
 def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
-    """Directions (2n, m) of the state in which the motion goes on unchanged, but for going that way; orthonormal.
+    """Directions (y, m) of the state in which the motion goes on unchanged, but for going that way; orthonormal.
 
     A walker may be anywhere along an even slope; a body that hangs in its mass centre turns as fast as it pleases. The
     derivative does not change in these directions or changes along one of them, at all of the states.
 
     Args:
         engine: of the model.
-        states: some that the walk goes through (k, 2n).
+        states: some that the walk goes through (k, y).
     """
     found_slopes = [derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)]
     usual = float(np.median([uneven for _, uneven in found_slopes]))
@@ -101,7 +131,7 @@ def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
 
 
 def derivative_matrix(engine: CompiledEngine, state: Floats) -> tuple[Floats, float]:
-    """Derivative (2n, 2n) of the rate of change of the state by the state, and how even that is.
+    """Derivative (y, y) of the rate of change of the state by the state, and how even that is.
 
     Evenness: the part by which the differences to either side are unlike; much where a contact only just touches.
     """

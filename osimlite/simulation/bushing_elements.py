@@ -15,6 +15,7 @@ from osimlite.simulation.elements import ElementBuilder, Triple, triple
 from osimlite.simulation.field import Writer, integral
 from osimlite.simulation.formula import Formula
 from osimlite.simulation.script import Matrix, Scalar, Vector, matrix
+from osimlite.simulation.states import StateVariable
 
 DEVIATIONS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 FUNCTIONS = (
@@ -48,7 +49,7 @@ class Bushing:
         laws: for the six deviations, angles first.
         damping: N.m/(rad/s), N/(m/s).
         about_bodies: whether the torques of the record are about the origins of the bodies instead of the frames.
-        state: path of the energy that the dampers have taken up, if that is a state.
+        states: the energy that the dampers have taken up, if that is one.
     """
 
     path: str
@@ -58,15 +59,15 @@ class Bushing:
     laws: tuple[Law, ...]
     damping: tuple[float, ...]
     about_bodies: bool = False
-    state: str = ""
+    states: tuple[StateVariable, ...] = ()
 
     @classmethod
     def linear(cls, builder: ElementBuilder, force: BushingForce) -> Bushing:
         """The element of a BushingForce."""
         stiffness = *force.rotational_stiffness, *force.translational_stiffness
         builder.check(force, stiffness)
-        path = f"{builder.path(force)}/dissipated_energy"
-        return cls._of(builder, force, stiffness, about_bodies=True, state=path)
+        state = StateVariable(f"{builder.path(force)}/dissipated_energy", is_simbody=True)
+        return cls._of(builder, force, stiffness, about_bodies=True, states=(state,))
 
     @classmethod
     def by_functions(cls, builder: ElementBuilder, force: FunctionBasedBushingForce) -> Bushing:
@@ -117,9 +118,9 @@ class Bushing:
         force = script.apply(r1, _triple(loads[3:]))
         writer.push(columns, force)
         writer.turn(columns, moment)
-        if self.state:
+        for state in self.states:
             damped = [(rate, c) for rate, c in zip(rates, self.damping, strict=True) if c != 0.0]
-            writer.dissipate(self.state, script.sum(*((writer.call("bushing_dissipation", *each),) for each in damped)))
+            writer.dissipate(state.path, script.sum(*((writer.call("bushing_dissipation", *each),) for each in damped)))
         if writer.reporting:
             writer.keep(0, *force, *moment, *start, *end, self._energy(writer, deviations))
 

@@ -21,6 +21,7 @@ from osimlite.multibody.schema_functions import numeric
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import CoordinateLimitForce, Force, HuntCrossleyForce
 from osimlite.schema.model import Model
+from osimlite.simulation.states import StateVariable
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -63,14 +64,14 @@ class CoordinateLimit:
 
     Attributes:
         constants: Ku, qu, Kl, ql, D, t of the law.
-        state: path of the energy that the damper has taken up, if that is a state.
+        states: the energy that the damper has taken up, if that is one.
     """
 
     path: str
     name: str
     coordinate: int
     constants: tuple[float, float, float, float, float, float]
-    state: str = ""
+    states: tuple[StateVariable, ...] = ()
 
     def write(self, writer: Writer) -> None:
         """Write the force on the coordinate."""
@@ -79,11 +80,11 @@ class CoordinateLimit:
         if isinstance(q, str):
             # The law is called beyond the limits only; where they are crossed (ql > qu), always.
             outside = f"if {q} > {qu!r} or {q} < {ql!r}:" if ql <= qu else "if True:"
-            if self.state:
-                writer.dissipate(self.state, 0.0)
+            for state in self.states:
+                writer.dissipate(state.path, 0.0)
             with writer.script.block(outside):
-                if self.state:
-                    writer.dissipate(self.state, writer.call("limit_dissipation", q, u, qu, ql, D, t))
+                for state in self.states:
+                    writer.dissipate(state.path, writer.call("limit_dissipation", q, u, qu, ql, D, t))
                 value = writer.call("limit_force", q, u, Ku, qu, Kl, ql, D, t)
                 writer.push_coordinate(self.coordinate, value)
                 self._keep(writer, value, q)
@@ -106,41 +107,12 @@ class CoordinateLimit:
         return [0.0, 0.0] if value is None else [value[0], value[-1]]
 
 
-def state_of(element: Any) -> str:
-    """Path of the auxiliary state of a force element, empty if it has none."""
-    return getattr(element, "state", "")
-
-
-def state_paths(elements: Sequence[Any]) -> list[str]:
-    """Paths of the auxiliary states: energies (J) that dampers have taken up.
-
-    Nothing depends on them, but their errors count in the control of the steps, as they do in OpenSim. They are in its
-    order: first those that are not Simbody's.
-    """
-    in_order = sorted(elements, key=lambda element: not isinstance(element, CoordinateLimit))
-    return [path for path in map(state_of, in_order) if path]
-
-
 @dataclass(frozen=True)
 class Forces:
     """The force elements of a model in its order, and the forces that were left out, as ``path (class)``."""
 
     elements: tuple[ForceElement, ...]
     skipped: tuple[str, ...] = ()
-
-
-def auxiliary_states(forces: Forces, states: Sequence[Sequence[float]], plain: int) -> dict[str, list[float]]:
-    """Columns of the auxiliary states of a motion by path, in the order of the forces; none after fixed steps.
-
-    Args:
-        forces: of the model.
-        states: one row for each moment.
-        plain: how many numbers stand before them in a row.
-    """
-    places = {path: plain + number for number, path in enumerate(state_paths(forces.elements))}
-    if len(states[0]) == plain:
-        return {}
-    return {path: [row[places[path]] for row in states] for path in map(state_of, forces.elements) if path}
 
 
 def force_elements(
@@ -301,8 +273,8 @@ class ElementBuilder:
         )
         self.check(force, constants)
         path = self.path(force)
-        state = f"{path}/dissipatedEnergy" if force.compute_dissipation_energy else ""
-        return CoordinateLimit(path, force.name, place, constants, state)
+        states = (StateVariable(f"{path}/dissipatedEnergy"),) if force.compute_dissipation_energy else ()
+        return CoordinateLimit(path, force.name, place, constants, states)
 
     def check(self, component: Any, numbers: Sequence[float]) -> None:
         """Raise a ModelError if a number is not finite."""

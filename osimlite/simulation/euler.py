@@ -14,13 +14,15 @@ FIXED_STEP_TOLERANCE = 1e-9
 
 
 class SemiImplicitEuler(Stepper):
-    """Fixed steps u1 = u0 + h udot(t0, q0, u0), q1 = q0 + h qdot(q0, u1): first order; PyBullet steps like that.
+    """Fixed steps u1 = u0 + h udot(t0, y0), q1 = q0 + h qdot(q0, u1), z1 = z0 + h zdot(t0, y0), with y = (q, u, z).
+
+    That is of first order; PyBullet steps like that.
 
     Args:
-        f: derivative of the state (q, u); only the speeds' part is used.
+        f: derivative of the state; the part of q is not used.
         t: initial time, s.
         y: initial state.
-        nq: number of coordinates in it.
+        nq: number of coordinates in it, and of speeds after them; the rest are auxiliary states.
         h: step, s. Only a step that would pass the limit is shortened.
         rates: qdot as a function of (q, u); by default qdot = u.
         observe: called with (time, state) after each step taken.
@@ -44,8 +46,8 @@ class SemiImplicitEuler(Stepper):
         if not 0.0 < h < inf:
             raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
         super().__init__(f, t, y, observe, names)
-        if rates is None and len(self.state) != 2 * nq:
-            raise ValueError(f"{nq} coordinates and {len(self.state) - nq} speeds need a function for qdot")
+        if len(self.state) < 2 * nq:
+            raise ValueError(f"{nq} coordinates and as many speeds do not fit into {len(self.state)} states")
         self._nq = nq
         self._h = h
         self._rates = rates
@@ -65,9 +67,10 @@ class SemiImplicitEuler(Stepper):
             t = limit
             self._origin, self._since = limit, 0
         q = self.state[: self._nq]
-        u = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
+        rest = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
+        u = rest[: self._nq]
         rates = u if self._rates is None else self._rates(q, u)
-        y = [x + h * v for x, v in zip(q, rates, strict=True)] + u
+        y = [x + h * v for x, v in zip(q, rates, strict=True)] + rest
         if self._projection is not None:
             found = self._projection.project(t, y, None, FIXED_STEP_TOLERANCE)
             if found is None:

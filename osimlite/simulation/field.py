@@ -31,8 +31,9 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.chain import Chain, Column
 from osimlite.simulation.contact_elements import PairContact
-from osimlite.simulation.elements import ForceElement, Triple, state_paths
+from osimlite.simulation.elements import ForceElement, Triple
 from osimlite.simulation.script import ZERO, Scalar, Script, Vector, matrix, vector
+from osimlite.simulation.states import StateLayout
 
 _MODULES = (
     bushing,
@@ -177,6 +178,7 @@ class ForceField:
         number_of: the number in the state of each coordinate that moves.
         separate: whether the state is told apart from the values and rates of the joints.
         contacts: names of the contacts, by their number.
+        state: what a state consists of.
         states: paths of the auxiliary states.
         powers: their derivatives where `generalized` was last called.
     """
@@ -193,7 +195,8 @@ class ForceField:
         self.elements = tuple(elements)
         self.separate = order is not None
         self.order = tuple(own_coordinates(joints) if order is None else order)
-        self.states = state_paths(self.elements)
+        self.state = StateLayout(self.mechanism, self.order, self.elements)
+        self.states = self.state.paths
         self.powers = [0.0] * len(self.states)
         self.number_of = {place: number for number, place in enumerate(self.order)}
         self.contacts = tuple(

@@ -56,7 +56,7 @@ def run_many(
 
     Args:
         engine: of the model.
-        states: where the runs start (W, 2n), in the engine's order.
+        states: where the runs start (W, y), in the engine's order.
         to: when they end unless a watch stops them, s.
         numbers: `engine.numbers` of models of the same structure, one row for each run; by default the engine's own.
         accuracy: of the integrator.
@@ -72,10 +72,7 @@ def run_many(
         OsimliteError: the shapes do not fit, or a watch names nothing or a locked coordinate.
         ModelError: a watch names what does not exist.
     """
-    starts = np.array(states, dtype=np.float64, order="C")
-    size = 2 * len(engine.order)
-    if starts.ndim != 2 or starts.shape[1] != size:
-        raise OsimliteError(f"the states are one row of {size} numbers for each run; got {starts.shape}")
+    starts = engine.state.table(states)
     _check_settings(to, accuracy, report_times, most_events, most_tries, threads)
     vectors, count = _rows(engine, numbers), len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
@@ -144,14 +141,14 @@ def contact_places(
 
     Args:
         engine: of the model.
-        states: (k, 2n).
+        states: (k, y).
         numbers: of models of the same structure (v, m); by default the engine's own.
         rows: which of them each state goes with (k,); by default the first.
     """
-    vectors, given = _rows(engine, numbers), np.array(states, dtype=np.float64, order="C")
+    vectors, given = _rows(engine, numbers), engine.state.table(states)
     which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     places = np.zeros((len(given), len(engine.contacts), 9))
-    w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(2 * len(engine.order))
+    w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(engine.state.size)
     entry_point("contact_places")(
         *(part.ctypes.data for part in (engine.program, vectors, w)),
         vectors.shape[1],

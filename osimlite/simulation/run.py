@@ -16,12 +16,13 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import Constrained, kept_state
-from osimlite.simulation.elements import auxiliary_states, force_elements
+from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines import engine_factory
-from osimlite.simulation.engines.protocol import Engine, FreeState, Settings
+from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import doubt_of, in_units_of
+from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Stepper
 from osimlite.simulation.summary import course, outcome, versions
 from osimlite.simulation.trajectory import Report, Trajectory
@@ -153,8 +154,10 @@ class Simulation:
 
             visuals = collect_visuals(model, self.mechanism)
         self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
-        self.state = FreeState(self.mechanism, self.engine.order)
+        self.state = self.engine.state
         self.constraints = Constrained(self.mechanism, self.engine.order).names
+        paths = [f"{info.path}/{what}" for info in self.mechanism.coordinates for what in ("value", "speed")]
+        self._paths = in_model_order(model, paths + self.state.paths)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._settings = {
             "skip_unsupported": skip_unsupported,
@@ -220,7 +223,7 @@ class Simulation:
 
     # --------------------------------------------------------------------------------------------- helpers
     def initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
-        """State in the engine's order (2n) at the default values and speeds, but for those given (rad, m).
+        """State in the engine's order (y,) at the default values and speeds, but for those given (rad, m).
 
         Raises:
             ModelError: there is no such coordinate.
@@ -289,8 +292,10 @@ class Simulation:
             lambda: [engine.energies(*moment) for moment in zip(times, states, strict=True)],
             summary,
         )
-        auxiliary = auxiliary_states(self.forces, states, 2 * len(engine.order))
-        return Trajectory(self.mechanism, times, *self.state.histories(states), report, auxiliary)
+        values, speeds = self.state.histories(states)
+        return Trajectory(
+            self.mechanism, times, values, speeds, report, self.state.auxiliary_histories(states), self._paths
+        )
 
 
 LONGEST_STEP = 0.1

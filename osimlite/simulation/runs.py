@@ -38,17 +38,17 @@ class Watch(NamedTuple):
 
 @dataclass(frozen=True)
 class Runs:
-    """W runs of n degrees of freedom.
+    """W runs, whose states have y numbers.
 
     Attributes:
         times: at which the runs ended (W,), s.
-        states: in which (W, 2n), in the engine's order.
+        states: in which (W, y), in the engine's order.
         endings: how, see `ENDINGS` (W,).
         counts: steps taken, steps tried, evaluations (W, 3).
-        reports: states at the report times (W, r, 2n); not a number after the end of a run.
+        reports: states at the report times (W, r, y); not a number after the end of a run.
         events: of each run its events in the order of time: time (s), name, whether it begins or rises.
         peaks: largest force (N) of each contact at the end of a step, and its time (s) (W, P, 2).
-        event_states: of each run the states at its events (as many as events, 2n), if they were asked for.
+        event_states: of each run the states at its events (as many as events, y), if they were asked for.
     """
 
     times: Floats

@@ -1,8 +1,8 @@
 """What follows a motion in steps: the present state, the step to the next one, and states at times in between.
 
-A state is one list y = (q, u) or (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative
-comes from a function f(t, y) that returns (qdot, udot) or (qdot, udot, zdot) as a fresh sequence of Python floats
-and leaves y alone. Lists of floats are quicker than arrays here up to some 30 states.
+A state is one list y = (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative comes from a
+function f(t, y) that returns (qdot, udot, zdot) as a fresh sequence of Python floats and leaves y alone. Lists of
+floats are quicker than arrays here up to some 30 states.
 """
 
 from __future__ import annotations

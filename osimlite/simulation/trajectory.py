@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite._require import require
 from osimlite.files import make_folder, write_atomically
@@ -30,17 +31,19 @@ class Trajectory:
         values: coordinate values (n, k), rad or m.
         speeds: generalized speeds (n, k).
         auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
-            a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it. Empty with fixed steps.
+            a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it.
+        paths: of all states, in the order of OpenSim: ".../value" and ".../speed" of the coordinates, and `auxiliary`.
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
         times: Sequence[float],
-        values: Sequence[Sequence[float]],
-        speeds: Sequence[Sequence[float]],
+        values: ArrayLike,
+        speeds: ArrayLike,
         report: Report,
-        auxiliary: Mapping[str, Sequence[float]] = MappingProxyType({}),
+        auxiliary: Mapping[str, ArrayLike] = MappingProxyType({}),
+        paths: Sequence[str] = (),
     ) -> None:
         count = len(mechanism.coordinates)
         self.mechanism = mechanism
@@ -48,7 +51,10 @@ class Trajectory:
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
         self.speeds: Array = np.array(speeds, dtype=float).reshape(len(self.times), count)
-        self.auxiliary: dict[str, Array] = {path: np.array(row, dtype=float) for path, row in auxiliary.items()}
+        own = [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
+        self.paths = tuple(paths) or (*own, *auxiliary)
+        ordered = sorted(auxiliary, key=self.paths.index)
+        self.auxiliary: dict[str, Array] = {path: np.array(auxiliary[path], dtype=float) for path in ordered}
         self._report: Report | None = report
 
     def __repr__(self) -> str:
@@ -119,13 +125,12 @@ class Trajectory:
         )
 
     def states_text(self) -> str:
-        """The text of states.sto: value and speed of every coordinate, then `auxiliary`, in the order of OpenSim."""
-        paths = [info.path for info in self.mechanism.coordinates]
-        columns = [f"{path}/{what}" for path in paths for what in ("value", "speed")]
-        columns += self.auxiliary
-        rows = np.stack([self.values, self.speeds], axis=2).reshape(len(self.times), -1)
-        rows = np.column_stack([rows, *self.auxiliary.values()])
-        return sto_text(self.mechanism.name, self.times.tolist(), columns, rows.tolist())
+        """The text of states.sto: all states, in the order of `paths`."""
+        columns: dict[str, Array] = dict(self.auxiliary)
+        for place, info in enumerate(self.mechanism.coordinates):
+            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, place], self.speeds[:, place]
+        rows = np.array([columns[path] for path in self.paths]).reshape(len(self.paths), len(self.times)).T
+        return sto_text(self.mechanism.name, self.times.tolist(), self.paths, rows.tolist())
 
     def forces_text(self) -> str:
         """The text of forces.sto, with the labels of OpenSim's ForceReporter."""

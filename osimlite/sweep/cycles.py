@@ -30,6 +30,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.many import run_many
 from osimlite.sweep.plan import Plan
+from osimlite.sweep.renewal import Variant
 from osimlite.sweep.variables import Floats, Start, refuse_counts
 from osimlite.sweep.variants import Variants
 
@@ -87,7 +88,7 @@ class Candidate:
 
     Attributes:
         fractions: where the numbers of its model lie in their ranges (k,).
-        state: at the end of the first step, written for the first foot (2n,).
+        state: at the end of the first step, written for the first foot (y,).
         miss: by how much the second ended otherwise.
     """
 
@@ -230,7 +231,8 @@ class CycleSearch:
         models = rng.random((-(-count // ALIKE), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
         fractions = np.repeat(models, ALIKE, axis=0)[:count]
-        states, vectors = np.zeros((count, 2 * len(engine.order))), np.zeros((count, len(engine.numbers)))
+        states, vectors = np.zeros((count, engine.state.size)), np.zeros((count, len(engine.numbers)))
+        variants: list[Variant] = []
         made = np.ones(count, dtype=bool)
         for row in range(count):
             sample = self.values(fractions[row])
@@ -244,10 +246,11 @@ class CycleSearch:
             made[row] = variant.structure == self.variants.given.structure
             if made[row]:
                 states[row], vectors[row] = self.variants.start(variant, sample), variant.numbers
+                variants.append(variant)
         states, vectors, fractions = states[made], vectors[made], fractions[made]
         if not len(states):
             return []
-        states = planted(engine, self.footing, states, numbers=vectors)
+        states = self.variants.started(variants, planted(engine, self.footing, states, numbers=vectors))
         walks = walk_many(
             engine, states, FIRST_SECONDS, footing=self.footing, numbers=vectors, accuracy=1e-3,
             most_tries=MOST_TRIES, threads=self.threads,
@@ -279,8 +282,9 @@ class CycleSearch:
     @staticmethod
     def _distance(step_map: StepMap, one: Floats, two: Floats) -> float:
         difference = step_map.basis @ step_map.reduce(two - one)
-        half = len(difference) // 2
-        return float(np.hypot(np.linalg.norm(difference[:half]), SLOWER * np.linalg.norm(difference[half:])))
+        n = len(step_map.engine.order)
+        others = *difference[:n], *difference[2 * n :]
+        return float(np.hypot(np.linalg.norm(others), SLOWER * np.linalg.norm(difference[n : 2 * n])))
 
     # ---------------------------------------------------------------------------------------- cycles
     def close(self, candidate: Candidate) -> Found | None:
@@ -305,7 +309,7 @@ class CycleSearch:
 
         Args:
             fractions: of the numbers (k,).
-            state: where to begin (2n,).
+            state: where to begin (y,).
             fine: whether it is wanted to the last digits.
 
         Raises:
@@ -340,7 +344,7 @@ class CycleSearch:
 
 
 def along(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
-    """States (k, 2n) at parts of a step after the heel strike of a cycle; the parts increase.
+    """States (k, y) at parts of a step after the heel strike of a cycle; the parts increase.
 
     The walker is at the origin, its trunk as it was built, as far as neither matters.
     """

@@ -223,6 +223,8 @@ def started(search: CycleSearch, found: Found, digits: int | None) -> tuple[dict
     states[np.abs(states) < 1e-12] = 0.0
     if digits is not None:
         states = np.array([[float(f"{number:.{digits}g}") for number in row] for row in states.tolist()])
+    # A file says where coordinates start, and the auxiliary states follow.
+    states = engine.state.started(states)
     walks = walk_many(
         engine, states, WALK_SECONDS, footing=search.footing, accuracy=WALK_ACCURACY, threads=search.threads
     )
@@ -232,7 +234,7 @@ def started(search: CycleSearch, found: Found, digits: int | None) -> tuple[dict
 
 def _named(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
     names = [engine.mechanism.coordinates[place].name for place in engine.order]
-    values, speeds = np.split(state, 2)
+    values, speeds = state[: len(names)], state[len(names) : 2 * len(names)]
     return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
 
 

@@ -46,7 +46,7 @@ class Batch:
         engine: of a model of the same structure.
         engine_of: the engine of the model of a run, by its place.
         numbers: of the compiled engines (W, m); None if all are those of `engine`.
-        starts: initial states (W, 2n), in the engine's order.
+        starts: initial states (W, y), in the engine's order.
         runs: what came of them.
         values: of the variables (W, d).
         names: of the variables.

@@ -23,6 +23,7 @@ from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.kernels.items import Item, Places, items_of
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.states import StateLayout
 from osimlite.sweep.variables import Floats
 
 
@@ -31,14 +32,14 @@ class Variant:
     """A model made ready.
 
     Attributes:
-        start: its default state (2n,), in the engine's order.
+        state: what its states consist of.
         structure: equal for variants that differ in numbers only.
         numbers: all numbers of the compiled engine, empty for others.
         maker: makes its engine.
         simulation: that the engine is part of; None if only forces are new.
     """
 
-    start: Floats
+    state: StateLayout
     structure: bytes
     numbers: Floats
     maker: Callable[[], Any]
@@ -98,8 +99,10 @@ class Renewal:
         numbers = self._with_forces(made) if only_forces else self._packed(mechanism, forces)
         if numbers is None:
             return None
-        start, structure = self._given.start, self._given.structure
-        return Variant(start, structure, numbers, lambda: engine_factory("compiled")(mechanism, forces, Settings()))
+        # The auxiliary states may start otherwise.
+        state = StateLayout(mechanism, self._given.state.order, forces.elements)
+        make = engine_factory("compiled")
+        return Variant(state, self._given.structure, numbers, lambda: make(mechanism, forces, Settings()))
 
     def _with_forces(self, made: Mapping[str, Any]) -> Floats | None:
         """The given numbers with those of some elements in their places."""

@@ -45,7 +45,7 @@ class Block:
 
 
 class _Sample(NamedTuple):
-    """A row of the samples, with its model and its initial state (2n,)."""
+    """A row of the samples, with its model and its initial state (y,)."""
 
     place: int
     variant: Variant
@@ -230,7 +230,7 @@ class Runner:
         order, contacts = engine.order, engine.contacts
         count, size = len(order), len(starts)
         times, states = np.zeros(size), starts.copy()
-        reports = np.full((size, len(self._report_times), 2 * count), np.nan)
+        reports = np.full((size, len(self._report_times), starts.shape[1]), np.nan)
         events: list[list[tuple[float, str, bool]]] = [[] for _ in range(size)]
         peaks = np.zeros((size, len(contacts), 2))
         for number, variant in enumerate(variants):
@@ -251,7 +251,7 @@ class Runner:
                 why.append((FAILED, str(error)))
                 continue
             why.append((DONE, None))
-            history = np.concatenate((trajectory.values[:, list(order)], trajectory.speeds[:, list(order)]), axis=1)
+            history = simulation.state.rows(trajectory.values, trajectory.speeds, trajectory.auxiliary)
             times[number], states[number] = trajectory.times[-1], history[-1]
             if len(self._report_times):
                 reports[number] = history

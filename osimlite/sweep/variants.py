@@ -89,38 +89,44 @@ class Variants:
         return found
 
     def start(self, variant: Variant, values: Sequence[float]) -> Floats:
-        """Initial state of a sample (2n,).
+        """Initial state of a sample (y,).
 
         Raises:
             OsimliteError: the model has no such coordinate, or holds it.
         """
         # An engine of its own is only made where the coordinates may be others.
-        row, engine = (
-            variant.start.copy(),
-            (self.given if variant.structure == self.given.structure else variant).engine,
-        )
+        engine = (self.given if variant.structure == self.given.structure else variant).engine
+        row = np.array(variant.state.default())
         simulation = variant.simulation or self.given.simulation
         if simulation is not None and simulation.constraints:
             # The rest follows from what is set.
             chosen: tuple[dict[str, float], dict[str, float]] = {}, {}
             for place, target in self._starts:
                 chosen[target.is_speed][target.coordinate] = float(values[place])
-            return np.array(simulation.initial_state(*chosen))
-        for place, target in self._starts:
-            coordinate = engine.mechanism.coordinate_index(target.coordinate)
-            if coordinate not in engine.order:
-                raise SettingError(f"'{target.coordinate}' is locked in this model, so that it has no start")
-            number = engine.order.index(coordinate)
-            row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
-        return row
+            row = np.array(simulation.initial_state(*chosen))
+        else:
+            for place, target in self._starts:
+                coordinate = engine.mechanism.coordinate_index(target.coordinate)
+                if coordinate not in engine.order:
+                    raise SettingError(f"'{target.coordinate}' is locked in this model, so that it has no start")
+                number = engine.order.index(coordinate)
+                row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
+        started: Floats = variant.state.started(row[None])[0]
+        return started
+
+    @staticmethod
+    def started(variants: Sequence[Variant], states: Floats) -> Floats:
+        """States (k, y) of as many models, with the auxiliary ones where they start from the values and speeds."""
+        rows = [variant.state.started(row[None]) for variant, row in zip(variants, states, strict=True)]
+        return np.concatenate(rows)
 
     def placed(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
-        """Initial states (k, 2n), put on their feet if the plan says so.
+        """Initial states (k, y), put on their feet if the plan says so.
 
         Args:
             engine: of any model of the structure that these have.
             variants: the models (k).
-            starts: where they start (k, 2n).
+            starts: where they start (k, y).
 
         Raises:
             OsimliteError: the model has no two feet.
@@ -131,7 +137,8 @@ class Variants:
 
         footing = self._footing(engine)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
-        return stood(engine, footing, planted(engine, footing, starts, numbers=numbers), PRESSED, -1, numbers=numbers)
+        resting = planted(engine, footing, starts, numbers=numbers)
+        return self.started(variants, stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""
@@ -209,10 +216,9 @@ class Variants:
         simulation = Simulation(self.model, plan.engine, skip_unsupported=plan.skip_unsupported, folder=plan.folder)
         engine: Any = simulation.engine
         infos = engine.mechanism.coordinates
-        start = simulation.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
-        return Variant(np.array(start), structure, getattr(engine, "numbers", np.zeros(0)), lambda: engine, simulation)
+        return Variant(simulation.state, structure, getattr(engine, "numbers", np.zeros(0)), lambda: engine, simulation)
 
     def _make(self, values: Sequence[float]) -> Variant:
         self.put(values)

@@ -27,3 +27,23 @@ def test_states_and_steps(engine, accuracy, tmp_path):
     assert ours.columns == theirs.columns
     assert trajectory.summary["steps"] == len(theirs.rows) - 1
     assert np.abs(ours.rows[-1] - theirs.rows[-1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_components_anywhere_have_their_places_in_the_table(engine, tmp_path):
+    """Those that the model holds beside its sets stand before all coordinates, those that a body holds too."""
+    model = damped()
+    force_set = model.force_set.objects
+    slack, stop = force_set.pop(0), force_set.pop(0)
+    model.subcomponents.append(slack)
+    model.body_set.objects[1].subcomponents.append(stop)
+    osimlite.write(model, tmp_path / "model.osim")
+    model = osimlite.read(tmp_path / "model.osim")
+    theirs = simulated(tmp_path / "model.osim", 0.2, 1e-6)
+    assert theirs.columns[:2] == ("/slack/dissipated_energy", "/bodyset/b1/stop/dissipatedEnergy")
+    trajectory = osimlite.simulate(model, 0.2, accuracy=1e-6, engine=engine)
+    trajectory.to_sto(tmp_path / "states.sto")
+    ours = read_sto(tmp_path / "states.sto")
+    assert ours.columns == theirs.columns
+    assert trajectory.summary["steps"] == len(theirs.rows) - 1
+    assert np.abs(ours.rows[-1] - theirs.rows[-1]).max() < 1e-12

@@ -49,7 +49,9 @@ def test_files_and_fixed_steps(engine, tmp_path):
     assert table.rows[:, -1] == pytest.approx(trajectory.auxiliary[STATES[-1]], abs=0.0)
     again = pickle.loads(pickle.dumps(trajectory))
     assert np.array_equal(again.auxiliary[STATES[-1]], trajectory.auxiliary[STATES[-1]])
-    assert osimlite.simulate(damped(), to=0.1, engine=engine, fixed_step=1e-3).auxiliary == {}
+    stepped = osimlite.simulate(damped(), to=0.1, engine=engine, fixed_step=1e-5)
+    for path in STATES:
+        assert stepped.auxiliary[path] == pytest.approx(trajectory.auxiliary[path], rel=1e-2, abs=1e-4)
 
 
 def test_many_runs_equal_single_ones():

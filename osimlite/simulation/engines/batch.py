@@ -27,7 +27,7 @@ class Batch:
 
     Args:
         engine: whose mechanism.
-        states: where the runs start (W, 2n), or with auxiliary states (W, y); otherwise these are 0.
+        states: where the runs start (W, y).
         to: when they end, s.
         accuracy: of the integrator.
         start: time from which they go on, s.
@@ -45,14 +45,12 @@ class Batch:
     Attributes:
         clocks: time and next step of each run, s (W, 2).
         counts: see :mod:`osimlite.simulation.kernels.merson` (W, 6).
-        states: values and speeds at the end (W, 2n).
+        states: at the end (W, y).
         endings: of the runs (W,).
-        reports: the same at the times (W, r, 2n), not a number after the end of a run.
-        whole_states: with auxiliary states (W, y).
-        whole_reports: likewise (W, r, y).
-        events: time, number, 1 for a beginning, and the state if it is kept (W, e, 3 or 3 + 2n).
+        reports: states at the times (W, r, y), not a number after the end of a run.
+        events: time, number, 1 for a beginning, and the state if it is kept (W, e, 3 or 3 + y).
         peaks: largest force of each contact and its time (W, P, 2).
-        log: of each step time, state and derivative, with auxiliary states.
+        log: of each step time, state and derivative.
         forces: of each step the force of each contact.
     """
 
@@ -75,10 +73,8 @@ class Batch:
         most_logged: int = 0,
         start_holds: bool = False,
     ) -> None:
-        starts, plain = np.array(states, dtype=np.float64), 2 * len(engine.order)
-        count, size, pairs = len(starts), int(engine.structure[layout.STATE_SIZE]), len(engine.contacts)
-        self.whole_states = np.zeros((count, size))
-        self.whole_states[:, : starts.shape[1]] = starts
+        self.states = engine.state.table(states)
+        (count, size), pairs = self.states.shape, len(engine.contacts)
         self._engine, self._kinds, self._levels = engine, kinds, levels
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(times, dtype=np.float64)
@@ -101,10 +97,8 @@ class Batch:
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
         self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
-        self.whole_reports = np.full((count, len(times), size), np.nan)
-        self._events, self.peaks = np.zeros((count, most_events, event)), np.zeros((count, pairs, 2))
-        self.states, self.reports = self.whole_states[:, :plain], self.whole_reports[:, :, :plain]
-        self.events = self._events[:, :, : 3 + plain]
+        self.reports = np.full((count, len(times), size), np.nan)
+        self.events, self.peaks = np.zeros((count, most_events, event)), np.zeros((count, pairs, 2))
         self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
         self._room = int(engine.structure[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
 
@@ -120,16 +114,16 @@ class Batch:
             self._settings.ctypes.data,
             self.clocks.ctypes.data,
             self.counts.ctypes.data,
-            self.whole_states.ctypes.data,
+            self.states.ctypes.data,
             self._times.ctypes.data,
-            self.whole_reports.ctypes.data,
+            self.reports.ctypes.data,
             self.log.ctypes.data,
             self.forces.ctypes.data,
-            self._events.ctypes.data,
+            self.events.ctypes.data,
             self.peaks.ctypes.data,
             self._kinds.ctypes.data,
             self._levels.ctypes.data,
             self.endings.ctypes.data,
             first,
-            len(self.whole_states) if last is None else last,
+            len(self.states) if last is None else last,
         )

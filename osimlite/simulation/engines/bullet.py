@@ -26,7 +26,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet_file import require_masses
 from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.bullet_world import World, bullet
-from osimlite.simulation.engines.protocol import FreeState, Settings
+from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.field import ForceField, own_coordinates
 from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.solver import SingularMassError, tree_solver
@@ -136,7 +136,7 @@ class BulletEngine:
         plain = all(item.mobilizer.speeds_are_rates for item in mechanism.bodies)
         self.field = ForceField(robot, body.joints, forces.elements, None if plain else places)
         self.order = self.field.order
-        self.state = FreeState(mechanism, self.order)
+        self.state = self.field.state
         self.contacts = self.field.contacts
         self.columns = self.field.columns
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
@@ -152,11 +152,11 @@ class BulletEngine:
         if route == MASS_MATRIX:
             self._solve = tree_solver([self.field.chain.parent(joint) for joint in range(self._count)])
         if not self._count:
-            self.derivative = self._nothing_moves  # type: ignore[method-assign]
+            self._motion = self._nothing_moves  # type: ignore[method-assign]
         elif self.field.separate:
-            self.derivative = self._derivative_with_speeds  # type: ignore[method-assign]
+            self._motion = self._motion_with_speeds  # type: ignore[method-assign]
         elif route == ARTICULATED_BODY:
-            self.derivative = self._derivative_by_step  # type: ignore[method-assign]
+            self._motion = self._motion_by_step  # type: ignore[method-assign]
 
     def _require_mass_matrix(self) -> None:
         if not self._body.mass_matrix_works:
@@ -167,7 +167,12 @@ class BulletEngine:
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: list[float]) -> list[float]:
-        """(qdot, udot) at a state; here where the speeds are the rates, by the mass matrix."""
+        """(qdot, udot, zdot) at a state."""
+        self.state.require(y)
+        return self._motion(t, y[: 2 * self._count]) + self.field.powers
+
+    def _motion(self, t: float, y: list[float]) -> list[float]:
+        """(qdot, udot) at (q, u); here where the speeds are the rates, by the mass matrix."""
         count, body = self._count, self._body
         q, u = y[:count], y[count:]
         try:
@@ -179,11 +184,11 @@ class BulletEngine:
         except SingularMassError as error:
             raise self._singular(error, y) from None
 
-    def _derivative_by_step(self, t: float, y: list[float]) -> list[float]:
+    def _motion_by_step(self, t: float, y: list[float]) -> list[float]:
         q, u = y[: self._count], y[self._count :]
         return u + self._body.accelerations_by_step(q, u, self._forces(t, q, u, self.loads))
 
-    def _derivative_with_speeds(self, t: float, y: list[float]) -> list[float]:
+    def _motion_with_speeds(self, t: float, y: list[float]) -> list[float]:
         count, body = self._count, self._body
         q, u = y[:count], y[count:]
         rates = self._speeds.rates(q, u)
@@ -211,7 +216,7 @@ class BulletEngine:
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
-        udot = self.derivative(t, self.state.pack(q, u))[self._count :]
+        udot = self.derivative(t, self.state.pack(q, u))[self._count : 2 * self._count]
         return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
 
     def _singular(self, error: SingularMassError, y: list[float]) -> SimulationError:
@@ -223,6 +228,7 @@ class BulletEngine:
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: list[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
+        self.state.require(y)
         q, u = y[: self._count], y[self._count : 2 * self._count]
         self._joint_forces(t, q, self._speeds.rates(q, u), u)
         return int(self.loads[-1])
@@ -237,6 +243,7 @@ class BulletEngine:
 
     def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
         """Values and rates of the joints, and the state where it is told apart from these."""
+        self.state.require(y)
         q, u = y[: self._count], y[self._count : 2 * self._count]
         rates = self._speeds.rates(q, u)
         return (q, rates, q, u) if self.field.separate else (q, rates)
@@ -253,30 +260,19 @@ class BulletEngine:
     ) -> RungeKuttaMerson:
         # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
         spare = sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
-        states = self.field.states
         return RungeKuttaMerson(
-            self._with_powers if states else self.derivative,
+            self.derivative,
             t,
-            y + [0.0] * len(states),
+            y,
             self._count,
             nu=self._count,
             accuracy=settings.accuracy,
             count_q=len(self.mechanism.coordinates) + spare,
             count_u=len(self.mechanism.coordinates),
             observe=observe,
-            names=self._names + states,
+            names=self.state.names,
             projection=projection,
         )
-
-    def _with_powers(self, t: float, y: list[float]) -> list[float]:
-        """(qdot, udot, zdot) at a state with its auxiliary part."""
-        return self.derivative(t, y[: 2 * self._count]) + self.field.powers
-
-    @property
-    def _names(self) -> list[str]:
-        """What the entries of the state are called in messages."""
-        names = [self.mechanism.coordinates[place].name for place in self.order]
-        return names + [f"the speed of {name}" for name in names]
 
     def close(self) -> None:
         """Leave Bullet; any number of times."""

@@ -24,7 +24,7 @@ from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RECURSION, BulletEngine
 from osimlite.simulation.engines.bullet_file import excess
-from osimlite.simulation.engines.protocol import FreeState, Settings
+from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.field import ForceField
 from osimlite.simulation.reduction import Reduction
@@ -54,7 +54,7 @@ class ReducedBulletEngine(BulletEngine):
         self._still = np.array([info.default_value for info in mechanism.coordinates])
         self._count = len(self.order)
         self.field = ForceField(robot, body.joints, forces.elements, self.order)
-        self.state = FreeState(mechanism, self.order)
+        self.state = self.field.state
         self.contacts, self.columns = self.field.contacts, self.field.columns
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.reduction = Reduction(mechanism, body.joints, self.order)
@@ -73,7 +73,8 @@ class ReducedBulletEngine(BulletEngine):
                 f"take {MASS_MATRIX} for '{mechanism.name}'"
             )
         self.route = MASS_MATRIX if route == "auto" else route
-        self.derivative = self._derivative if self._count else self._nothing_moves  # type: ignore[method-assign]
+        if not self._count:
+            self._motion = self._nothing_moves  # type: ignore[method-assign]
 
     # ---------------------------------------------------------------------------------------- accelerations
     def equations(self, t: float, y: list[float]) -> tuple[Array, Array, Array, Kinematics | None]:
@@ -103,7 +104,7 @@ class ReducedBulletEngine(BulletEngine):
             right += added * state.biases[index][:3] @ turning
         return matrix, right, joints.coordinate_rates, state
 
-    def _derivative(self, t: float, y: list[float]) -> list[float]:
+    def _motion(self, t: float, y: list[float]) -> list[float]:
         matrix, right, rates, state = self.equations(t, y)
         x, u = np.array(y[: self._count]), np.array(y[self._count :])
         found: list[float] = rates.tolist() + self.constrained.accelerations(t, x, u, matrix, right, state).tolist()
@@ -121,6 +122,7 @@ class ReducedBulletEngine(BulletEngine):
 
     def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
         """Values and rates of the joints, values and speeds of the state."""
+        self.state.require(y)
         x, u = y[: self._count], y[self._count : 2 * self._count]
         joints = self.reduction.at(np.array(x), np.array(u))
         return joints.values.tolist(), joints.rates.tolist(), x, u
@@ -140,7 +142,7 @@ class ReducedBulletEngine(BulletEngine):
             settings.fixed_step,
             rates=self._rates,
             observe=observe,
-            names=self._names,
+            names=self.state.names,
             projection=self.constrained,
         )
 

@@ -42,8 +42,9 @@ class BulletStepper(Stepper):
         self.time, self.state = t, list(y)
         self.evaluations = self.taken = 0
         self._previous = t, self.state, []
+        engine.state.require(y)
         count = engine._count
-        self._body.set_state(y[:count], engine._speeds.rates(y[:count], y[count:]))
+        self._body.set_state(y[:count], engine._speeds.rates(y[:count], y[count : 2 * count]))
         self._torques = self._evaluate_forces(y)
 
     def step(self, limit: float = inf) -> None:
@@ -65,6 +66,8 @@ class BulletStepper(Stepper):
                 f"the motion bursts at t = {self.time:.9g} s; take a shorter fixed step than {self._h:g} s, "
                 "or control the error (--accuracy)"
             )
+        auxiliary = self._engine.state.auxiliary(self.state)
+        y += [z + h * rate for z, rate in zip(auxiliary, self._auxiliary_rates, strict=True)]
         self._previous = self.time, self.state, []
         self.time, self.state = t, y
         self.taken += 1
@@ -85,5 +88,7 @@ class BulletStepper(Stepper):
     def _evaluate_forces(self, y: list[float]) -> Sequence[float]:
         self.evaluations += 1
         engine = self._engine
-        q, u = y[: engine._count], y[engine._count :]
-        return engine._joint_forces(self.time, q, engine._speeds.rates(q, u), u)
+        q, u = y[: engine._count], y[engine._count : 2 * engine._count]
+        torques = engine._joint_forces(self.time, q, engine._speeds.rates(q, u), u)
+        self._auxiliary_rates = list(engine.field.powers)
+        return torques

@@ -16,16 +16,17 @@ from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.constrained import Constrained
 from osimlite.simulation.contact_elements import PairContact
-from osimlite.simulation.elements import Forces, state_paths
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
-from osimlite.simulation.engines.protocol import FreeState, Settings
+from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.table import LAW_NUMBERS
+from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
 LOGGED_STEPS = 512
@@ -69,7 +70,7 @@ class CompiledEngine:
         self.numbers = packed.numbers
         self.order = packed.order
         self.placements = packed.placements
-        self.state = FreeState(mechanism, self.order)
+        self.state = StateLayout(mechanism, self.order, forces.elements)
         self.constrained = Constrained(mechanism, self.order)
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
@@ -95,22 +96,24 @@ class CompiledEngine:
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
-        """(qdot, udot) at a state (q, u); (qdot, udot, zdot) at one with its auxiliary part."""
+        """(qdot, udot, zdot) at a state."""
         status = self._at(t, y, layout.WHOLE)
         if status != layout.FINE:
             raise self._refusal(status, t, y)
         self._note_loads(self._pairs[:, :3])
-        found: list[float] = self._f[: len(y)].tolist()
+        found: list[float] = self._f.tolist()
         return found
 
     def _at(self, t: float, y: Sequence[float], how_far: int) -> int:
+        if len(y) != len(self._y):
+            raise self.state.wrong_length(len(y))
         self._w[layout.TIME] = t
-        self._y[: len(y)] = y
+        self._y[:] = y
         return self._evaluate(self.program_address, self.numbers.ctypes.data, *self._addresses, how_far)
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
-        udot = self.derivative(t, self.state.pack(q, u))[len(self.order) :]
+        udot = self.derivative(t, self.state.pack(q, u))[len(self.order) : 2 * len(self.order)]
         return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
 
     def _refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
@@ -201,8 +204,6 @@ class CompiledEngine:
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on: Runge-Kutta-Merson, or fixed steps of semi-implicit Euler."""
-        infos = [self.mechanism.coordinates[place] for place in self.order]
-        names = [info.name for info in infos] + [f"the speed of {info.name}" for info in infos]
         if settings.fixed_step is not None:
             rates = None if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies) else self._rates
             return SemiImplicitEuler(
@@ -213,14 +214,14 @@ class CompiledEngine:
                 settings.fixed_step,
                 rates=rates,
                 observe=observe,
-                names=names,
+                names=self.state.names,
                 projection=self.constrained,
             )
-        states = state_paths(self.forces.elements)
-        return CompiledMerson(self, t, [*y, *[0.0] * len(states)], settings.accuracy, observe, names + states)
+        return CompiledMerson(self, t, y, settings.accuracy, observe, self.state.names)
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
-        return self.derivative(0.0, q + u)[: len(self.order)]
+        # They depend on nothing else.
+        return self.derivative(0.0, q + u + [0.0] * len(self.state.variables))[: len(self.order)]
 
     def close(self) -> None:
         """Nothing is held."""
@@ -317,12 +318,12 @@ class CompiledMerson(RungeKuttaMerson):
             (ending,), logged = batch.endings.tolist(), count[merson.LOGGED]
             self._put_off.append((batch.log[:logged].copy(), batch.forces[:logged].copy()))
             self.time, self._next_step = batch.clocks[0].tolist()
-            self.state = batch.whole_states[0].tolist()
+            self.state = batch.states[0].tolist()
             self.taken, self.attempted, self.evaluations = count[: merson.REPORTED].tolist()
             if ending == merson.FAILED:
                 self._explain()
             reached = int(count[merson.REPORTED])
-            yield times[done:reached], batch.whole_reports[0, done:reached]
+            yield times[done:reached], batch.reports[0, done:reached]
             done = reached
 
     def catch_up(self) -> None:

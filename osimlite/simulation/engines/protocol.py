@@ -1,20 +1,19 @@
 """What an engine is.
 
-An engine integrates only the coordinates that are free to move: a state is one list y = (q, u), first their values,
-then their generalized speeds, in an order of its own, `order`.
+An engine integrates only the coordinates that are free to move, in an order of its own: its `state` tells what the
+numbers of a state y = (q, u, z) are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
-
-import numpy as np
+from typing import TYPE_CHECKING, Protocol
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
@@ -43,11 +42,14 @@ class Settings:
 class Engine(Protocol):
     """Computes the motion of one mechanism under its forces. Close it after use, or use it in a ``with`` statement.
 
+    Every method that takes a state raises an OsimliteError where it has another length than `state` says.
+
     Attributes:
         name: of the engine.
         version: of the program behind it.
         route: how the accelerations are computed.
         order: place in the mechanism of each coordinate of the state.
+        state: what the numbers of a state are.
         contacts: names of the contacts, by number.
         columns: labels of the force records.
         loads: after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N,
@@ -58,19 +60,23 @@ class Engine(Protocol):
     version: str
     route: str
     order: tuple[int, ...]
+    state: StateLayout
     contacts: tuple[str, ...]
     columns: tuple[str, ...]
     loads: list[object]
 
     def derivative(self, t: float, y: list[float]) -> list[float]:
-        """(qdot, udot) at a state.
+        """(qdot, udot, zdot) at a state.
 
         Raises:
             SimulationError: a motion that nothing forbids moves no mass, or speeds are not defined in a pose.
         """
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
-        """Derivatives of the speeds of all coordinates of the mechanism, in its order; zero if locked."""
+        """Derivatives of the speeds of all coordinates of the mechanism, in its order; zero if locked.
+
+        The auxiliary states are where they start.
+        """
 
     def touching(self, t: float, y: list[float]) -> int:
         """The bits of the contacts that touch at a state; sets `loads`. Works when the engine is closed."""
@@ -90,44 +96,3 @@ class Engine(Protocol):
 
 EngineFactory = Callable[[Mechanism, Forces, Settings], Engine]
 """Makes an engine for a mechanism; of the settings, `route`, `show` and `visuals` count."""
-
-
-class FreeState:
-    """The part of a mechanism's state that an engine integrates: y = (q, u), which auxiliary states may follow.
-
-    Args:
-        mechanism: whose state.
-        order: place in the mechanism of each coordinate that is not locked.
-    """
-
-    def __init__(self, mechanism: Mechanism, order: Sequence[int]) -> None:
-        self.order = tuple(order)
-        self._q = [info.default_value for info in mechanism.coordinates]
-
-    def pack(self, q: Sequence[float], u: Sequence[float]) -> list[float]:
-        """y = (q, u) of the free coordinates, from all coordinates."""
-        return [float(q[place]) for place in self.order] + [float(u[place]) for place in self.order]
-
-    def spread(self, values: Sequence[float], still: Sequence[float]) -> list[float]:
-        """Numbers of the free coordinates put at their places among those of all, the rest from `still`."""
-        row = list(still)
-        for place, value in zip(self.order, values, strict=True):
-            row[place] = value
-        return row
-
-    def values(self, y: Sequence[float]) -> list[float]:
-        """Values of all coordinates, in the mechanism's order."""
-        return self.spread(y[: len(self.order)], self._q)
-
-    def histories(self, states: Sequence[Sequence[float]]) -> tuple[Any, Any]:
-        """Values and speeds (k, n) of all coordinates at k states."""
-        rows, count = np.array(states, dtype=float).reshape(len(states), -1), len(self.order)
-        values, speeds = np.empty((len(states), len(self._q))), np.zeros((len(states), len(self._q)))
-        values[:] = self._q
-        values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]
-        return values, speeds
-
-    def speeds(self, y: Sequence[float]) -> list[float]:
-        """Generalized speeds of all coordinates, in the mechanism's order."""
-        count = len(self.order)
-        return self.spread(y[count : 2 * count], [0.0] * len(self._q))

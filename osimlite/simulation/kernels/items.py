@@ -42,7 +42,7 @@ class Item:
         room: length of its record, if it is not that of a contact.
         is_contact: whether its record is that of a contact.
         is_part: whether another item of the element calls its law.
-        has_state: whether it has an auxiliary state, whose place in y follows its integers.
+        has_state: whether it has auxiliary states; the place in y of the element's first one follows its integers.
     """
 
     kept: Kept

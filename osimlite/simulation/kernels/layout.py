@@ -34,7 +34,7 @@ CONTACT_AT = 18
 HELD = 19
 """Place of the record of all constraints, 0 if there are none."""
 STATE_SIZE = 20
-"""Length of a state: values, speeds, and auxiliary states, on which nothing depends but the step control."""
+"""Length of a state: values, speeds, and auxiliary states."""
 LAWS = 21
 """From here on the addresses of the laws, by their number."""
 

@@ -15,7 +15,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyDrift, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.constrained import Constrained, free_coordinates
-from osimlite.simulation.elements import Forces, state_of, state_paths
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.items import Item, Placement, Places, items_of
@@ -23,6 +23,7 @@ from osimlite.simulation.kernels.merson import STATES
 from osimlite.simulation.kernels.pack_bonds import bond_of, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS
+from osimlite.simulation.states import StateLayout
 
 LAWS_OF_FUNCTIONS = {
     MONOMIALS: "amount_by_several",
@@ -100,9 +101,9 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
     items = [items_of(element, places) for element in forces.elements]
-    paths = state_paths(forces.elements)
-    states = [paths.index(path) if path else -1 for path in map(state_of, forces.elements)]
-    return _Packer(places, links, ends, items, states).packed(tuple(order))
+    state = StateLayout(mechanism, order, forces.elements)
+    first_states = [state.first_of(element) for element in forces.elements]
+    return _Packer(places, links, ends, items, state.size, first_states).packed(tuple(order))
 
 
 def _operations(
@@ -194,13 +195,20 @@ class _Packer:
     """Puts everything at its place in the vectors."""
 
     def __init__(
-        self, places: Places, links: list[_Link], ends: list[int], items: list[list[Item]], states: list[int]
+        self,
+        places: Places,
+        links: list[_Link],
+        ends: list[int],
+        items: list[list[Item]],
+        state_size: int,
+        first_states: list[int],
     ) -> None:
         self.places = places
         self.links = links
         self.ends = ends
         self.items = items
-        self.states = states  # number of the auxiliary state of each element, -1 without one
+        self.state_size = state_size
+        self.first_states = first_states  # place of the first one of each element, -1 without any
         self.operations = [operation for link in links for operation in link.operations]
         self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
@@ -227,7 +235,7 @@ class _Packer:
         self.operation_records()
         self.bond_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
-        ints[at.STATE_SIZE] = 2 * size + sum(number >= 0 for number in self.states)
+        ints[at.STATE_SIZE] = self.state_size
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
         ints[at.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
@@ -349,9 +357,8 @@ class _Packer:
         records: list[int] = []
         pairs: list[int] = []
         found: list[list[tuple[Item, int]]] = []
-        for number, group in zip(self.states, self.items, strict=True):
+        for state, group in zip(self.first_states, self.items, strict=True):
             found.append([])
-            state = 2 * self.ints[at.FREEDOMS] + number
             first = len(pairs)
             for item in group:
                 place = contact + at.CONTACT_WORK * len(pairs) if item.is_contact else self.room(item.room)

@@ -116,6 +116,6 @@ def pack_limit(element: CoordinateLimit, places: Places) -> list[Item]:
     freedom = places.freedom(element.coordinate)
     force, power = (None, None) if freedom < 0 else ("limit", "limit_power")
     items = [Item(kept, force, (freedom,), element.constants)]
-    if element.state:
+    if element.states:
         items.append(Item(lambda *_: [], power, (freedom,), element.constants, has_state=True))
     return items

@@ -116,8 +116,8 @@ def pack_bushing(element: Bushing, places: Places) -> list[Item]:
         tables.append(len(numbers))
         if isinstance(law, Function):
             numbers += table_of_one(law, f"{DEVIATIONS[number]} of '{element.path}'")
-    ints = *links, *kinds, *tables, *(() if element.state else (0,))
-    return [Item(kept, "bushing", ints, tuple(numbers), room=BUSHING_REGISTERS, has_state=bool(element.state))]
+    ints = *links, *kinds, *tables, *(() if element.states else (0,))
+    return [Item(kept, "bushing", ints, tuple(numbers), room=BUSHING_REGISTERS, has_state=bool(element.states))]
 
 
 def _frame(frame: BushingFrame, places: Places) -> tuple[int, list[float]]:
