@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import json
 import os
 import subprocess
 import sys
@@ -46,16 +48,43 @@ def test_what_is_stored_is_found_again(folder):
     assert run(object_code.load("answer", "one")) == 48
     # Of other sources.
     assert object_code.load("answer", "two") is None
-    for damaged in (kept.read_bytes()[:-8], b"", b"[]\n", b"{}\nrest"):
+    assert kept.stat().st_mode & 0o077 == 0 and folder.stat().st_mode & 0o077 == 0
+    code = kept.read_bytes().partition(b"\n")[2]
+    fitting = {"sha256": hashlib.sha256(code).hexdigest()}
+    heads = [{}, [], None, "x", fitting, *({**fitting, "symbol": it} for it in (None, 5, ["answer"], {}, "elsewhere"))]
+    heads += [{**fitting, "sha256": [fitting["sha256"]], "symbol": "answer"}]
+    for damaged in (
+        *(kept.read_bytes()[:-8], b"", b"[" * 100_000 + b"\n" + code),
+        *(json.dumps(head).encode() + b"\n" + code for head in heads),
+    ):
         kept.write_bytes(damaged)
         assert object_code.load("answer", "one") is None
+    assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    assert run(object_code.load("answer", "one")) == 48
 
 
-def test_without_a_folder(tmp_path, monkeypatch):
+def test_without_a_folder(tmp_path, monkeypatch, caplog):
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     monkeypatch.setattr(object_code, "_folders", lambda: [blocked / "inside"])
+    object_code._tell_once.cache_clear()
+    for _ in range(2):
+        assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    (told,) = caplog.messages
+    assert "compiled anew in every run" in told and str(blocked) in told
+
+
+@pytest.mark.parametrize("mode", [0o775, 0o757, 0o1777])
+def test_code_that_others_could_have_written_is_neither_run_nor_kept(folder, caplog, mode):
+    """Whoever can write there can choose a checksum that fits."""
+    object_code.store("answer", "one", TEXT, "answer")
+    folder.chmod(mode)
+    assert object_code.load("answer", "one") is None
+    object_code._tell_once.cache_clear()
+    (kept,) = folder.iterdir()
+    kept.unlink()
     assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    assert not list(folder.iterdir()) and f"'{folder}' can be written by others" in caplog.text
 
 
 def test_folders(monkeypatch, tmp_path):

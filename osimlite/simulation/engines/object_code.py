@@ -1,7 +1,8 @@
 """Machine code in files: loaded in a moment, without the compiler that made it.
 
 A file holds one entry in the object format of the system. It is good for one version of the sources and of the compiler
-and for one kind of processor, which its name stands for.
+and for one kind of processor, which its name stands for. A checksum tells damage; who wrote a file is told by who can
+write there: what others can change is not run.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import json
+import logging
 import os
 import re
 import sys
@@ -21,7 +23,9 @@ from typing import Any
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 from osimlite.errors import OsimliteError
-from osimlite.files import make_folder, write_atomically
+from osimlite.simulation.engines.private_files import read_private, write_private
+
+_log = logging.getLogger(__name__)
 
 FOLDER = "NUMBA_CACHE_DIR"
 """Environment variable that may name the only folder for the files; numba uses it likewise."""
@@ -34,22 +38,25 @@ _kept: list[Any] = []
 
 
 def load(name: str, digest: str) -> int | None:
-    """Address of an entry from its file, None if there is none.
+    """Address of an entry from its file, None if there is none that only the user can have written.
 
     Args:
         name: of the entry.
         digest: of the sources.
     """
     for folder in _folders():
-        path = folder / _file(name, digest)
-        try:
-            head, _, code = path.read_bytes().partition(b"\n")
-            told = json.loads(head)
-        except (OSError, ValueError):
-            continue
-        if isinstance(told, dict) and told.get("sha256") == hashlib.sha256(code).hexdigest():
-            return _link(code, told["symbol"])
+        head, _, code = (read_private(folder / _file(name, digest)) or b"").partition(b"\n")
+        match _parsed(head):
+            case {"symbol": str(symbol), "sha256": str(checksum)} if checksum == hashlib.sha256(code).hexdigest():
+                return _link(code, symbol) or None
     return None
+
+
+def _parsed(head: bytes) -> object:
+    try:
+        return json.loads(head)
+    except (ValueError, RecursionError):
+        return None
 
 
 def store(name: str, digest: str, text: str, symbol: str) -> int:
@@ -63,13 +70,21 @@ def store(name: str, digest: str, text: str, symbol: str) -> int:
     """
     code: bytes = _machine().emit_object(llvm.parse_assembly(text))
     told = {"symbol": symbol, "sha256": hashlib.sha256(code).hexdigest()}
+    refusals = []
     for folder in _folders():
         try:
-            write_atomically(make_folder(folder) / _file(name, digest), json.dumps(told).encode() + b"\n" + code)
+            write_private(folder / _file(name, digest), json.dumps(told).encode() + b"\n" + code)
             break
-        except OsimliteError:
-            continue
+        except OsimliteError as error:
+            refusals.append(str(error))
+    else:
+        _tell_once(f"machine code is compiled anew in every run, since it can be kept nowhere: {'; '.join(refusals)}")
     return _link(code, symbol)
+
+
+@cache
+def _tell_once(sentence: str) -> None:
+    _log.warning(sentence)
 
 
 def _link(code: bytes, symbol: str) -> int:
