@@ -289,8 +289,8 @@ def _parsed_json(text: str, file: str) -> Any:
         return json.loads(text)
     except json.JSONDecodeError as error:
         raise DocumentError(f"not JSON: {error.msg}", file=file, line=error.lineno, column=error.colno) from None
-    except RecursionError:
-        raise DocumentError("the JSON text is nested too deeply to be a model", file=file, line=1) from None
+    except (RecursionError, ValueError):
+        raise DocumentError("the JSON text is nested too deeply, or has too long a number", file=file, line=1) from None
 
 
 def _parsed_yaml(text: str, file: str) -> Any:

@@ -33,7 +33,7 @@ def without_baseline(path: str | Path, report: Report) -> Report:
         counts = Counter({tuple(key): int(count) for *key, count in data["findings"]})
     except OSError as error:
         raise OsimliteError(f"cannot read the baseline: {error.strerror}", file=str(path)) from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise OsimliteError("this is no baseline; write one with --write-baseline", file=str(path)) from None
     kept = []
     for finding in report.findings:

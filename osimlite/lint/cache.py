@@ -37,12 +37,13 @@ class Cache:
     def get(self, file: str, key: str) -> list[Finding] | None:
         """The findings in a file, None unless they were kept for this key and nothing has changed since."""
         try:
-            entry = json.loads(self._entry(file).read_bytes())
-            if entry["key"] != key or any(self._stamp(path) != _pair(stamp) for path, stamp in entry["outside"]):
-                return None
-            return [_finding(file, *values) for values in entry["findings"]]
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
+            match json.loads(self._entry(file).read_bytes()):
+                case {"key": str(kept), "outside": [*outside], "findings": [*findings]} if kept == key:
+                    if all(self._stamp(path) == stamp for path, stamp in map(_outside, outside)):
+                        return [_finding(file, values) for values in findings]
+        except (OSError, ValueError, TypeError, RecursionError):
+            pass
+        return None
 
     def put(self, file: str, key: str, findings: Iterable[Finding], outside: Iterable[str]) -> None:
         """Keep the findings in a file; `outside` are the paths at which the check looked for something."""
@@ -119,8 +120,14 @@ def _code() -> str:
     return f"{__version__} {newest} {count}"
 
 
-def _pair(stamp: Any) -> Stamp:
-    return None if stamp is None else (stamp[0], stamp[1])
+def _outside(values: Any) -> tuple[str, Stamp]:
+    """A path and its stamp as an entry has them; TypeError for anything else."""
+    match values:
+        case [str(path), None]:
+            return path, None
+        case [str(path), [int(time), int(size)]]:
+            return path, (time, size)
+    raise TypeError
 
 
 def _values(finding: Finding) -> list[object]:
@@ -132,10 +139,29 @@ def _values(finding: Finding) -> list[object]:
     ]  # fmt: skip
 
 
-def _finding(
-    file: str, code: str, name: str, severity: str, message: str, line: int | None, column: int | None, length: int,
-    component: str, suggestion: str | None, fix: Any,
-) -> Finding:  # fmt: skip
-    mend = None if fix is None else Fix(tuple(Edit(*edit) for edit in fix[1]), fix[0])
-    level = Severity(severity)
-    return Finding(code, name, level, message, file, line, column, length, component, suggestion, mend)
+def _finding(file: str, values: Any) -> Finding:
+    """The finding that `_values` made a list of; TypeError for anything else."""
+    match values:
+        case [
+            str(code), str(name), str(severity), str(message), int() | None as line, int() | None as column,
+            int(length), str(component), str() | None as suggestion, fix,
+        ]:  # fmt: skip
+            mend, level = _fix(fix), Severity(severity)
+            return Finding(code, name, level, message, file, line, column, length, component, suggestion, mend)
+    raise TypeError
+
+
+def _fix(values: Any) -> Fix | None:
+    match values:
+        case None:
+            return None
+        case [bool(safe), [*edits]]:
+            return Fix(tuple(map(_edit, edits)), safe)
+    raise TypeError
+
+
+def _edit(values: Any) -> Edit:
+    match values:
+        case [int(start), int(end), str(text)]:
+            return Edit(start, end, text)
+    raise TypeError

@@ -110,6 +110,43 @@ def test_a_broken_entry_is_no_entry(project, checked, content):
     assert json.loads(entry.read_text())["findings"]
 
 
+def _places(value, *way):
+    """The way to every value in JSON data, and to all that is within it."""
+    yield way
+    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, part in parts:
+        yield from _places(part, *way, key)
+
+
+def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked):
+    first = check_files([str(project / "m.osim")], Config())
+    (entry,) = (project / NAME).rglob("*.json")
+    whole = json.loads(entry.read_text())
+    assert whole["outside"] and any(values[-1] for values in whole["findings"])
+    tried = 0
+    for way in _places(whole):
+        for wrong in (None, 1.5, 7, "x", [], [1], {}, {"a": 1}):
+            damaged = json.loads(json.dumps({"": whole}))
+            *outer, last = ("", *way)
+            inside = damaged
+            for key in outer:
+                inside = inside[key]
+            # A line, a column, a suggestion and a mend may be missing.
+            fits = wrong is None and last in (4, 5, 8, 9)
+            fits = fits or (inside[last] is None and {4: 7, 5: 7, 8: "x"}.get(last) == wrong)
+            if fits or type(inside[last]) is type(wrong):
+                continue
+            inside[last] = wrong
+            entry.write_text(json.dumps(damaged[""]))
+            again = check_files([str(project / "m.osim")], Config())
+            assert again.findings == first.findings
+            assert [finding.fix for finding in again] == [finding.fix for finding in first], (way, wrong)
+            tried += 1
+    assert len(checked) == 1 + tried and tried > 100
+    entry.write_text("[" * 100_000)
+    assert check_files([str(project / "m.osim")], Config()).findings == first.findings
+
+
 def test_a_cache_that_cannot_be_written_is_done_without(project, checked):
     (project / NAME).write_text("a file stands in its place")
     assert codes(project) == codes(project)
