@@ -127,7 +127,7 @@ def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked):
     for way in _places(whole):
         for wrong in (None, 1.5, 7, "x", [], [1], {}, {"a": 1}):
             damaged = json.loads(json.dumps({"": whole}))
-            *outer, last = ("", *way)
+            outer, last = ("", *way)[:-1], ("", *way)[-1]
             inside = damaged
             for key in outer:
                 inside = inside[key]
