@@ -204,7 +204,7 @@ def many(path: Path) -> Table:
 
 def memory() -> float:
     """Of this process, MB."""
-    text = Path("/proc/self/status").read_text()
+    text = Path("/proc/self/status").read_text(encoding="utf-8")
     return float(text.partition("VmRSS:")[2].split()[0]) / 1024.0
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from osimlite.text import visible
+
 
 class OsimliteError(Exception):
     """Base of every error osimlite raises on purpose.
@@ -29,7 +31,7 @@ class OsimliteError(Exception):
 
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
-        return f"{place}: {self.message}" if place else self.message
+        return visible(f"{place}: {self.message}" if place else self.message)
 
 
 class DoubtfulWarning(UserWarning):

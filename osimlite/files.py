@@ -48,7 +48,16 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
     with written_atomically(path) as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
+        stream.write(_encoded(content, path) if isinstance(content, str) else content)
+
+
+def _encoded(content: str, path: str | Path) -> bytes:
+    try:
+        return content.encode()
+    except UnicodeEncodeError as error:
+        # Half of a character: JSON can hold it, UTF-8 cannot.
+        odd = content[max(0, error.start - 20) : error.end]
+        raise OsimliteError(f"cannot write the file: '{odd}' ends in half a character", file=str(path)) from None
 
 
 @contextmanager

@@ -1,8 +1,57 @@
-"""Sentences for people: nearest names and short lists."""
+"""Sentences for people: nearest names, short lists, and what a terminal or a log must not obey."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+
+_COLOUR = r"\x1b\[[0-9;]*m"
+# Bidirectional controls, the separators of lines, and halves of characters: what stands for a byte that is no UTF-8.
+_UNSAFE = r"[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]|\r(?!\n)"
+# Workflow commands: GitHub obeys `::name::` at the start of a line; it, Azure and TeamCity obey `##name[` anywhere.
+_COMMAND = r"(?:(?<=\n)|\A)[ \t\xa0\u1680\u2000-\u200a\u202f\u205f\u3000]*:(?=:)|#(?=#\w*\[)"
+_OBEYED = re.compile(f"{_COLOUR}|{_UNSAFE}|{_COMMAND}")
+
+
+def visible(text: str) -> str:
+    r"""The text in one line, all that prints nothing written out: ``\n``, ``\x1b``, ``\u202e``.
+
+    A byte of a file name that is no UTF-8 is written as ``\xe9``. This is for people: it cannot be read back.
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() else _escape(c) for c in text)
+
+
+def json_lines(data: object) -> str:
+    """JSON as programs read it from a log or a pipe: ASCII, so that it passes everywhere, and nothing in it is lost."""
+    from json import dumps
+
+    # Where it goes through the log of a CI job, a string must not be taken for a command; `#` stands in strings only.
+    return dumps(data, indent=2).replace("##", "#\\u0023").replace("\x7f", "\\u007f") + "\n"
+
+
+def harmless(text: str, *, starts_line: bool = True) -> str:
+    r"""Lines of text without anything that terminals or the logs of CI obey, but for colours, ``\n`` and ``\t``.
+
+    Args:
+        text: whole lines, or a part of one.
+        starts_line: whether a line starts where the text does.
+    """
+    return _OBEYED.sub(lambda found: _written_out(found, starts_line), text)
+
+
+def _written_out(found: re.Match[str], starts_line: bool) -> str:
+    what = found[0]
+    if len(what) == 1 and what not in ":#":
+        return _escape(what)
+    if what.endswith(":"):
+        return what if not starts_line and found.start() == 0 else f"{what[:-1]}\\x3a"
+    return what if what.startswith("\x1b") else "\\x23"
+
+
+def _escape(character: str) -> str:
+    if "\udc80" <= character <= "\udcff":
+        return f"\\x{ord(character) - 0xDC00:02x}"
+    return character.encode("unicode_escape").decode("ascii")
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | None:

@@ -59,8 +59,9 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
     def osimlite(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
         if version:
             from osimlite import __version__
+            from osimlite.cli._console import say
 
-            typer.echo(f"osimlite {__version__}")
+            say(f"osimlite {__version__}")
             raise typer.Exit
 
     return application
@@ -115,11 +116,18 @@ def main(arguments: list[str] | None = None) -> None:
 
     Exits with 0 (done), 1 (the answer is no), 2 (could not be carried out) or 130 (interrupted).
     """
+    from osimlite.cli._console import guarded_output
+
+    with guarded_output():
+        _run(sys.argv[1:] if arguments is None else arguments)
+
+
+def _run(words: list[str]) -> None:
     import warnings
 
+    from osimlite.cli._console import complain
     from osimlite.errors import DoubtfulWarning, OsimliteError
 
-    words = sys.argv[1:] if arguments is None else arguments
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Only the command that is asked for is loaded; without one, all are, for the help.
@@ -139,14 +147,22 @@ def main(arguments: list[str] | None = None) -> None:
         with warnings.catch_warnings():
             # Commands say themselves what is odd about what was typed.
             warnings.simplefilter("ignore", DoubtfulWarning)
-            app(names)(args=words, prog_name="osimlite")
+            raise SystemExit(app(names)(args=words, prog_name="osimlite", standalone_mode=False))
     except OsimliteError as error:
-        print(f"osimlite: {error}{_built_in(error)}", file=sys.stderr)
+        complain(f"{error}{_built_in(error)}")
         raise SystemExit(error.exit_code) from None
     except KeyboardInterrupt:
-        print("osimlite: interrupted", file=sys.stderr)
+        complain("interrupted")
         raise SystemExit(130) from None
     except BrokenPipeError:
         # Whoever read our output has gone; Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
+    except Exception as error:
+        # The library that reads options does not tell under what name it can be caught.
+        if not hasattr(error, "format_message"):
+            raise
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context is not None else "osimlite"
+        complain(f"{error.format_message().rstrip('.')}; '{command} --help' lists what there is")
+        raise SystemExit(2) from None

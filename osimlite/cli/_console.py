@@ -1,12 +1,102 @@
-"""What commands print when they have done their work."""
+"""The one way out for what commands print: nothing that a terminal or the log of a CI job would obey gets through."""
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+from osimlite.text import harmless, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
+
+
+class Guarded:
+    """A text stream that writes out what terminals and logs obey, and what its encoding lacks."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+        self._starts_line = True
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+    def write(self, text: str) -> int:
+        """Write text, lines or parts of them."""
+        self.stream.write(harmless(text, starts_line=self._starts_line))
+        last = text[text.rfind("\n") + 1 :]
+        self._starts_line = not last.strip() and (self._starts_line or "\n" in text)
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+@contextmanager
+def guarded_output() -> Iterator[None]:
+    """Let all that is written to standard output and standard error go through :class:`Guarded`."""
+    kept = sys.stdout, sys.stderr
+    # A program without a console has no streams.
+    sys.stdout, sys.stderr = (stream and cast(TextIO, Guarded(stream)) for stream in kept)
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = kept
+
+
+def say(text: object = "", *, err: bool = False) -> None:
+    """Print one line: whatever names in it hold, it stays one."""
+    print(visible(str(text)), file=sys.stderr if err else sys.stdout, flush=True)
+
+
+def complain(text: object) -> None:
+    """Say one sentence on standard error, as the program."""
+    say(f"osimlite: {text}", err=True)
+
+
+def show(lines: str, *, err: bool = False) -> None:
+    """Print lines whose names have gone through :func:`osimlite.text.visible`."""
+    (sys.stderr if err else sys.stdout).write(lines)
+
+
+def print_diff(before: str, after: str, old: str, new: str) -> None:
+    """Print what differs between two texts, under their names, as a unified diff."""
+    import difflib
+    import io
+
+    # A text breaks its lines at \\n; what else looks like a break to Python is written out.
+    first, second = (list(io.StringIO(text, newline="\n")) for text in (before, after))
+    for line in difflib.unified_diff(first, second, old, new):
+        body = line.rstrip("\r\n")
+        end = line[len(body) :] if line.endswith("\n") else "\n\\ No newline at end of file\n"
+        show("\t".join(map(visible, body.split("\t"))) + end)
+
+
+def hand_over(text: str) -> None:
+    """Write a text for programs to standard output: as it is, in UTF-8, whatever people here read."""
+    sys.stdout.flush()
+    # What takes the place of standard output in tests may be without bytes.
+    if hasattr(sys.stdout, "buffer"):
+        sys.stdout.buffer.write(text.encode())
+        sys.stdout.buffer.flush()
+    else:
+        unguarded(sys.stdout).write(text)
+
+
+def unguarded(stream: TextIO) -> TextIO:
+    """The stream itself: for texts of our own that move the cursor."""
+    return stream.stream if isinstance(stream, Guarded) else stream
+
+
+def wants_colour() -> bool:
+    """Whether what is printed on standard output is coloured."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    return bool(os.environ.get("FORCE_COLOR")) or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
 
 
 def plain_console(**choices: Any) -> Console:
@@ -14,6 +104,11 @@ def plain_console(**choices: Any) -> Console:
     from rich.console import Console
 
     return Console(**{"markup": False, "emoji": False, **choices})
+
+
+def add_row(table: Table, *cells: str) -> None:
+    """Add a row to a table of the console, whatever names its cells hold."""
+    table.add_row(*map(visible, cells))
 
 
 @dataclass
@@ -31,9 +126,9 @@ class Facts:
         """Print them as a table; a long name goes on in the next line."""
         from rich.table import Table
 
-        table = Table(title=self.title, title_justify="left", show_header=False)
+        table = Table(title=visible(self.title), title_justify="left", show_header=False)
         table.add_column(style="bold", overflow="fold")
         table.add_column(overflow="fold")
         for row in self.rows:
-            table.add_row(*row)
+            add_row(table, *row)
         plain_console().print(table)

@@ -87,8 +87,7 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
     Raises:
         OsimliteError: a word is not of that form, there is no such coordinate, or the unit does not fit it.
     """
-    import sys
-
+    from osimlite.cli._console import complain
     from osimlite.errors import ModelError, OsimliteError
     from osimlite.simulation.start import doubt_of, in_units_of
 
@@ -100,7 +99,7 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
             if option == "--set" and (odd := doubt_of(info, name, text)):
-                print(f"osimlite: warning: {odd}", file=sys.stderr)
+                complain(f"warning: {odd}")
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}") from None

@@ -8,6 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
+from osimlite.cli._console import complain, plain_console, unguarded
+from osimlite.text import visible
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -66,8 +69,7 @@ def tell_of_compiling() -> None:
     class Once(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             log.removeHandler(self)
-            words = "compiling the engine, which this machine keeps; it takes some ten seconds"
-            print(f"osimlite: {words}", file=sys.stderr, flush=True)
+            complain("compiling the engine, which this machine keeps; it takes some ten seconds")
 
     log = logging.getLogger("osimlite.simulation.engines.machine_code")
     log.setLevel(logging.INFO)
@@ -79,16 +81,15 @@ def _silent(*_: float) -> None:
 
 
 def _started(title: str) -> Progress:
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
     )
-    bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
-    bar.add_task(title, total=None)
+    bar = Progress(*columns, console=plain_console(file=unguarded(sys.stderr)), transient=True, auto_refresh=False)
+    bar.add_task(visible(title), total=None)
     bar.start()
     return bar

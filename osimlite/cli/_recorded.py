@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from osimlite.cli._console import plain_console
+from osimlite.cli._console import say
 from osimlite.document.reader import read
 from osimlite.errors import OsimliteError
 from osimlite.files import make_folder
@@ -38,11 +38,10 @@ def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Pa
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]
         write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
         names.append("markers.trc")
-    console = plain_console(highlight=False, soft_wrap=True)
     if recorded.missing:
-        console.print(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
+        say(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
     if recorded.ignored:
-        console.print(f"columns that name no coordinate, ignored: {listed(recorded.ignored)}")
+        say(f"columns that name no coordinate, ignored: {listed(recorded.ignored)}")
     times = recorded.times
     paths = listed([str(folder / name) for name in names])
-    console.print(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
+    say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

@@ -67,9 +67,9 @@ def make_plan(
     Raises:
         OsimliteError: they do not describe one.
     """
-    import sys
     import warnings
 
+    from osimlite.cli._console import complain
     from osimlite.errors import DoubtfulWarning, SettingError
     from osimlite.sweep.variables import parse
 
@@ -81,7 +81,7 @@ def make_plan(
         levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
         made = _plan(source, ranges, parameter, **levels, **choices)
     for each in told:
-        print(f"osimlite: warning: {each.message}", file=sys.stderr)
+        complain(f"warning: {each.message}")
     return made
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import gc
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from osimlite.cli._console import hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import OsimliteError
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
-from osimlite.lint.reporters import FORMATS, render
+from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -56,24 +56,24 @@ def run(
         mended = [_mend(path, given, unsafe=unsafe_fixes) for path in files]
         count, left = sum(count for count, _ in mended), sum(left for _, left in mended)
         more = f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
-        print(f"Mended {_places(count)}{more}.", file=sys.stderr)
+        say(f"Mended {_places(count)}{more}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=cached, progress=progress)
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write
 
         count = write(write_baseline, report)
-        print(f"{write_baseline}: {count} {'finding' if count == 1 else 'findings'}")
+        say(f"{write_baseline}: {count} {'finding' if count == 1 else 'findings'}")
         return 0
     if baseline is not None:
         from osimlite.lint.baseline import without_baseline
 
         report = without_baseline(baseline, report)
     if statistics:
-        sys.stdout.write(_statistics(report))
+        show(_statistics(report))
     else:
-        colour = _wants_colour() and format in ("full", "concise")
-        sys.stdout.write(render(report, format, colour=colour, width=min(max(_width(), 40), 120)))
+        text = render(report, format, colour=wants_colour(), width=min(max(_width(), 40), 120))
+        (show if format in FOR_PEOPLE else hand_over)(text)
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
     return int(bool(report.at_least(worst)))
 
@@ -149,16 +149,13 @@ def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
     """Print what mending would change; whether it would change anything."""
-    import difflib
-
     from osimlite.document.source import Source
 
     source, data, count, left = _mended(path, given, unsafe)
     if not count:
         guess = f"can be mended with certainty; --unsafe-fixes would mend {_places(left)}" if left else "to mend"
-        print(f"{path}: nothing {guess}.", file=sys.stderr)
-    new = Source(data).text.splitlines(keepends=True)
-    sys.stdout.writelines(difflib.unified_diff(source.text.splitlines(keepends=True), new, path, path))
+        say(f"{path}: nothing {guess}.", err=True)
+    print_diff(source.text, Source(data).text, path, path)
     return bool(count)
 
 
@@ -166,12 +163,6 @@ def _width() -> int:
     import shutil
 
     return shutil.get_terminal_size((80, 24)).columns if sys.stdout.isatty() else 80
-
-
-def _wants_colour() -> bool:
-    if os.environ.get("NO_COLOR"):
-        return False
-    return bool(os.environ.get("FORCE_COLOR")) or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
 
 
 def _statistics(report: Report) -> str:

@@ -39,6 +39,7 @@ def build(
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
+    from osimlite.cli._console import complain, hand_over, say, show
     from osimlite.document.printer import to_text, write
     from osimlite.errors import OsimliteError
     from osimlite.lint import validate
@@ -55,25 +56,26 @@ def build(
     if not report.ok:
         from osimlite.lint.reporters import render
 
-        typer.echo(render(report, "full"), err=True)
-        typer.echo(f"osimlite: '{source}' has errors; nothing was written", err=True)
+        show(render(report, "full"), err=True)
+        complain(f"'{source}' has errors; nothing was written")
         raise typer.Exit(1)
     if str(output) == "-":
-        typer.echo(to_text(model, numbers=style), nl=False)
+        hand_over(to_text(model, numbers=style))
         return
     target = output or Path(f"{model.name or 'model'}.osim")
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
     warnings = len(report.warnings)
     advice = f"; {warnings} warning{'s' * (warnings != 1)}: see osimlite validate {target}" if warnings else ""
-    typer.echo(f"{target}: {count} components{advice}")
+    say(f"{target}: {count} components{advice}")
 
 
 def _list_models() -> None:
     import textwrap
 
+    from osimlite.cli._console import show
     from osimlite.models import BUILT_IN
     from osimlite.models.source import describe
 
     for name in BUILT_IN:
-        typer.echo(textwrap.fill(f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)))
+        show(textwrap.fill(f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)) + "\n")

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from osimlite.cli._console import add_row, plain_console, say, show
 from osimlite.cli._progress import progress_bar
+from osimlite.text import visible
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
@@ -34,8 +34,6 @@ def demo(
     The walker is the model of the OpenSim exercise "Building a Dynamic Walker". The tour takes about ten seconds,
     most of it for the pictures.
     """
-    from rich.console import Console
-
     from osimlite._require import require
     from osimlite.files import make_folder
 
@@ -44,7 +42,7 @@ def demo(
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
     make_folder(output)
-    tour = _Tour(Console(), output)
+    tour = _Tour(output)
     model, trajectory = _work(tour)
     if pictures:
         _pictures(tour, model, trajectory)
@@ -55,36 +53,36 @@ def demo(
 class _Tour:
     """What has been done so far, for the closing table."""
 
-    console: Console
     folder: Path
     rows: list[tuple[str, str, str, float]] = field(default_factory=list)
 
     @contextmanager
     def step(self, title: str) -> Iterator[Callable[[str, str], None]]:
         """Announce a step; the caller says what came out and which file holds it."""
-        self.console.print(f"[bold]{len(self.rows) + 1}. {title}[/bold]")
+        say(f"{len(self.rows) + 1}. {title}")
         start = time.perf_counter()
         said = ["", ""]
 
-        def say(result: str, file: str = "") -> None:
+        def tell(result: str, file: str = "") -> None:
             said[:] = [result, file]
 
-        yield say
+        yield tell
         self.rows.append((title, said[0], said[1], time.perf_counter() - start))
-        self.console.print(f"   {said[0]}\n", highlight=False)
+        say(f"   {said[0]}")
+        say()
 
     def table(self) -> None:
         """Print everything that was done."""
         from rich.table import Table
 
-        table = Table(title=f"Everything is in {self.folder}/", title_justify="left")
+        table = Table(title=visible(f"Everything is in {self.folder}/"), title_justify="left")
         table.add_column("step", overflow="fold")
         table.add_column("result", overflow="fold")
         table.add_column("file", no_wrap=True)
         table.add_column("s", justify="right", no_wrap=True)
         for title, result, file, seconds in self.rows:
-            table.add_row(title, result, file, f"{seconds:.2f}")
-        self.console.print(table)
+            add_row(table, title, result, file, f"{seconds:.2f}")
+        plain_console().print(table)
 
 
 def _work(tour: _Tour) -> tuple[Model, Trajectory]:
@@ -96,36 +94,36 @@ def _work(tour: _Tour) -> tuple[Model, Trajectory]:
     from osimlite.translate import to_urdf
 
     folder = tour.folder
-    with tour.step("Build in Python") as say:
+    with tour.step("Build in Python") as tell:
         model = dynamic_walker()
         file = folder / f"{model.name}.osim"
         write(model, file)
-        say(f"{sum(1 for _ in model.components())} components written", file.name)
+        tell(f"{sum(1 for _ in model.components())} components written", file.name)
 
-    with tour.step("Validate the file") as say:
+    with tour.step("Validate the file") as tell:
         report = validate(file)
-        say(f"{len(report.errors)} errors, {len(report.warnings)} warnings", file.name)
+        tell(f"{len(report.errors)} errors, {len(report.warnings)} warnings", file.name)
 
-    with tour.step("Validate a misspelt copy") as say:
-        text = file.read_text()
+    with tour.step("Validate a misspelt copy") as tell:
+        text = file.read_text(encoding="utf-8")
         assert text.count(MISSPELT[0]) == 1
         broken = folder / "misspelt.osim"
-        broken.write_text(text.replace(*MISSPELT))
+        broken.write_text(text.replace(*MISSPELT), encoding="utf-8")
         found = validate(broken)
         errors = replace(found, findings=found.errors)
-        tour.console.print(render(errors, "full"), highlight=False, markup=False)
-        say(f"{len(found.errors)} error on line {found.errors[0].line}: {found.errors[0].name}", broken.name)
+        show(render(errors, "full"))
+        tell(f"{len(found.errors)} error on line {found.errors[0].line}: {found.errors[0].name}", broken.name)
 
-    with tour.step("Translate to URDF") as say:
+    with tour.step("Translate to URDF") as tell:
         urdf = to_urdf(model)
         urdf.write(folder / "urdf")
-        say(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
+        tell(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
 
-    with tour.step("Simulate in PyBullet") as say, progress_bar("   simulating", 2.0) as progress:
+    with tour.step("Simulate in PyBullet") as tell, progress_bar("   simulating", 2.0) as progress:
         trajectory = simulate(model, to=2.0, report_interval=0.01, progress=progress)
         trajectory.write(folder)
         difference = distance_to_opensim(trajectory)
-        say(
+        tell(
             f"{trajectory.summary['steps']} steps; at most {difference:.1e} from OpenSim's converged motion",
             "states.sto",
         )
@@ -136,13 +134,13 @@ def _pictures(tour: _Tour, model: Model, trajectory: Trajectory) -> None:
     from osimlite.view.animation import animate
     from osimlite.view.plots import plot_simulation
 
-    with tour.step("Plot motion, forces, energy") as say:
+    with tour.step("Plot motion, forces, energy") as tell:
         files = plot_simulation(trajectory, tour.folder)
-        say(", ".join(file.stem for file in files), "*.png")
-    with tour.step("Animate the walker") as say, progress_bar("   drawing", None) as progress:
+        tell(", ".join(file.stem for file in files), "*.png")
+    with tour.step("Animate the walker") as tell, progress_bar("   drawing", None) as progress:
         target = tour.folder / "animation.gif"
         animate(model, trajectory, target, progress=progress)
-        say(f"{target.stat().st_size / 1e6:.1f} MB", target.name)
+        tell(f"{target.stat().st_size / 1e6:.1f} MB", target.name)
 
 
 def distance_to_opensim(trajectory: Trajectory) -> float:
@@ -150,7 +148,7 @@ def distance_to_opensim(trajectory: Trajectory) -> float:
     import csv
     from importlib.resources import files
 
-    text = files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text()
+    text = files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text(encoding="utf-8")
     largest = 0.0
     times = [round(float(t), 6) for t in trajectory.times]
     for row in csv.DictReader(text.splitlines()):

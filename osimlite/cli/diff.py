@@ -27,6 +27,7 @@ def diff(
 
     Example: osimlite diff gait2392.osim gait2392_scaled.osim
     """
+    from osimlite.cli._console import complain, say
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError
     from osimlite.schema.difference import differences
@@ -45,13 +46,14 @@ def diff(
         models = [Model() if str(file) == "/dev/null" else read(file) for file in (old, new)]
     except OsimliteError as error:
         # 1 says that the models differ.
-        typer.echo(f"osimlite: {error}", err=True)
+        complain(error)
         raise typer.Exit(2) from None
     found = differences(models[0], models[1])
     if git:
-        typer.echo(f"--- {title}\n+++ {title}")
+        say(f"--- {title}")
+        say(f"+++ {title}")
     for line in described(found):
-        typer.echo(line)
+        say(line)
     if found and not git:
         raise typer.Exit(1)
 

@@ -9,12 +9,12 @@ import sys
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from osimlite.cli._console import add_row, plain_console, say
+from osimlite.cli._progress import progress_bar
 
 PURPOSES = {
     "": "read, write, check: build, validate, format, upgrade, diff, info",
@@ -61,38 +61,44 @@ def doctor(
 
     Example: osimlite doctor gait2392.osim
     """
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from osimlite import __version__
     from osimlite.errors import MissingFileError
 
     if model is not None and not model.exists():
         raise MissingFileError("there is no such file or folder", file=str(model))
-    console = Console(highlight=False)
-    console.print(f"osimlite {__version__}, Python {sys.version.split()[0]}, {sys.platform}")
-    console.print(f"installed in {Path(__file__).parents[2]}\n", soft_wrap=True)
+    say(f"osimlite {__version__}, Python {sys.version.split()[0]}, {sys.platform}")
+    say(f"installed in {Path(__file__).parents[2]}")
+    say()
 
     wanted = requirements()
-    with console.status("loading each package ..."):
-        found = {name: examine(name) for names in wanted.values() for name in names}
+    every = {name for names in wanted.values() for name in names}
+    found = {}
+    with progress_bar("loading each package", len(every)) as progress:
+        for count, name in enumerate(every, 1):
+            found[name] = examine(name)
+            progress(count)
     table = Table(box=None, pad_edge=False)
     for heading in ("extra", "for", "packages"):
         table.add_column(heading, overflow="fold")
     for extra, names in wanted.items():
         packages = [found[name] for name in names]
         missing = any(not package.version for package in packages)
-        words = ", ".join(f"{item.name} {item.version or '[red]missing[/red]'}" for item in packages)
-        cure = f"\n[bold]pip install 'osimlite\\[{extra}]'[/bold]" if extra and missing else ""
-        table.add_row(extra or "(none)", PURPOSES[extra], words + cure)
-    console.print(table)
+        words = ", ".join(f"{item.name} {item.version or 'missing'}" for item in packages)
+        add_row(table, extra or "(none)", PURPOSES[extra], words)
+        if extra and missing:
+            table.add_row("", "", Text(f"pip install 'osimlite[{extra}]'", style="bold"))
+    plain_console().print(table)
 
-    console.print()
-    _show_places(console, model)
-    console.print("\nshell completion: osimlite --install-completion")
+    say()
+    _show_places(model)
+    say()
+    say("shell completion: osimlite --install-completion")
     broken = [package for package in found.values() if package.trouble]
     for package in broken:
-        console.print(f"[red]{package.name} {package.version} cannot be loaded[/red]: {package.trouble}")
+        say(f"{package.name} {package.version} cannot be loaded: {package.trouble}")
     if broken:
         raise typer.Exit(1)
 
@@ -119,10 +125,10 @@ def examine(name: str) -> Package:
     named = name.lower().replace("-", "_")
     main = named if named in modules else next(module for module in modules if not module.startswith("_"))
     # -P: what lies in the current folder is not what was installed.
-    done = subprocess.run([sys.executable, "-P", "-c", f"import {main}"], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-P", "-c", f"import {main}"], capture_output=True, check=False)
     if done.returncode == 0:
         return Package(name, version, "")
-    words = done.stderr.strip().splitlines() or [f"its process ended with {done.returncode}"]
+    words = done.stderr.decode(errors="replace").strip().splitlines() or [f"its process ended with {done.returncode}"]
     return Package(name, version, words[-1])
 
 
@@ -136,7 +142,7 @@ def _modules(path: tuple[str, ...]) -> dict[str, list[str]]:
     return found
 
 
-def _show_places(console: Console, model: Path | None) -> None:
+def _show_places(model: Path | None) -> None:
     """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
     from osimlite.files import GEOMETRY_VARIABLE
     from osimlite.lint.settings import settings_for
@@ -145,12 +151,12 @@ def _show_places(console: Console, model: Path | None) -> None:
     folder = Path.cwd() if model is None else model.resolve() if model.is_dir() else model.resolve().parent
     settings = settings_for(folder)
     where = settings.file or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
-    console.print(f"settings: {where}", soft_wrap=True)
-    console.print("mesh folders, in the order of the search:")
+    say(f"settings: {where}")
+    say("mesh folders, in the order of the search:")
     for place in MeshFolders(folder, [Path(path) for path in settings.mesh_paths]).searched:
-        console.print(f"  {place}: {_meshes(place)}", soft_wrap=True)
+        say(f"  {place}: {_meshes(place)}")
     if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
-        console.print(
+        say(
             "Bones of OpenSim's models lie in the folder Geometry of its installation; name that in the environment "
             f"variable {GEOMETRY_VARIABLE}, or as mesh-paths in the settings."
         )
@@ -158,6 +164,6 @@ def _show_places(console: Console, model: Path | None) -> None:
 
 def _meshes(place: Path) -> str:
     if not place.is_dir():
-        return "[yellow]not there[/yellow]"
+        return "not there"
     count = sum(path.suffix.lower() in MESHES for path in place.iterdir())
     return f"{count} mesh files" if count else "no mesh files"

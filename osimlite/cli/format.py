@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +20,7 @@ def format(
 
     Example: osimlite format models --check
     """
+    from osimlite.cli._console import complain, print_diff, say
     from osimlite.document.printer import to_text
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
@@ -37,7 +37,7 @@ def format(
                     f"document version {document.version}: run 'osimlite upgrade' first", file=str(path)
                 )
         except OsimliteError as error:
-            typer.echo(f"osimlite: {error}", err=True)
+            complain(error)
             worst = max(worst, error.exit_code)
             continue
         before = document.source.text
@@ -47,21 +47,16 @@ def format(
             continue
         changed += 1
         if show_diff:
-            typer.echo("".join(_unified(before, after, str(path))), nl=False)
+            print_diff(before, after, str(path), f"{path} (formatted)")
         elif check:
-            typer.echo(f"would reformat {path}")
+            say(f"would reformat {path}")
         else:
             write_atomically(path, after)
-            typer.echo(f"reformatted {path}")
+            say(f"reformatted {path}")
     if same and not (changed and show_diff):
         files = "1 file is" if same == 1 else f"{same} files are"
-        typer.echo(f"{files} formatted already", err=True)
+        say(f"{files} formatted already", err=True)
     if worst:
         raise typer.Exit(worst)
     if changed and (check or show_diff):
         raise typer.Exit(1)
-
-
-def _unified(before: str, after: str, name: str) -> list[str]:
-    old, new = before.splitlines(keepends=True), after.splitlines(keepends=True)
-    return list(difflib.unified_diff(old, new, name, f"{name} (formatted)"))

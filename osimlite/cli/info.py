@@ -27,12 +27,13 @@ def info(
     """
     from rich.table import Table
 
-    from osimlite.cli._console import plain_console
+    from osimlite.cli._console import add_row, plain_console, say, show
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
     from osimlite.schema.coordinates import Coordinate
     from osimlite.schema.joints import Joint
     from osimlite.schema.tree import is_a
+    from osimlite.text import visible
 
     document = read_document(Source.of_file(file))
     model = document.model
@@ -60,23 +61,24 @@ def info(
         ("components in all", str(len(components))),
         ("remarks of the reader", str(len(document.notes))),
     ):
-        facts.add_row(name, value)
+        add_row(facts, name, value)
     console.print(facts)
 
     if any(joint.coordinates for joint in model.components(Joint)):
-        console.print("\n[bold]Coordinates[/bold]: default, range", markup=True)
+        say()
+        say("Coordinates: default, range")
         for line in _coordinates(model):
             # A name is never broken, however narrow the terminal is.
-            console.print(line, soft_wrap=True, highlight=False)
+            say(line)
 
     counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in components)
     shown = counts.most_common(None if every_class else 15)
     # A count stays with its class.
-    listed = ", ".join(f"{count}\0{name}" for name, count in shown)
+    listed = ", ".join(f"{count}\0{visible(name)}" for name, count in shown)
     text = textwrap.fill(f"Classes: {listed}", console.width, subsequent_indent="  ", break_long_words=False)
-    console.print("\n" + text.replace("\0", " "), soft_wrap=True, highlight=False)
+    show("\n" + text.replace("\0", " ") + "\n")
     if len(counts) > len(shown):
-        console.print(f"and {len(counts) - len(shown)} classes more (--all lists them)", highlight=False)
+        say(f"and {len(counts) - len(shown)} classes more (--all lists them)")
 
 
 def _coordinates(model: Model) -> Iterator[str]:

@@ -19,6 +19,7 @@ def rule(
 
     Example: osimlite rule OSIM301
     """
+    from osimlite.cli._console import show
     from osimlite.errors import OsimliteError
     from osimlite.lint.engine import all_rules
     from osimlite.text import did_you_mean
@@ -29,7 +30,7 @@ def rule(
         width = max(len(known.name) for known in rules)
         for known in rules:
             head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
-            typer.echo(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)))
+            show(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)) + "\n")
         return
     found = next((known for known in rules if code.upper() == known.code or code == known.name), None)
     if found is None:
@@ -37,7 +38,7 @@ def rule(
         raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)}; 'osimlite rule' lists all rules")
     from osimlite.lint.pages import page_of
 
-    typer.echo(_wrapped(page_of(found), columns))
+    show(_wrapped(page_of(found), columns) + "\n")
 
 
 def _wrapped(page: str, columns: int) -> str:

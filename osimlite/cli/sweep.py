@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
-from osimlite.cli._console import Facts
+from osimlite.cli._console import Facts, complain
 
 if TYPE_CHECKING:
     from osimlite.sweep.plan import Plan
@@ -86,7 +85,7 @@ def sweep(
         )
     _told(plan, outcome).show()
     if outcome.status["failed"] == outcome.count:
-        print("osimlite: every run failed", file=sys.stderr)
+        complain("every run failed")
         raise typer.Exit(1)
 
 

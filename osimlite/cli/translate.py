@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from osimlite.cli import _options as options
-from osimlite.text import listed
+from osimlite.cli._console import add_row, plain_console, say
+from osimlite.text import listed, visible
 
 if TYPE_CHECKING:
     from osimlite.translate.fidelity import Fidelity
@@ -50,7 +51,6 @@ def translate(
     """
     from typing import cast
 
-    from osimlite.cli._console import plain_console
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError
     from osimlite.translate.export import Limits, to_urdf
@@ -71,15 +71,12 @@ def translate(
     )
     written = urdf.write(output)
 
-    console = plain_console()
     if len(urdf.fidelity):
-        console.print(_table(urdf.fidelity))
+        plain_console().print(_table(urdf.fidelity))
     robot = urdf.robot
-    console.print(
+    say(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
-        + listed([str(path) for path in written], most=4),
-        highlight=False,
-        soft_wrap=True,
+        + listed([str(path) for path in written], most=4)
     )
 
 
@@ -87,11 +84,11 @@ def _table(fidelity: Fidelity) -> Any:
     """What is lost, one row for all components of which the same is said."""
     from rich.table import Table
 
-    table = Table(title=f"What URDF cannot say of {fidelity.model}", title_justify="left", show_lines=True)
+    table = Table(title=visible(f"What URDF cannot say of {fidelity.model}"), title_justify="left", show_lines=True)
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("done about it", overflow="fold", ratio=3)
     table.add_column("where", overflow="fold", ratio=3)
     for group in fidelity.groups():
         names = [path.rsplit("/", 1)[1] or "the model" for path in group.components]
-        table.add_row(group.cannot_say, group.done, listed(names, most=3))
+        add_row(table, group.cannot_say, group.done, listed(names, most=3))
     return table

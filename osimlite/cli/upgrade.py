@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from osimlite.cli import _options as options
+from osimlite.cli._console import add_row, plain_console, say
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from osimlite.document.reader import Document
     from osimlite.document.upgrade import Change
 
@@ -36,8 +35,6 @@ def upgrade(
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
-    from rich.console import Console
-
     from osimlite.document.printer import write
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
@@ -48,17 +45,17 @@ def upgrade(
     document = read_document(Source.of_file(file))
     mended = document.fault is not None
     if document.version >= CURRENT_VERSION and output is None and not mended:
-        typer.echo(f"{file}: already version {document.version}, nothing to do")
+        say(f"{file}: already version {document.version}, nothing to do")
         return
     target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}.osim")
     if output is None and target.exists():
         raise OsimliteError(f"'{target}' is there already; name the file to write with -o", file=str(file))
     write(document.model, target, numbers=style)
-    _report(Console(), document)
-    typer.echo(f"{target}: version {document.version} to {CURRENT_VERSION}, {_count(len(document.changes), 'change')}")
+    _report(document)
+    say(f"{target}: version {document.version} to {CURRENT_VERSION}, {_count(len(document.changes), 'change')}")
 
 
-def _report(console: Console, document: Document) -> None:
+def _report(document: Document) -> None:
     """Print what was done, one line for each step, then every loss."""
     from rich.table import Table
 
@@ -72,14 +69,14 @@ def _report(console: Console, document: Document) -> None:
         table.add_column("First line", justify="right")
         for what, changes in sorted(steps.items(), key=lambda item: item[1][0].below):
             line = document.source.of_tag(changes[0].number).line
-            table.add_row(what, str(len(changes)), str(line))
-        console.print(table)
+            add_row(table, what, str(len(changes)), str(line))
+        plain_console().print(table)
     for note in document.notes:
         if note.line is not None:
             meant = (
                 "as nothing" if not note.value else "as it stands" if note.value == note.word else f"as '{note.value}'"
             )
-            console.print(f"line {note.line}: '{note.word}' is no XML and was read {meant}", markup=False)
+            say(f"line {note.line}: '{note.word}' is no XML and was read {meant}")
     lost: dict[str, list[Change]] = {}
     for change in done:
         if change.lost is not None:
@@ -87,7 +84,7 @@ def _report(console: Console, document: Document) -> None:
     for what, changes in lost.items():
         first = document.source.of_tag(changes[0].number).line
         more = f" and {_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
-        console.print(f"lost: {what} (line {first}, {changes[0].where}{more})", markup=False)
+        say(f"lost: {what} (line {first}, {changes[0].where}{more})")
 
 
 def _count(number: int, word: str) -> str:

@@ -11,8 +11,6 @@ import typer
 from osimlite.cli import _options as options
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from osimlite.view.shown import Shown
 
 SIZE = (1200, 900)
@@ -61,7 +59,7 @@ def view(
 
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
-    from osimlite.cli._console import plain_console
+    from osimlite.cli._console import say
     from osimlite.document.reader import read
     from osimlite.multibody import build_mechanism
     from osimlite.view.shown import Shown
@@ -71,22 +69,23 @@ def view(
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
     folders = options.mesh_folders(file, geometry)
     shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
-    console = plain_console(highlight=False, soft_wrap=True)
     for remark in shown.remarks:
-        console.print(remark)
+        say(remark)
     if page is not None:
-        console.print(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
+        say(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
     if screenshot is not None:
-        console.print(f"wrote {shown.write_picture(screenshot, SIZE, at)}")
+        say(f"wrote {shown.write_picture(screenshot, SIZE, at)}")
     if page is None and screenshot is None:
-        _serve(console, shown, port, browser=browser)
+        _serve(shown, port, browser=browser)
 
 
-def _serve(console: Console, shown: Shown, port: int, *, browser: bool) -> None:
+def _serve(shown: Shown, port: int, *, browser: bool) -> None:
     import webbrowser
 
+    from osimlite.cli._console import say
+
     with shown.server(port) as server:
-        console.print(f"serving {server.url} until you press Ctrl-C")
+        say(f"serving {server.url} until you press Ctrl-C")
         if browser:
             webbrowser.open(server.url)
         server.wait()

@@ -17,7 +17,7 @@ def write_baseline(path: str | Path, report: Report) -> int:
     """Write the findings of a report as the baseline, and return how many there are."""
     counts = Counter(map(_key, report.findings))
     findings = [[*key, count] for key, count in sorted(counts.items())]
-    text = json.dumps({"format": _FORMAT, "findings": findings}, indent=1, ensure_ascii=False) + "\n"
+    text = json.dumps({"format": _FORMAT, "findings": findings}, indent=1) + "\n"
     write_atomically(path, text)
     return len(report.findings)
 

@@ -73,7 +73,7 @@ class Cache:
         folder.mkdir(parents=True, exist_ok=True)
         ignore = self.folder.parent / ".gitignore"
         if self.folder.parent.name == NAME and not ignore.exists():
-            ignore.write_text("*\n")
+            ignore.write_text("*\n", encoding="utf-8")
 
     def _stamp(self, path: str) -> Stamp:
         # Many models share their meshes.

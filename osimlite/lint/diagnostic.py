@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from osimlite.text import visible
+
 
 class Severity(StrEnum):
     """How bad a finding is.
@@ -96,7 +98,7 @@ class Finding:
 
     def __str__(self) -> str:
         hint = f" (did you mean '{self.suggestion}'?)" if self.suggestion is not None else ""
-        return f"{self.place}: {self.severity} {self.code} {self.message}{hint}"
+        return visible(f"{self.place}: {self.severity} {self.code} {self.message}{hint}")
 
 
 @dataclass(slots=True)

@@ -156,4 +156,4 @@ def _is_plain(value: Any) -> bool:
 
 
 if __name__ == "__main__":
-    print(json.dumps(json_schema(), indent=1))
+    print(json.dumps(json_schema(), indent=1))  # noqa: T201

@@ -149,7 +149,7 @@ class Trajectory:
         texts = {
             "states.sto": self.states_text(),
             "forces.sto": self.forces_text(),
-            "summary.json": json.dumps(self.summary, indent=2, ensure_ascii=False) + "\n",
+            "summary.json": json.dumps(self.summary, indent=2) + "\n",
         }
         make_folder(base)
         for name, text in texts.items():

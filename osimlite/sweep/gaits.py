@@ -155,7 +155,7 @@ def _spare(folder: Path, wanted: dict[str, Any]) -> None:
     """
     summary = folder / SUMMARY
     try:
-        before = dict(json.loads(summary.read_text())["settings"])
+        before = dict(json.loads(summary.read_text(encoding="utf-8"))["settings"])
     except (OSError, ValueError, LookupError, TypeError):
         spare_strangers(folder / name for name in (BEST, CYCLES, SUMMARY))
     else:

@@ -96,4 +96,4 @@ class Fidelity:
             for record in self.records
         ]
         content = {"model": self.model, "target": self.target, "records": records, "translated": self.translated}
-        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        return json.dumps(content, indent=2) + "\n"

@@ -8,6 +8,8 @@ from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Report
 
 FORMATS = ("full", "concise", "json", "github", "sarif", "junit")
+FOR_PEOPLE = ("full", "concise")
+"""The formats that are read on a terminal; the others are for programs, and are UTF-8 wherever they go."""
 
 
 def render(report: Report, name: str = "full", *, colour: bool = False, width: int = 80) -> str:

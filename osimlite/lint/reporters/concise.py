@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.reporters.style import painted, summary
+from osimlite.text import visible
 
 
 def render(report: Report, *, colour: bool = False) -> str:
@@ -13,6 +14,7 @@ def render(report: Report, *, colour: bool = False) -> str:
 
 def _line(finding: Finding, colour: bool) -> str:
     hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
+    words = visible(f"{finding.message}{hint}")
     severity = painted(finding.severity.value, finding.severity, colour)
-    place = painted(finding.place, "strong", colour)
-    return f"{place}: {severity} {finding.code} {finding.message}{hint}"
+    place = painted(visible(finding.place), "strong", colour)
+    return f"{place}: {severity} {finding.code} {words}"

@@ -8,6 +8,7 @@ from itertools import groupby
 
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.reporters.style import painted, summary
+from osimlite.text import visible
 
 _ELLIPSIS = "..."
 
@@ -43,12 +44,12 @@ def _lines(report: Report, file: str | None) -> list[str] | None:
 
 def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) -> str:
     head = f"{painted(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
-    place = painted(finding.place, "strong", colour)
+    place = painted(visible(finding.place), "strong", colour)
     rows = [f"{place}: {head}" if finding.place else head]
-    if len(f"{finding.place}: {finding.severity.value} {finding.code} {finding.name}") > width:
+    if len(f"{visible(finding.place)}: {finding.severity.value} {finding.code} {finding.name}") > width:
         # Broken where it means something, not where the terminal ends.
         rows = [f"{place}:", f"  {head}"]
-    rows += [f"  {row}" for row in textwrap.wrap(finding.message, width - 4, break_on_hyphens=False)]
+    rows += [f"  {row}" for row in textwrap.wrap(visible(finding.message), width - 4, break_on_hyphens=False)]
     if finding.line is not None and lines is not None and finding.line <= len(lines):
         rows += _snippet(finding, lines[finding.line - 1], colour, width)
     notes: list[tuple[str, str]] = []
@@ -60,7 +61,7 @@ def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) 
         notes.append((f"in {finding.component}", "dim"))
     margin = " " * len(str(finding.line or ""))
     for note, style in notes:
-        rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(note, style, colour)}")
+        rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(visible(note), style, colour)}")
     return "\n".join(rows)
 
 
@@ -76,6 +77,8 @@ def _snippet(finding: Finding, line: str, colour: bool, width: int) -> list[str]
     length = max(1, min(finding.length, len(shown) - start))
     margin = len(str(finding.line))
     room = max(20, width - margin - 3)
+    before, marked, after = map(visible, (shown[:start], shown[start : start + length], shown[start + length :]))
+    shown, start, length = before + marked + after, len(before), max(1, len(marked))
     if len(shown) > room:
         shown, start, length = _cut(shown, start, length, room)
     bar = painted("|", "dim", colour)

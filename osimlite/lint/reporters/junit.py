@@ -5,6 +5,7 @@ from __future__ import annotations
 from lxml import etree
 
 from osimlite.lint.diagnostic import Finding, Report, Severity
+from osimlite.text import harmless, visible
 
 
 def render(report: Report) -> str:
@@ -17,24 +18,19 @@ def render(report: Report) -> str:
     suites = etree.Element("testsuites", {"name": "osimlite", **counts})
     suite = etree.SubElement(suites, "testsuite", {"name": "osimlite", **counts})
     for file, findings in by_file.items():
-        case = etree.SubElement(suite, "testcase", name=_clean(file), classname="osimlite")
+        case = etree.SubElement(suite, "testcase", name=visible(file), classname="osimlite")
         bad = [finding for finding in findings if _fails(finding)]
         if bad:
             message = f"{len(bad)} finding{'s' if len(bad) != 1 else ''}"
-            etree.SubElement(case, "failure", message=message).text = _clean("\n".join(map(str, bad)))
+            etree.SubElement(case, "failure", message=message).text = "\n".join(map(str, bad))
         rest = [finding for finding in findings if not _fails(finding)]
         if rest:
-            etree.SubElement(case, "system-out").text = _clean("\n".join(map(str, rest)))
+            etree.SubElement(case, "system-out").text = "\n".join(map(str, rest))
     for number in range(report.checked - len(by_file)):
         etree.SubElement(suite, "testcase", name=f"without findings {number + 1}", classname="osimlite")
-    body: str = etree.tostring(suites, encoding="unicode", pretty_print=True)
+    body = harmless(etree.tostring(suites, encoding="unicode", pretty_print=True))
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + body
 
 
 def _fails(finding: Finding) -> bool:
     return finding.severity is not Severity.INFO
-
-
-def _clean(text: str) -> str:
-    """The text without characters that XML cannot hold."""
-    return "".join(character for character in text if character in "\t\n" or character >= " ")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from json import dumps
+import os
 from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
@@ -10,6 +10,7 @@ from urllib.parse import quote
 from osimlite import __version__
 from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.engine import Rule, all_rules
+from osimlite.text import json_lines
 
 _SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
@@ -25,7 +26,7 @@ def render(report: Report) -> str:
         "columnKind": "unicodeCodePoints",
         "results": [_result(finding, places[finding.code]) for finding in report.findings],
     }
-    return dumps({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False) + "\n"
+    return json_lines({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
@@ -49,7 +50,7 @@ def _result(finding: Finding, index: int) -> dict[str, Any]:
     location: dict[str, Any] = {}
     if finding.file is not None:
         path = PurePath(finding.file)
-        uri = path.as_uri() if path.is_absolute() else quote(path.as_posix())
+        uri = path.as_uri() if path.is_absolute() else quote(os.fsencode(path.as_posix()))
         location["physicalLocation"] = {"artifactLocation": {"uri": uri}}
         if finding.line is not None and finding.column is not None:
             location["physicalLocation"]["region"] = {

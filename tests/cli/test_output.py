@@ -1,0 +1,134 @@
+"""Names of models and files that terminals and logs of CI jobs would obey; output that is not UTF-8."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import sys
+from pathlib import Path
+from typing import cast
+from xml.etree import ElementTree
+
+import pytest
+
+from osimlite.cli import main
+from osimlite.cli._console import Guarded, guarded_output
+
+HOSTILE = "::error::##[add-mask]v1\x7f\x85\x9b31m\u202e\u2066\u2028\u00e9\u4e16"
+"""What may stand in an XML attribute and still be obeyed by something."""
+
+FILE = "::error::\x1b[2J\x07\n::error::caf\udce9\u202e.osim"
+OBEYED = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+@pytest.fixture(scope="module")
+def folder(fixtures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a walker whose names, and whose file's name, are as bad as they can be."""
+    place = tmp_path_factory.mktemp("hostile")
+    text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text(encoding="utf-8")
+    written = "".join(f"&#{ord(character)};" for character in HOSTILE)
+    for name in ("RHip_rz", "Pelvis", "RFootContact", "DynamicWalkerModel", "RightThighToPelvis"):
+        text = re.sub(rf"\b{name}\b", name + written, text)
+    (place / FILE).write_text(text, encoding="utf-8")
+    (place / "other.osim").write_text(text.replace("Pelvis&", "Qelvis&"), encoding="utf-8")
+    (place / "wrong.osim").write_text(text.replace("<gravity>", "<gravty>&#27; :::error::\u202e", 1), encoding="utf-8")
+    return place
+
+
+def call(folder: Path, *words: str, encoding: str = "utf-8") -> tuple[int, bytes, bytes]:
+    streams = [io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv("COLUMNS", "60")
+        patch.setattr(sys, "stdout", streams[0])
+        patch.setattr(sys, "stderr", streams[1])
+        with pytest.raises(SystemExit) as ended:
+            main(list(words))
+    out, err = (cast(io.BytesIO, stream.buffer).getvalue() for stream in streams)
+    return int(ended.value.code or 0), out, err
+
+
+def check(text: str) -> None:
+    assert not OBEYED.search(text), OBEYED.findall(text)
+    assert not any(line.lstrip().startswith("::") for line in text.split("\n")), text
+    assert not re.search(r"##\w*\[", text)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["validate", "--no-cache", "./" + FILE],
+        ["validate", "--no-cache", "--format", "concise", FILE],
+        ["validate", "wrong.osim", "--unsafe-fixes", "--diff"],
+        ["validate", "no\n::error::\x1b[2J\udce9.osim"],
+        ["validate", "--\x1b[31m\n::error::"],
+        ["validate", FILE, "--select", "\n::error::\x1b"],
+        ["\n::error::\x1b[2J"],
+        ["info", FILE],
+        ["diff", FILE, "other.osim"],
+        ["diff", "--git", "\n::error::\x1b", FILE, "0" * 40, "100644", "other.osim", "1" * 40, "100644"],
+        ["format", "--diff", FILE],
+        ["upgrade", FILE, "-o", "new\n::error::\x1b\udce9.osim"],
+        ["translate", FILE, "-o", "out\n::error::\x1b\udce9"],
+        ["simulate", FILE, "--to", "0.01", "-o", "moved\n::error::\x1b\udce9"],
+        ["simulate", FILE, "--to", "0.01", "--set", "RHip\n::error::\x1b=1"],
+        ["kinematics", FILE, "moved\n::error::\x1b\udce9/states.sto", "-o", "followed\n::error::"],
+        ["doctor", "no\n::error::\x1b"],
+    ],
+    ids=lambda words: " ".join(word for word in words if word.isalnum())[:30],
+)  # fmt: skip
+def test_nothing_that_people_read_is_obeyed(folder: Path, words: list[str]) -> None:
+    if words[0] in ("simulate", "kinematics"):
+        pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    _, out, err = call(folder, *words)
+    check(out.decode())
+    check(err.decode())
+    assert out or err
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "ascii", "utf-16"])
+def test_formats_for_programs_are_whole_wherever_they_go(folder: Path, encoding: str) -> None:
+    texts = {}
+    for form in ("json", "sarif", "junit", "github"):
+        code, out, err = call(folder, "validate", "--no-cache", FILE, "--format", form, encoding=encoding)
+        assert (code, err) == (1, b"")
+        texts[form] = out.decode("utf-8")
+    findings = json.loads(texts["json"])
+    assert {finding["file"] for finding in findings} == {FILE}
+    assert any(HOSTILE in finding["message"] for finding in findings)
+    results = json.loads(texts["sarif"])["runs"][0]["results"]
+    uris = {result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for result in results}
+    assert uris == {"%3A%3Aerror%3A%3A%1B%5B2J%07%0A%3A%3Aerror%3A%3Acaf%E9%E2%80%AE.osim"}
+    assert ElementTree.fromstring(texts["junit"]).get("failures") == "1"
+    check(texts["junit"])
+    assert len(texts["github"].splitlines()) == len(findings)
+    for line in texts["github"].splitlines():
+        assert re.match(r"::(error|warning|notice) title=", line) and "é世" in texts["github"]
+        assert not OBEYED.search(line)
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-16"])
+def test_output_of_any_encoding(folder: Path, encoding: str) -> None:
+    for words, code in ((["info", FILE], 0), (["validate", "--no-cache", FILE], 1), (["info", "世.osim"], 2)):
+        done, out, err = call(folder, *words, encoding=encoding)
+        assert done == code, err.decode(encoding)
+        check(out.decode(encoding) + err.decode(encoding))
+        assert "世" in out.decode(encoding) + err.decode(encoding) or r"\u4e16" in (out + err).decode(encoding)
+    # A model is no text of the terminal: it says itself that it is UTF-8.
+    code, out, _ = call(folder, "build", "dynamic-walker", "-o", "-", encoding=encoding)
+    assert code == 0 and out.decode("utf-8").startswith("<?xml") and out.endswith(b"</OpenSimDocument>\n")
+
+
+def test_what_others_print_is_guarded_too(capsys: pytest.CaptureFixture[str]) -> None:
+    with guarded_output():
+        assert isinstance(sys.stdout, Guarded)
+        print("::error::x")
+        print("Body", end="")
+        print("::error::\x1b[2J\x1b[1mbold\x1b[0m")
+        print("\x07", file=sys.stderr)
+    print("::as it was")
+    assert tuple(capsys.readouterr()) == (
+        "\\x3a:error::x\nBody::error::\\x1b[2J\x1b[1mbold\x1b[0m\n::as it was\n",
+        "\\x07\n",
+    )
