@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -13,15 +14,20 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import Mechanism
 
+_log = logging.getLogger(__name__)
+
 HOST = "127.0.0.1"
 _LONGEST = 1_000_000
+PATIENCE = 30.0
+"""A browser that says nothing for so long, in the middle of a question or between two, is hung up on (s)."""
 
 
 class PageServer:
     """Serves one page at ``http://127.0.0.1:<port>/`` until it is closed; use it in a ``with`` statement.
 
     Besides the page it answers ``POST /assemble`` with ``{"values": [...]}``, coordinate values in the mechanism's
-    order, by the nearest values that fulfil the constraints, or by ``{"error": sentence}``.
+    order, by the nearest values that fulfil the constraints, or by ``{"error": sentence}``; what is no such question,
+    with the status 400.
 
     Args:
         page: text of the page (HTML).
@@ -34,7 +40,7 @@ class PageServer:
 
     def __init__(self, page: str, mechanism: Mechanism, port: int = 0) -> None:
         try:
-            self._server = ThreadingHTTPServer((HOST, port), _handler(page.encode(), mechanism))
+            self._server = _QuietServer((HOST, port), _handler(page.encode(), mechanism, PATIENCE))
         except (OSError, OverflowError) as error:
             raise OsimliteError(f"cannot listen at port {port}: {error}; choose another one by --port") from None
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
@@ -63,9 +69,24 @@ class PageServer:
         self.close()
 
 
-def _handler(page: bytes, mechanism: Mechanism) -> type[BaseHTTPRequestHandler]:
+class _QuietServer(ThreadingHTTPServer):
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that hangs up in the middle is nobody's mistake."""
+        _log.debug("a question was not answered", exc_info=True)
+
+
+class _BadQuestion(Exception):
+    """A question that cannot be answered, and with what status."""
+
+    def __init__(self, status: HTTPStatus, why: str) -> None:
+        super().__init__(why)
+        self.status = status
+
+
+def _handler(page: bytes, mechanism: Mechanism, patience: float) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+        timeout = patience
 
         def do_GET(self) -> None:
             if not self._is_for_us():
@@ -76,13 +97,23 @@ def _handler(page: bytes, mechanism: Mechanism) -> type[BaseHTTPRequestHandler]:
                 self._answer(HTTPStatus.NOT_FOUND, b"", "text/plain")
 
         def do_POST(self) -> None:
-            length = int(self.headers.get("Content-Length") or 0)
-            if not self._is_for_us() or self.path != "/assemble" or not 0 < length < _LONGEST:
+            try:
+                status, found = HTTPStatus.OK, assembled(mechanism, self._question())
+            except _BadQuestion as problem:
+                status, found = problem.status, {"error": str(problem)}
+                # What is left of such a question is not the next one.
                 self.close_connection = True
-                self._answer(HTTPStatus.FORBIDDEN, b"", "text/plain")
-                return
-            found = assembled(mechanism, self.rfile.read(length))
-            self._answer(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
+            self._answer(status, json.dumps(found).encode(), "application/json")
+
+        def _question(self) -> bytes:
+            if not self._is_for_us() or self.path != "/assemble":
+                raise _BadQuestion(HTTPStatus.FORBIDDEN, "this server answers its own page only")
+            length = self.headers.get("Content-Length", "")
+            if not (length.isascii() and length.isdigit() and len(length) < 20):
+                raise _BadQuestion(HTTPStatus.BAD_REQUEST, "the question does not say how long it is")
+            if int(length) > _LONGEST:
+                raise _BadQuestion(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the question is too long")
+            return self.rfile.read(int(length))
 
         def _is_for_us(self) -> bool:
             # Pages of other origins may reach this port by a name of their own; they are not to read the model.
@@ -103,13 +134,26 @@ def _handler(page: bytes, mechanism: Mechanism) -> type[BaseHTTPRequestHandler]:
 
 
 def assembled(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
-    """The answer to the page's question for a pose that fulfils the constraints."""
+    """The answer to the page's question for a pose that fulfils the constraints.
+
+    Raises:
+        _BadQuestion: it is no question for one.
+    """
     try:
-        values = np.array(json.loads(question)["values"], dtype=float)
-        if not np.isfinite(values).all():
-            return {"error": "a coordinate value is no number"}
-        return {"values": mechanism.assemble(values).tolist()}
-    except OsimliteError as error:
-        return {"error": error.message}
-    except (ValueError, KeyError, TypeError):
-        return {"error": "the question is no list of values"}
+        match json.loads(question):
+            case {"values": [*values]} if all(isinstance(value, int | float) for value in values):
+                q = np.array(values, dtype=float)
+            case _:
+                raise ValueError
+    except (ValueError, OverflowError, RecursionError):
+        raise _BadQuestion(HTTPStatus.BAD_REQUEST, "the question is no list of values") from None
+    if len(q) != len(mechanism.coordinates):
+        raise _BadQuestion(HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates")
+    if not np.isfinite(q).all():
+        return {"error": "a coordinate value is no number"}
+    try:
+        with np.errstate(all="ignore"):
+            found = mechanism.assemble(q)
+    except (OsimliteError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return {"error": error.message if isinstance(error, OsimliteError) else "no pose was found"}
+    return {"values": found.tolist()} if np.isfinite(found).all() else {"error": "no pose was found"}
