@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Protocol
+import typing
+from typing import Any
 
 from lsprotocol import types
-from pygls.exceptions import FeatureRequestError, JsonRpcInvalidParams
+from pygls.exceptions import FeatureRequestError, JsonRpcException, JsonRpcInvalidParams, JsonRpcParseError
 from pygls.lsp.server import LanguageServer
 from pygls.uris import to_fs_path
 
@@ -19,6 +20,7 @@ from osimlite.lsp.completion import completions
 from osimlite.lsp.findings import actions, diagnostics
 from osimlite.lsp.hover import hover
 from osimlite.lsp.navigation import folds, outline, renaming
+from osimlite.lsp.protocol import NO_JSON, Protocol, keep_log_plain, strict_converter
 from osimlite.lsp.text import Text
 from osimlite.schema.base import Component
 from osimlite.schema.model import CURRENT_VERSION
@@ -27,7 +29,7 @@ PAUSE = 0.02
 """A check begins when nothing has been typed for so long, s."""
 
 
-class Asked(Protocol):
+class Asked(typing.Protocol):
     """A question about a place in a file."""
 
     text_document: types.TextDocumentIdentifier
@@ -43,10 +45,24 @@ class Server(LanguageServer):
     """
 
     def __init__(self) -> None:
-        super().__init__("osimlite", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
+        super().__init__(
+            "osimlite",
+            __version__,
+            text_document_sync_kind=types.TextDocumentSyncKind.Incremental,
+            protocol_cls=Protocol,
+            converter_factory=strict_converter,
+        )
         self.open: dict[str, Analysis] = {}
         self.known: dict[str, Analysis] = {}
         self._checks: dict[str, asyncio.Task[None]] = {}
+
+    def report_server_error(self, error: Exception, source: Any) -> None:
+        """Tell the editor what nobody asked for; what is no JSON may be a question, and gets an answer."""
+        if isinstance(error, NO_JSON) and source is JsonRpcException:
+            assert isinstance(self.protocol, Protocol)
+            self.protocol.refuse(JsonRpcParseError(f"this is no JSON: {error}"))
+        else:
+            super().report_server_error(error, source)
 
     def show(self, uri: str, text: Text, version: int | None) -> None:
         """Take a new version of a file, and check it as soon as nobody types."""
@@ -101,6 +117,7 @@ class Server(LanguageServer):
 
 def make_server() -> Server:
     """The server with everything that it answers."""
+    keep_log_plain()
     server = Server()
     _add_files(server)
     _add_reading(server)
