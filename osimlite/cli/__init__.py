@@ -87,6 +87,8 @@ def _plainly(words: list[str]) -> dict[str, Any] | None:
             paths.append(word)
         elif word == "--no-cache":
             asked["cached"] = False
+        elif word == "--all":
+            asked["everything"] = True
         elif word in ("--format", "--fail-on"):
             value = next(rest, None)
             if value is None:

@@ -37,6 +37,7 @@ def run(
     geometry: Sequence[Path] = (),
     statistics: bool = False,
     cached: bool = True,
+    everything: bool = False,
 ) -> int:
     """Check files and folders, write the report to standard output, and return the exit code."""
     if fail_on is not None and fail_on not in tuple(Severity):
@@ -72,7 +73,8 @@ def run(
     if statistics:
         show(_statistics(report))
     else:
-        text = render(report, format, colour=wants_colour(), width=min(max(_width(), 40), 120))
+        width = min(max(_width(), 40), 120)
+        text = render(report, format, colour=wants_colour(), width=width, everything=everything)
         (show if format in FOR_PEOPLE else hand_over)(text)
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
     return int(bool(report.at_least(worst)))

@@ -47,6 +47,9 @@ def validate(
         str | None, typer.Option(help="Write all findings to this file and stop.", metavar="FILE", show_default=False)
     ] = None,
     geometry: options.Geometry = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Print every finding; else the first stands for those that are like it.")
+    ] = False,
     statistics: Annotated[bool, typer.Option("--statistics", help="Count findings by rule instead.")] = False,
     no_cache: Annotated[
         bool, typer.Option("--no-cache", help="Check every file, also those that have not changed since.")
@@ -75,5 +78,6 @@ def validate(
             geometry=options.named_folders(geometry),
             statistics=statistics,
             cached=not no_cache,
+            everything=everything,
         )
     )

@@ -7,7 +7,6 @@ import json
 import re
 import sys
 from pathlib import Path
-from typing import cast
 from xml.etree import ElementTree
 
 import pytest
@@ -45,7 +44,7 @@ def call(folder: Path, *words: str, encoding: str = "utf-8") -> tuple[int, bytes
         patch.setattr(sys, "stderr", streams[1])
         with pytest.raises(SystemExit) as ended:
             main(list(words))
-    out, err = (cast(io.BytesIO, stream.buffer).getvalue() for stream in streams)
+    out, err = (stream.buffer.getvalue() for stream in streams)
     return int(ended.value.code or 0), out, err
 
 

@@ -168,7 +168,8 @@ def test_long_lines_are_cut_around_the_caret(width):
     )
     report = validate(Source(text.encode(), "m.osim"), select="OSIM301")
     assert len(report) == 61
-    rows = render(report, "full", width=width).splitlines()
+    assert max(map(len, render(report, width=width).splitlines())) <= width
+    rows = render(report, "full", width=width, everything=True).splitlines()
     for row, below in pairwise(rows):
         assert len(row) <= width or ".osim:" in row
         if "^" in below and "|" in below and "marker" in row:
@@ -185,3 +186,51 @@ def test_a_model_made_in_python_shows_its_components():
     (finding,) = report.errors
     assert (finding.file, finding.line, finding.component) == (None, None, "/markerset/asis")
     assert render(report).startswith("/markerset/asis: error OSIM301 unresolved-reference\n")
+
+
+def _finding(number: int, message: str, severity: Severity = Severity.ERROR, file: str = "m.osim") -> Finding:
+    return Finding("OSIM301", "a-rule", severity, message, file, number, 1)
+
+
+def test_what_is_alike_is_folded_for_people():
+    like = [_finding(n, f"Marker 'm{n}': parent is '/b{n}' at {n}.5e-3 m, which is not there") for n in range(1, 93)]
+    other = _finding(40, "Marker 'm' names nothing")
+    report = Report(sorted([*like, other], key=lambda finding: finding.line or 0))
+    full = render(report)
+    assert full.count("OSIM301") == 2 and "'m1'" in full and "'m2'" not in full and "names nothing" in full
+    assert "= 91 more like this, on lines 2, 3, 4, 5 and 87 more\n" in full and "--all" in full
+    assert max(map(len, full.splitlines())) <= 80
+    concise = render(report, "concise").splitlines()
+    assert len(concise) == 3 and concise[0].endswith("; 91 more like this") and "93 errors" in concise[2]
+    for name in ("full", "concise"):
+        assert render(report, name, everything=True).count("OSIM301") == 93
+    assert len(json.loads(render(report, "json"))) == 93
+    assert len(json.loads(render(report, "sarif"))["runs"][0]["results"]) == 93
+    assert render(report, "github").count("\n") == 93 and render(report, "junit").count("OSIM301") == 93
+
+
+def test_what_differs_or_is_quickly_read_is_not_folded():
+    few = [_finding(n, f"no body 'b{n}'") for n in range(1, 4)]
+    severe = [_finding(n, f"no body 'b{n}'", Severity.WARNING) for n in range(4, 7)]
+    elsewhere = [_finding(n, f"no body 'b{n}'", file="n.osim") for n in range(1, 4)]
+    report = Report([*few, *severe, *elsewhere])
+    assert render(report).count("OSIM301") == 9 and "more like this" not in render(report)
+
+
+def test_missing_meshes_are_one_finding_of_a_model(tmp_path, monkeypatch):
+    from osimlite import Body, Mesh, PinJoint, write
+
+    monkeypatch.setenv("OSIMLITE_GEOMETRY", str(tmp_path / "bones"))
+    model = Model(name="m")
+    for n in range(2):
+        body = model.add(Body(name=f"b{n}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
+        body.attached_geometry.append(Mesh(name=f"mesh{n}", mesh_file=f"bone{n}.vtp"))
+        model.add(PinJoint(name=f"j{n}").between(model.ground, body))
+    write(model, tmp_path / "m.osim")
+    report = validate(tmp_path / "m.osim", select="OSIM701")
+    assert len(report) == 2
+    text = " ".join(render(report).split())
+    assert text.count("OSIM701") == 1 and "1 more like this" in text
+    for place in (tmp_path, tmp_path / "Geometry", tmp_path / "bones"):
+        assert str(place) in report.findings[0].message
+    assert "--geometry or in OSIMLITE_GEOMETRY" in text

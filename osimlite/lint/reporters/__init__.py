@@ -12,7 +12,9 @@ FOR_PEOPLE = ("full", "concise")
 """The formats that are read on a terminal; the others are for programs, and are UTF-8 wherever they go."""
 
 
-def render(report: Report, name: str = "full", *, colour: bool = False, width: int = 80) -> str:
+def render(
+    report: Report, name: str = "full", *, colour: bool = False, width: int = 80, everything: bool = False
+) -> str:
     """The report in a format.
 
     Args:
@@ -20,6 +22,8 @@ def render(report: Report, name: str = "full", *, colour: bool = False, width: i
         name: one of `FORMATS`.
         colour: whether to write the colours of a terminal, in the formats that people read.
         width: columns to keep to, in the full format.
+        everything: whether findings that are alike are all written, where people read them; else the first stands
+            for all. The formats for programs are always whole.
 
     Raises:
         OsimliteError: there is no such format.
@@ -30,7 +34,7 @@ def render(report: Report, name: str = "full", *, colour: bool = False, width: i
         raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{name}'")
     module = import_module(f"osimlite.lint.reporters.{name}")
     if name == "full":
-        return str(module.render(report, colour=colour, width=width))
+        return str(module.render(report, colour=colour, width=width, everything=everything))
     if name == "concise":
-        return str(module.render(report, colour=colour))
+        return str(module.render(report, colour=colour, everything=everything))
     return str(module.render(report))

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from osimlite.lint.diagnostic import Finding, Report
+from osimlite.lint.diagnostic import Report
+from osimlite.lint.reporters.fold import Fold, folded, told
 from osimlite.lint.reporters.style import painted, summary
 from osimlite.text import visible
 
 
-def render(report: Report, *, colour: bool = False) -> str:
+def render(report: Report, *, colour: bool = False, everything: bool = False) -> str:
     """``file:line:column: severity code message`` for each finding, and a closing line."""
-    return "\n".join([*(_line(finding, colour) for finding in report.findings), summary(report, colour)]) + "\n"
+    folds = folded(report.findings, everything=everything)
+    closing = f"{summary(report, colour)} {told(folds)}".rstrip()
+    return "\n".join([*(_line(fold, colour) for fold in folds), closing]) + "\n"
 
 
-def _line(finding: Finding, colour: bool) -> str:
+def _line(fold: Fold, colour: bool) -> str:
+    finding = fold.first
+    more = f"; {len(fold.more)} more like this" if fold.more else ""
     hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
-    words = visible(f"{finding.message}{hint}")
+    words = visible(f"{finding.message}{hint}{more}")
     severity = painted(finding.severity.value, finding.severity, colour)
     place = painted(visible(finding.place), "strong", colour)
     return f"{place}: {severity} {finding.code} {words}"

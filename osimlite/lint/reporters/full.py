@@ -7,21 +7,25 @@ import textwrap
 from itertools import groupby
 
 from osimlite.lint.diagnostic import Finding, Report
+from osimlite.lint.reporters.fold import Fold, folded, told
 from osimlite.lint.reporters.style import painted, summary
 from osimlite.text import visible
 
 _ELLIPSIS = "..."
 
 
-def render(report: Report, *, colour: bool = False, width: int = 80) -> str:
+def render(report: Report, *, colour: bool = False, width: int = 80, everything: bool = False) -> str:
     """The report as text of at most `width` columns (but for places, which are never broken)."""
     blocks: list[str] = []
-    for file, findings in groupby(report.findings, key=lambda finding: finding.file):
+    every = folded(report.findings, everything=everything)
+    for file, folds in groupby(every, key=lambda fold: fold.first.file):
         lines = _lines(report, file)
-        blocks += [_block(finding, lines, colour, width) for finding in findings]
-    mended = _fixes(report)
-    gap = "\n" if mended and len(summary(report)) + 1 + len(mended) > width else " " if mended else ""
-    return "\n\n".join([*blocks, summary(report, colour) + gap + mended]) + "\n"
+        blocks += [_block(fold, lines, colour, width) for fold in folds]
+    closing, length = summary(report, colour), len(summary(report))
+    for more in filter(None, (_fixes(report), told(every))):
+        fits = length + 1 + len(more) <= width
+        closing, length = f"{closing}{' ' if fits else chr(10)}{more}", (length + 1 if fits else 0) + len(more)
+    return "\n\n".join([*blocks, closing]) + "\n"
 
 
 def _fixes(report: Report) -> str:
@@ -42,7 +46,8 @@ def _lines(report: Report, file: str | None) -> list[str] | None:
         return None
 
 
-def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) -> str:
+def _block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str:
+    finding = fold.first
     head = f"{painted(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
     place = painted(visible(finding.place), "strong", colour)
     rows = [f"{place}: {head}" if finding.place else head]
@@ -60,6 +65,8 @@ def _block(finding: Finding, lines: list[str] | None, colour: bool, width: int) 
     if finding.component not in ("", "/") and finding.line is not None:
         notes.append((f"in {finding.component}", "dim"))
     margin = " " * len(str(finding.line or ""))
+    if fold.more:
+        notes.append((textwrap.shorten(fold.remark, width - len(margin) - 3, placeholder=" ..."), "strong"))
     for note, style in notes:
         rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(visible(note), style, colour)}")
     return "\n".join(rows)

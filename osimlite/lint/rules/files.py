@@ -6,6 +6,7 @@ import os
 from functools import lru_cache
 
 from osimlite.document.source import Source
+from osimlite.files import GEOMETRY_VARIABLE
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -47,6 +48,7 @@ def missing_mesh(subject: Subject, found: Found) -> None:
     beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
     places = [str(path) for path in beside]
     tried = listed(dict.fromkeys(places))
+    remedy = f"name its folder with --geometry or in {GEOMETRY_VARIABLE}"
     folders = _Folders()
     for item, tag, name in items:
         if not name:
@@ -55,7 +57,7 @@ def missing_mesh(subject: Subject, found: Found) -> None:
         if any(folders.has(place, name) for place in places):
             continue
         twin = folders.in_other_case(places, name)
-        message = f"the file '{name}' of {called(item)} is not there; looked in {tried}"
+        message = f"the file '{name}' of {called(item)} is not there; looked in {tried}; {remedy}"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
         severity = ERROR if isinstance(item, ContactMesh) and twin is None else None
