@@ -31,6 +31,12 @@ def simulate(
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
+    states: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Start from the last row of a file of states; --set says more.", show_default=False
+        ),
+    ] = None,
     report_interval: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
@@ -80,7 +86,8 @@ def simulate(
         folder=file.parent,
         show=gui,
     ) as simulation:
-        initial = options.quantities(start, simulation.mechanism, "--set")
+        initial = {} if states is None else simulation.state_in(states)
+        initial |= options.quantities(start, simulation.mechanism, "--set")
         speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
         with progress_bar("simulating", to) as progress:
             trajectory = simulation.run(

@@ -64,7 +64,7 @@ def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) ->
     source = np.arange(engine.state.size)
     for one, two in zip(*freedoms, strict=True):
         source[[one, two, n + one, n + two]] = two, one, n + two, n + one
-    _exchange_auxiliary(engine, source, np.asarray(states, dtype=float))
+    exchange_auxiliary(engine, source, np.asarray(states, dtype=float))
     for state in np.asarray(states, dtype=float):
         here, there = (np.array(engine.derivative(0.0, y.tolist())) for y in (state, state[source]))
         if not np.allclose(here[source], there, rtol=SAME, atol=SAME * np.abs(here).max()):
@@ -72,8 +72,14 @@ def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) ->
     return source
 
 
-def _exchange_auxiliary(engine: CompiledEngine, source: Ints, states: Floats) -> None:
-    """Complete the places, which are known for values and speeds."""
+def exchange_auxiliary(engine: CompiledEngine, source: Ints, states: Floats) -> None:
+    """Complete the places (y,) that the legs exchange, which are known for values and speeds.
+
+    Args:
+        engine: of the model.
+        source: changed where an auxiliary state does what another does when the legs have changed parts.
+        states: at which to try (k, y).
+    """
     first = 2 * len(engine.order)
     if first == engine.state.size:
         return

@@ -21,7 +21,7 @@ from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.recorder import Recorder
-from osimlite.simulation.start import doubt_of, in_units_of
+from osimlite.simulation.start import doubt_of, in_units_of, starting, state_in
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Stepper
 from osimlite.simulation.summary import course, outcome, versions
@@ -39,7 +39,7 @@ def simulate(
     accuracy: float = DEFAULT_ACCURACY,
     fixed_step: float | None = None,
     report_interval: float = 0.01,
-    initial: Mapping[str, float | str] | None = None,
+    initial: Mapping[str, float | str] | str | Path | None = None,
     initial_speeds: Mapping[str, float | str] | None = None,
     route: str = "auto",
     skip_unsupported: bool = False,
@@ -64,7 +64,9 @@ def simulate(
         fixed_step: take PyBullet's own steps of this length (s) instead of controlling the error.
         report_interval: time between the recorded moments, s; the last one is `to` in any case.
         initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
-            default.
+            default. The path of a state (``/jointset/knee/flexion/speed``, ``/forceset/stop/dissipatedEnergy``) stands
+            for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of
+            states stands for its last row.
         initial_speeds: generalized speeds that do not start at their default, likewise.
         route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
             osimlite's own "recursion", or "auto" for the quickest that is possible.
@@ -122,6 +124,7 @@ class Simulation:
 
     Attributes:
         constraints: names of what the coordinates of the state must fulfil.
+        paths: of all states, in the order of OpenSim.
     """
 
     def __init__(
@@ -157,7 +160,7 @@ class Simulation:
         self.state = self.engine.state
         self.constraints = Constrained(self.mechanism, self.engine.order).names
         paths = [f"{info.path}/{what}" for info in self.mechanism.coordinates for what in ("value", "speed")]
-        self._paths = in_model_order(model, paths + self.state.paths)
+        self.paths = in_model_order(model, paths + self.state.paths)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._settings = {
             "skip_unsupported": skip_unsupported,
@@ -175,7 +178,7 @@ class Simulation:
         accuracy: float = DEFAULT_ACCURACY,
         fixed_step: float | None = None,
         report_interval: float = 0.01,
-        initial: Mapping[str, float | str] | None = None,
+        initial: Mapping[str, float | str] | str | Path | None = None,
         initial_speeds: Mapping[str, float | str] | None = None,
         progress: Progress | None = None,
     ) -> Trajectory:
@@ -186,10 +189,16 @@ class Simulation:
             _check_step(fixed_step)
         if self._show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
+        if isinstance(initial, str | Path):
+            initial = self.state_in(initial)
         for name, value in (initial or {}).items():
-            tell(doubt_of(self.mechanism.coordinates[self.mechanism.coordinate_index(name)], name, value))
+            if name not in self.paths:
+                tell(doubt_of(self.mechanism.coordinates[self.mechanism.coordinate_index(name)], name, value))
         initial, initial_speeds = (
-            {name: in_units_of(self.mechanism, name, value) for name, value in (given or {}).items()}
+            {
+                name: float(value) if name in self.paths else in_units_of(self.mechanism, name, value)
+                for name, value in (given or {}).items()
+            }
             for given in (initial, initial_speeds)
         )
         y = self.initial_state(initial, initial_speeds)
@@ -223,46 +232,36 @@ class Simulation:
 
     # --------------------------------------------------------------------------------------------- helpers
     def initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
-        """State in the engine's order (y,) at the default values and speeds, but for those given (rad, m).
+        """State in the engine's order (y,): default values and speeds, and what follows from them, but for those given.
+
+        Args:
+            initial: values (rad, m) of coordinates by name or path, and any states by their paths in ``states.sto``.
+            speeds: generalized speeds of coordinates by name or path.
 
         Raises:
             ModelError: there is no such coordinate.
             SimulationError: a coordinate is locked or prescribed, a number is not finite, or no pose or speeds fulfil
                 the constraints.
         """
-        infos = self.mechanism.coordinates
-        q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
-        places: list[list[int]] = []
-        for given, row, what in ((initial, q, "value"), (speeds, u, "speed")):
-            places.append([])
-            for name, value in given.items():
-                place = self.mechanism.coordinate_index(name)
-                if infos[place].locked:
-                    raise SimulationError(
-                        f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
-                        "be set; unlock it in the model"
-                    )
-                if infos[place].prescribed is not None:
-                    raise SimulationError(
-                        f"coordinate '{name}' is prescribed, so that its {what} cannot be set; "
-                        "set its prescribed to false in the model"
-                    )
-                if not isfinite(value):
-                    raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
-                row[place] = float(value)
-                places[-1].append(place)
-        for what, row in (("value", q), ("speed", u)):
-            for info, number in zip(infos, row, strict=True):
-                if not isfinite(number):
-                    raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
+        own = {path: initial[path] for path in self.state.paths if path in initial}
+        q, u, places = starting(self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds)
         if self.constraints:
             # To find the nearest pose can take as long as the motion: the same start is not looked for again.
             start = (q, u, places)
             if self._start is None or self._start[0] != start:
                 values, rates = kept_state(self.mechanism, q, u, *places)
                 self._start = start, (values.tolist(), rates.tolist())
-            return self.state.pack(*self._start[1])
-        return self.state.pack(q, u)
+            q, u = self._start[1]
+        y = self.state.pack(q, u)
+        for number, path in enumerate(self.state.paths, 2 * len(self.state.order)):
+            y[number] = float(own.get(path, y[number]))
+            if not isfinite(y[number]):
+                raise SettingError(f"the state '{path}' starts at {y[number]}; give a number")
+        return y
+
+    def state_in(self, path: str | Path, time: float | None = None) -> dict[str, float]:
+        """A state of a file such as ``states.sto``, as `run` takes it for `initial`; see :func:`state_in`."""
+        return state_in(path, self.mechanism, self.paths, time)
 
     def _trajectory(
         self,
@@ -294,7 +293,7 @@ class Simulation:
         )
         values, speeds = self.state.histories(states)
         return Trajectory(
-            self.mechanism, times, values, speeds, report, self.state.auxiliary_histories(states), self._paths
+            self.mechanism, times, values, speeds, report, self.state.auxiliary_histories(states), self.paths
         )
 
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from osimlite.errors import SettingError
+import numpy as np
+
+from osimlite.errors import ModelError, SettingError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, doubt, quantity
+from osimlite.simulation.storage import read_sto
 
 if TYPE_CHECKING:
     from osimlite.multibody.parts import CoordinateInfo
@@ -45,3 +51,88 @@ def doubt_of(info: CoordinateInfo, name: str, given: float | str) -> str:
     if info.motion_type != "rotational":
         return ""
     return doubt(name, quantity(given) if isinstance(given, str) else Quantity(float(given), None), info.range)
+
+
+def starting(
+    mechanism: Mechanism, initial: Mapping[str, float], speeds: Mapping[str, float]
+) -> tuple[list[float], list[float], list[list[int]]]:
+    """Where the coordinates start.
+
+    Args:
+        mechanism: whose coordinates.
+        initial: values (rad, m) by name or path; a path with ``/value`` or ``/speed`` behind it says where the
+            coordinate starts as far as constraints let it.
+        speeds: generalized speeds by name or path.
+
+    Returns:
+        Values and speeds of all coordinates, the places of those whose values stay as they are, and of those whose
+        speeds do.
+
+    Raises:
+        ModelError: there is no such coordinate.
+        SimulationError: a coordinate is locked or prescribed, or a number is not finite.
+    """
+    infos = mechanism.coordinates
+    q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
+    named = dict(initial)
+    for place, info in enumerate(infos):
+        for row, what in ((q, "value"), (u, "speed")):
+            given = named.pop(f"{info.path}/{what}", None)
+            if given is not None:
+                row[place] = _number(given, what, info.path)
+    places: list[list[int]] = []
+    for numbers, row, what in ((named, q, "value"), (speeds, u, "speed")):
+        places.append([])
+        for name, value in numbers.items():
+            place = mechanism.coordinate_index(name)
+            if infos[place].locked:
+                raise SimulationError(
+                    f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
+                    "be set; unlock it in the model"
+                )
+            if infos[place].prescribed is not None:
+                raise SimulationError(
+                    f"coordinate '{name}' is prescribed, so that its {what} cannot be set; "
+                    "set its prescribed to false in the model"
+                )
+            row[place] = _number(value, what, name)
+            places[-1].append(place)
+    for what, row in (("value", q), ("speed", u)):
+        for info, number in zip(infos, row, strict=True):
+            if not isfinite(number):
+                raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
+    return q, u, places
+
+
+def _number(value: float, what: str, name: str) -> float:
+    if not isfinite(value):
+        raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
+    return float(value)
+
+
+def state_in(
+    path: str | Path, mechanism: Mechanism, names: Collection[str], time: float | None = None
+) -> dict[str, float]:
+    """A state of a file, by the paths of its columns; columns that are no states are left out.
+
+    Args:
+        path: of a table of states.
+        mechanism: whose states they are.
+        names: paths of all states.
+        time: of the row that is taken, the nearest in the file, s; the last one if left out.
+
+    Raises:
+        DocumentError: it is no table.
+        ModelError: it has no states of the mechanism, or no rows.
+    """
+    table = read_sto(path)
+    columns = [(place, label) for place, label in enumerate(table.columns) if label in names]
+    if not columns or not len(table.times):
+        what = f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'" if not columns else "row"
+        raise ModelError(f"no {what}; give a file of its states", file=str(path))
+    row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
+    turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
+    return {
+        label: float(np.radians(row[place])) if table.in_degrees and label.rpartition("/")[0] in turning else row[place]
+        for place, label in columns
+    }

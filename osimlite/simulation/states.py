@@ -127,21 +127,22 @@ class StateLayout:
             u: generalized speeds in the order of the mechanism.
             z: the auxiliary states; by default where they start.
         """
-        if z is None:
-            z = [variable.start(q, u) if callable(variable.start) else variable.start for variable in self.variables]
-        elif len(z) != len(self.variables):
-            raise self.wrong_length(2 * len(self.order) + len(z))
-        return [float(q[place]) for place in self.order] + [float(u[place]) for place in self.order] + [*map(float, z)]
+        y = [float(row[place]) for row in (q, u) for place in self.order]
+        y += self._starts(y) if z is None else map(float, z)
+        self.require(y)
+        return y
 
     def started(self, states: Array) -> Array:
         """States (k, y) with the auxiliary ones where they start from the values and speeds there."""
-        found, first = states.copy(), 2 * len(self.order)
-        for number, variable in enumerate(self.variables, first):
-            if callable(variable.start):
-                found[:, number] = [variable.start(self.values(y), self.speeds(y)) for y in states.tolist()]
-            else:
-                found[:, number] = variable.start
-        return found
+        if not self.variables:
+            return states.copy()
+        first = 2 * len(self.order)
+        return np.array([y[:first] + self._starts(y) for y in states.tolist()])
+
+    def _starts(self, y: Sequence[float]) -> list[float]:
+        """Where the auxiliary states start from values and speeds."""
+        q, u = self.values(y), self.speeds(y)
+        return [float(item.start(q, u)) if callable(item.start) else item.start for item in self.variables]
 
     # ------------------------------------------------------------------------------------------------ parts
     def spread(self, values: Sequence[float], still: Sequence[float]) -> list[float]:

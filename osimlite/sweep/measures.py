@@ -92,7 +92,7 @@ class MeasureMaker(Protocol):
 
 
 class State(Mapping[str, float]):
-    """Values and speeds of the coordinates by name: ``state["RHip_rz"]``, ``state["RHip_rz/speed"]``."""
+    """States by name: ``state["RHip_rz"]``, ``state["RHip_rz/speed"]``, and any by its path in ``states.sto``."""
 
     def __init__(self, engine: Any, y: Floats) -> None:
         self._engine, self._y = engine, y
@@ -103,10 +103,10 @@ class State(Mapping[str, float]):
 
     def __iter__(self) -> Iterator[str]:
         names = [info.name for info in self._engine.mechanism.coordinates]
-        return iter([*names, *(f"{name}/speed" for name in names)])
+        return iter([*names, *(f"{name}/speed" for name in names), *self._engine.state.paths])
 
     def __len__(self) -> int:
-        return 2 * len(self._engine.mechanism.coordinates)
+        return 2 * len(self._engine.mechanism.coordinates) + len(self._engine.state.paths)
 
 
 @dataclass(frozen=True)
@@ -245,7 +245,9 @@ def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
 
 
 def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
-    """Where in a state ``NAME``, ``NAME/value`` or ``NAME/speed`` is; None and its value if it is locked."""
+    """Where in a state ``NAME``, ``NAME/value`` or ``NAME/speed`` is, or a path; None and its value if it is locked."""
+    if name in engine.state.paths:
+        return 2 * len(engine.order) + engine.state.paths.index(name), 0.0
     front, _, last = name.rpartition("/")
     if last not in ("value", "speed"):
         front, last = name, "value"

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.simulation import read_sto
 from tests.cli.command import run
+from tests.simulation.damped import damped
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 
@@ -98,3 +100,16 @@ def test_degrees_taken_for_radians_are_warned_of(walker, tmp_path):
         words = ("--set", f"RHip_rz={value}", "--set-speed", "RHip_rz=7")
         code, _, err = run("simulate", walker, "--to", "0.01", *words, folder=tmp_path)
         assert (code, err) == (0, "")
+
+
+def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
+    """All states are those at its end; what is set besides counts more."""
+    osimlite.write(damped(), tmp_path / "damped.osim")
+    words = ["simulate", str(tmp_path / "damped.osim"), "--to", "0.05"]
+    run(*words, "-o", str(tmp_path / "one"))
+    run(*words, "--states", str(tmp_path / "one" / "states.sto"), "--set", "q1=0.25", "-o", str(tmp_path / "two"))
+    one, two = (read_sto(tmp_path / folder / "states.sto") for folder in ("one", "two"))
+    changed = one.columns.index("/jointset/j1/q1/value")
+    assert two.rows[0, changed] == 0.25 and one.columns == two.columns
+    same = [place for place in range(len(one.columns)) if place != changed]
+    assert two.rows[0, same].tolist() == one.rows[-1, same].tolist()

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.multibody import build_mechanism
-from osimlite.simulation import Simulation
+from osimlite.simulation import Simulation, read_sto, write_sto
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.states import StateLayout, StateVariable
+from tests.oracle.random_models import RandomModel
 from tests.simulation.damped import damped
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
@@ -101,3 +103,71 @@ def test_states_have_the_order_and_the_starts_of_their_owners():
     moved = np.array([y, y])
     moved[1, 2], moved[:, 6:] = 0.5, 9.0
     assert layout.started(moved).tolist() == [y, pytest.approx([*moved[1, :6], 0.05, 1.6, 0.0])]
+
+
+def with_states(seed):
+    """A random model, and a start of each of its auxiliary states."""
+    random = RandomModel(seed)
+    random.model.add(random.bushing("bushing"))
+    with Simulation(random.model, "compiled") as simulation:
+        return random.model, {path: random.number(0.0, 2.0) for path in simulation.state.paths}
+
+
+@settings(max_examples=10, deadline=None, derandomize=True, phases=[Phase.generate])
+@given(seed=st.integers(0, 10**6))
+def test_random_models_keep_their_states(seed, tmp_path_factory):
+    """Through both engines, with both kinds of steps, in a batch, and through a file."""
+    from osimlite.simulation.many import run_many
+
+    model, z = with_states(seed)
+    file = tmp_path_factory.mktemp("random") / "states.sto"
+    ends = {}
+    for engine in ("bullet", "compiled"):
+        with Simulation(model, engine) as simulation:
+            assert set(z) == set(simulation.state.paths) and set(z) < set(simulation.paths)
+            for step in ({"accuracy": 1e-8}, {"fixed_step": 1e-3}):
+                trajectory = simulation.run(0.02, initial=z, **step)
+                assert {path: rows[0] for path, rows in trajectory.auxiliary.items()} == z
+                ends[engine, *step] = [rows[-1] for rows in trajectory.auxiliary.values()]
+                # What the dampers take up is counted on from there.
+                assert (np.array(ends[engine, *step]) >= np.array([z[path] for path in trajectory.auxiliary])).all()
+            trajectory.to_sto(file)
+            assert tuple(read_sto(file).columns) == tuple(simulation.paths)
+            last = simulation.initial_state(simulation.state_in(file), {})
+            history = simulation.state.rows(trajectory.values, trajectory.speeds, trajectory.auxiliary)
+            # Constraints hold a little better at a start.
+            assert last == pytest.approx(history[-1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0)
+            again = simulation.run(0.01, initial=str(file))
+            assert [rows[0] for rows in again.auxiliary.values()] == ends[engine, "fixed_step"]
+            middle = simulation.initial_state(simulation.state_in(file, 0.0101), {})
+            assert middle == pytest.approx(history[1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0)
+            if engine == "compiled":
+                starts = np.array([simulation.initial_state(z, {}), last])
+                runs = run_many(simulation.engine, starts, 0.02, accuracy=1e-8, report_times=[0.0, 0.01])
+                assert np.allclose(runs.reports[:, 0], starts, rtol=0.0, atol=1e-8 if simulation.constraints else 0.0)
+                alone = simulation.run(0.02, accuracy=1e-8, initial=z)
+                ending = simulation.state.rows(alone.values, alone.speeds, alone.auxiliary)
+                assert np.array_equal(runs.states[0], ending[-1])
+    assert ends["bullet", "accuracy"] == pytest.approx(ends["compiled", "accuracy"], rel=1e-7, abs=1e-9)
+    # Bullet steps the rates of its joints, which not all are the generalized speeds.
+    for engine in ("bullet", "compiled"):
+        assert ends[engine, "fixed_step"] == pytest.approx(ends["compiled", "accuracy"], rel=0.1, abs=0.1)
+
+
+def test_what_a_file_says_gives_way_to_what_holds(tmp_path):
+    """Locked coordinates stay; a name that is given besides counts more than the file."""
+    file = tmp_path / "states.sto"
+    osimlite.simulate(damped(), 0.1).to_sto(file)
+    with Simulation(damped(), "compiled") as simulation:
+        state = simulation.state_in(file)
+        state["/jointset/j2/q2/value"] = 7.0
+        y = simulation.initial_state({**state, "q1": 0.25}, {})
+        assert simulation.state.values(y)[2] == 0.3 and simulation.state.values(y)[1] == 0.25
+        for state, error in (({"/forceset/disc/dissipated_energy": np.nan}, "starts at nan"), ({"q9": 1.0}, "q9")):
+            with pytest.raises(OsimliteError, match=error):
+                simulation.initial_state(state, {})
+        write_sto(tmp_path / "other.sto", "x", [0.0], ["/jointset/k/r/value"], [[1.0]])
+        with pytest.raises(OsimliteError, match=r"no column is a state of 'damped', such as '/jointset/j0/q0/value'"):
+            simulation.run(0.1, initial=tmp_path / "other.sto")
+        write_sto(tmp_path / "degrees.sto", "x", [0.0], ["/jointset/j1/q1/value"], [[90.0]], in_degrees=True)
+        assert simulation.state_in(tmp_path / "degrees.sto") == {"/jointset/j1/q1/value": np.pi / 2}

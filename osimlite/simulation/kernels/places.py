@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, FINE, FREEDOMS, LAWS, NUMBERS, OWN, PLACED
+from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, FINE, LAWS, NUMBERS, OWN, PLACED, STATE_SIZE
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
 
@@ -18,12 +18,12 @@ def contact_places(
         w: room for an evaluation.
         each: length of a row of numbers.
         rows: which of them each state goes with (k,).
-        states: (k, 2n).
-        room: for a derivative (2n,).
+        states: (k, y).
+        room: for a derivative (y,).
         places: filled with the centre of surface 1, its normal, and the centre of surface 2, in ground (k, P, 9).
         count: k.
     """
-    pairs, size = s[CONTACTS], 2 * s[FREEDOMS]
+    pairs, size = s[CONTACTS], s[STATE_SIZE]
     for k in range(count):
         x = at(vectors, each * rows[k])
         call(s[LAWS], s, x, w, at(states, size * k), room, PLACED)
