@@ -27,7 +27,7 @@ from osimlite.errors import OsimliteError
 from osimlite.schema.forces import CoordinateLimitForce, Force
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
-from osimlite.simulation.element_makers import MAKERS
+from osimlite.simulation.elements.kind import kind_of_class
 from simulate import run_opensim, run_ours
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
@@ -80,7 +80,7 @@ def models(folder: Path) -> Iterator[tuple[str, Path]]:
                 found.append((name, osimlite.read_text(gzip.decompress(path.read_bytes()))))
     for number, (name, model) in enumerate(found):
         for force in model.components(Force):
-            known = isinstance(force, (CoordinateLimitForce, HuntCrossleyForce)) or type(force) in MAKERS
+            known = kind_of_class(type(force)) is not None
             if not known or isinstance(force, PathSpring):
                 force.appliesForce = False
         path = folder / f"{number}.osim"

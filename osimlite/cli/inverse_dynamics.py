@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from osimlite.cli import _options as options
 
 if TYPE_CHECKING:
-    from osimlite.simulation.external_loads import ExternalLoad
+    from osimlite.simulation.elements.kind import DeclaredForce
 
 
 def inverse_dynamics(
@@ -28,9 +28,9 @@ def inverse_dynamics(
     from osimlite.cli._recorded import opened, written
 
     recorded = opened(file, motion)
-    loads: tuple[ExternalLoad, ...] = ()
+    loads: tuple[DeclaredForce, ...] = ()
     if external_loads is not None:
-        from osimlite.simulation.external_loads import read_external_loads
+        from osimlite.simulation.elements.external_loads import read_external_loads
 
         loads = read_external_loads(recorded.mechanism, external_loads)
     written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, output)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.simulation.contact_elements import HuntCrossley
+from osimlite.simulation.elements.contact import HuntCrossley
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.text import counted, listed, or_known
 

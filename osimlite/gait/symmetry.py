@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.gait.footing import Footing
 from osimlite.multibody.mechanism import GROUND
-from osimlite.simulation.contact_elements import HuntCrossley
+from osimlite.simulation.elements.contact import HuntCrossley
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.kernels.pointers import Floats, Ints
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.engines.batch import NO_LIMIT, Batch
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.engines.machine_code import entry_point
+from osimlite.simulation.engines.linking import entry_point
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.contacts import RADIUS
@@ -150,9 +150,14 @@ def contact_places(
     places = np.zeros((len(given), len(engine.contacts), 9))
     w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(engine.state.size)
     entry_point("contact_places")(
-        *(part.ctypes.data for part in (engine.program, vectors, w)),
+        engine.program.ints,
+        vectors,
+        w,
         vectors.shape[1],
-        *(part.ctypes.data for part in (which, given, derivative, places)),
+        which,
+        given,
+        derivative,
+        places,
         len(given),
     )
     return places

@@ -22,7 +22,7 @@ from osimlite.simulation.storage import StoTable, read_sto
 from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from osimlite.simulation.external_loads import ExternalLoad
+    from osimlite.simulation.elements.kind import DeclaredForce
 
 _HALF_ORDER = 3
 """OpenSim differentiates coordinates by splines of fifth degree."""
@@ -136,7 +136,7 @@ class RecordedMotion:
             row[:] = [number for place in places.values() for number in state.point(*place)]
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)
 
-    def inverse_dynamics(self, external_loads: Sequence[ExternalLoad] = ()) -> StoTable:
+    def inverse_dynamics(self, external_loads: Sequence[DeclaredForce] = ()) -> StoTable:
         """Generalized forces (N, N·m) that make the bodies move so against gravity and external loads.
 
         Locks and other constraints are left aside, as in OpenSim. The forces belong to the generalized speeds: for
@@ -151,9 +151,11 @@ class RecordedMotion:
             udot = mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u))
             row[:] = mechanism.inverse_dynamics(q, u, udot)
             if external_loads:
+                from osimlite.simulation.elements.external_loads import generalized
+
                 state = mechanism.at(q)
                 for load in external_loads:
-                    row -= load.generalized(state, time)
+                    row -= generalized(load.place, state, time)
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]

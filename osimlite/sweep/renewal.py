@@ -18,9 +18,9 @@ from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
+from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels.items import Item, Places, items_of
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
@@ -69,7 +69,7 @@ class Renewal:
         self._builder = ElementBuilder(model, engine.mechanism, False, folder)
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
-        self._items = {element.path: items_of(element, self._places) for element in engine.forces.elements}
+        self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
         # The numbers of all items are the last ones, in their order.
         self._first, place = {}, len(given.numbers) - sum(_length(items) for items in self._items.values())
         for path, items in self._items.items():
@@ -108,11 +108,11 @@ class Renewal:
         """The given numbers with those of some elements in their places."""
         numbers = self._given.numbers.copy()
         for path, element in made.items():
-            items = items_of(element, self._places)
+            items = element.items(self._places)
             if [_kind(item) for item in items] != [_kind(item) for item in self._items[path]]:
                 return None
             place = self._first[path]
-            numbers[place : place + _length(items)] = [x for item in _computed(items) for x in item.numbers]
+            numbers[place : place + _length(items)] = [x for item in items for x in item.numbers]
         return numbers
 
     def _with_masses(self) -> Mechanism | None:
@@ -135,14 +135,10 @@ class Renewal:
         return packed.numbers if is_alike and packed.order == self._given.engine.order else None
 
 
-def _computed(items: Sequence[Item]) -> list[Item]:
-    return [item for item in items if item.law is not None]
-
-
 def _length(items: Sequence[Item]) -> int:
-    return sum(len(item.numbers) for item in _computed(items))
+    return sum(len(item.numbers) for item in items)
 
 
 def _kind(item: Item) -> tuple[object, ...]:
     """What of an item is not its numbers."""
-    return item.law, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part
+    return item.kernel, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part

@@ -110,24 +110,18 @@ def computed_forces(
         OsimliteError: a file is missing or cannot be read.
         SimulationError: at a state the rates of coordinates are not defined.
     """
-    from osimlite.robot.build import build_robot
-    from osimlite.robot.merge_fixed import merge_fixed
     from osimlite.simulation.elements import force_elements
-    from osimlite.simulation.field import ForceField
+    from osimlite.simulation.system import System
 
-    elements = force_elements(model, mechanism, skip_unsupported=True, folder=folder).elements
-    if not elements:
+    forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
+    if not forces.elements:
         return {}
-    robot = merge_fixed(build_robot(mechanism, body_frames=False))
-    order = [place for place, info in enumerate(mechanism.coordinates) if not info.locked]
-    forces = ForceField(robot, robot.moving, elements, order)
-    rows = []
-    for t, q, u in zip(times.tolist(), values, speeds, strict=True):
-        joints = [joint.value(q) for joint in robot.moving]
-        rates = robot.joint_jacobian(q) @ mechanism.coordinate_rates(q, u)
-        rows.append(forces.records(t, joints, rates.tolist(), q[order].tolist(), u[order].tolist()))
-    table = np.array(rows, dtype=float).reshape(len(times), len(forces.columns))
-    return {label: table[:, place] for place, label in enumerate(forces.columns)}
+    system = System(mechanism, forces)
+    rows = [
+        system.force_records(t, system.state.pack(q, u)) for t, q, u in zip(times.tolist(), values, speeds, strict=True)
+    ]
+    table = np.array(rows, dtype=float).reshape(len(times), len(system.columns))
+    return {label: table[:, place] for place, label in enumerate(system.columns)}
 
 
 def _speeds(mechanism: Mechanism, table: StoTable) -> Array | None:

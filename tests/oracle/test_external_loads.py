@@ -12,7 +12,7 @@ from osimlite.document.reader import read_text
 from osimlite.multibody import build_mechanism
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.external_loads import read_external_loads
+from osimlite.simulation.elements.external_loads import read_external_loads
 from osimlite.simulation.recorded import RecordedMotion
 from osimlite.simulation.storage import write_sto
 

@@ -51,14 +51,15 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
-from osimlite.simulation.element_makers import MAKERS
 from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements.kind import kinds as declared_kinds
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.simulation.engines.bullet import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.external_loads import ExternalLoad
+from osimlite.simulation.elements.external_loads import external_load
+from osimlite.simulation.elements.geometries.load import Load
 
 
 def chain() -> Model:
@@ -366,7 +367,7 @@ def test_every_class_of_force_is_here():
     for make in FORCES.values():
         found = make()
         made |= {type(item) for item in (found if isinstance(found, tuple | list) else (found,))}
-    assert {kind.__name__ for kind in MAKERS} - {kind.__name__ for kind in made} <= {
+    assert {kind.component.__name__ for kind in declared_kinds()} - {kind.__name__ for kind in made} <= {
         "ElasticFoundationForce",
         "ExternalForce",
     }
@@ -379,18 +380,10 @@ def test_measured_load():
     functions = cubic, NumericLinear(2.0, -0.3), NumericConstant(0.4)
     frames = [FramePlacement(body, offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5))) for body in (2, 0, 3)]
     for given in ((1, 1, 1), (1, 0, 0), (0, 0, 1), (1, 1, 0)):
-        kinds = [functions if wanted else None for wanted in given]
-        forces = Forces((ExternalLoad("/a", "a", "b2", *frames, *kinds),))
+        kinds = [functions if wanted else () for wanted in given]
+        forces = Forces((external_load("/a", "a", Load(("b2_a_F", "b2_a_p", "b2_a_T"), *frames, *kinds)),))
         with BulletEngine(mechanism, forces) as theirs:
             assert_same(mechanism, CompiledEngine(mechanism, forces), theirs)
-
-
-def test_an_unknown_force_is_refused_by_name():
-    class Magnet:
-        path = "/forceset/magnet"
-
-    with pytest.raises(UnsupportedError, match=r"compute '/forceset/magnet' \(Magnet\); take --engine bullet"):
-        CompiledEngine(build_mechanism(chain()), Forces((Magnet(),)))
 
 
 def test_early_return():

@@ -16,7 +16,7 @@ from osimlite.schema.joints import FreeJoint
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalForce, PrescribedForce
 from osimlite.simulation import simulate, write_sto
-from osimlite.simulation.external_loads import natural_cubics, read_external_loads
+from osimlite.simulation.elements.external_loads import natural_cubics, read_external_loads
 
 LABELS = ["grf_vx", "grf_vy", "grf_vz", "grf_px", "grf_py", "grf_pz", "grf_mx", "grf_my", "grf_mz"]
 

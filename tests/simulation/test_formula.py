@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import ModelError
-from osimlite.simulation.field import LAWS
-from osimlite.simulation.formula import FUNCTIONS, Formula
-from osimlite.simulation.script import Script
-
-
-class Writer:
-    """As much of the true one as a formula needs."""
-
-    def __init__(self) -> None:
-        self.script = Script("f", ["q", "u"])
-
-    def call(self, law, *arguments):
-        return self.script.assign(f"{law}({', '.join(map(str, arguments))})")
+from osimlite.simulation.elements.formula import FUNCTIONS, Formula
+from osimlite.simulation.kernels.programs import STEPS, of_two, program
 
 
 def value(text, q=0.7, u=-1.3):
-    writer = Writer()
-    found = Formula.parse(text, ("q", "u"), "the expression").write(writer, {"q": "q", "u": "u"})
-    writer.script.line(f"return {found}")
-    return writer.script.function({**LAWS, "inf": math.inf})(q, u)
+    steps, constants = program(Formula.parse(text, ("q", "u"), "the expression"))
+    count = len(steps) // 3
+    return of_two(q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count))
 
 
 @pytest.mark.parametrize(
@@ -124,4 +111,4 @@ def test_no_text_does_worse_than_a_model_error(text):
 
 
 def test_every_function_is_a_law():
-    assert set(FUNCTIONS.values()) <= set(LAWS)
+    assert set(FUNCTIONS.values()) <= set(STEPS)

@@ -7,7 +7,7 @@ import pytest
 
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.meshes.folders import MeshFolders
-from osimlite.simulation.triangle_mesh import TriangleMesh
+from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 from tests.simulation.meshes import WRITERS, ball, block, triangles
 
 

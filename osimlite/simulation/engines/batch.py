@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.simulation.engines.machine_code import entry_point
+from osimlite.simulation.engines.linking import entry_point
 from osimlite.simulation.integrators import INITIAL_STEP
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats, Ints
@@ -106,24 +106,24 @@ class Batch:
         """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
         vectors, room = self._vectors, np.zeros(self._room)
         entry_point("run_several")(
-            self._engine.program_address,
-            vectors.ctypes.data,
-            room.ctypes.data,
+            self._engine.program.ints,
+            vectors,
+            room,
             vectors.shape[1] if len(vectors) > 1 else 0,
-            self._sizes.ctypes.data,
-            self._settings.ctypes.data,
-            self.clocks.ctypes.data,
-            self.counts.ctypes.data,
-            self.states.ctypes.data,
-            self._times.ctypes.data,
-            self.reports.ctypes.data,
-            self.log.ctypes.data,
-            self.forces.ctypes.data,
-            self.events.ctypes.data,
-            self.peaks.ctypes.data,
-            self._kinds.ctypes.data,
-            self._levels.ctypes.data,
-            self.endings.ctypes.data,
+            self._sizes,
+            self._settings,
+            self.clocks,
+            self.counts,
+            self.states,
+            self._times,
+            self.reports,
+            self.log,
+            self.forces,
+            self.events,
+            self.peaks,
+            self._kinds,
+            self._levels,
+            self.endings,
             first,
             len(self.states) if last is None else last,
         )

@@ -21,17 +21,17 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
 from osimlite.robot.names import legal_names
-from osimlite.robot.robot import Robot
+from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet_file import require_masses
 from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.bullet_world import World, bullet
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.field import ForceField, own_coordinates
 from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.solver import SingularMassError, tree_solver
 from osimlite.simulation.speeds import Speeds
 from osimlite.simulation.stepper import Observer, Projection, Stepper
+from osimlite.simulation.system import System
 
 if TYPE_CHECKING:
     from osimlite.robot.visuals import Visuals
@@ -133,16 +133,9 @@ class BulletEngine:
             raise ValueError(
                 f"'{mechanism.name}' has coordinates that move several axes; engine_class() tells its engine"
             )
-        plain = all(item.mobilizer.speeds_are_rates for item in mechanism.bodies)
-        self.field = ForceField(robot, body.joints, forces.elements, None if plain else places)
-        self.order = self.field.order
-        self.state = self.field.state
-        self.contacts = self.field.contacts
-        self.columns = self.field.columns
-        self.loads: list[Any] = [None] * len(self.contacts) + [0]
+        self._take(System(mechanism, forces, places))
         self._speeds = Speeds(mechanism, self.order)
         self._count = len(self.order)
-        self._forces = self.field.generalized
         if route == "auto":
             few = self._count <= FEW_JOINTS
             route = MASS_MATRIX if few and body.mass_matrix_works else ARTICULATED_BODY
@@ -150,13 +143,20 @@ class BulletEngine:
             self._require_mass_matrix()
         self.route = route
         if route == MASS_MATRIX:
-            self._solve = tree_solver([self.field.chain.parent(joint) for joint in range(self._count)])
+            self._solve = tree_solver(carriers(body.joints))
         if not self._count:
             self._motion = self._nothing_moves  # type: ignore[method-assign]
-        elif self.field.separate:
+        elif not all(item.mobilizer.speeds_are_rates for item in mechanism.bodies):
             self._motion = self._motion_with_speeds  # type: ignore[method-assign]
         elif route == ARTICULATED_BODY:
             self._motion = self._motion_by_step  # type: ignore[method-assign]
+
+    def _take(self, system: System) -> None:
+        """Have the forces from a system."""
+        self.system = system
+        self.order, self.state = system.order, system.state
+        self.contacts, self.columns, self.loads = system.contacts, system.columns, system.loads
+        self._count = len(self.order)
 
     def _require_mass_matrix(self) -> None:
         if not self._body.mass_matrix_works:
@@ -168,51 +168,40 @@ class BulletEngine:
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: list[float]) -> list[float]:
         """(qdot, udot, zdot) at a state."""
-        self.state.require(y)
-        return self._motion(t, y[: 2 * self._count]) + self.field.powers
+        applied, count = self.system.applied(t, y), self._count
+        q, u = y[:count], y[count : 2 * count]
+        return self._motion(q, u, applied[count : 2 * count]) + applied[2 * count :]
 
-    def _motion(self, t: float, y: list[float]) -> list[float]:
-        """(qdot, udot) at (q, u); here where the speeds are the rates, by the mass matrix."""
-        count, body = self._count, self._body
-        q, u = y[:count], y[count:]
+    def _motion(self, q: list[float], u: list[float], forces: list[float]) -> list[float]:
+        """(qdot, udot) under generalized forces; here where the speeds are the rates, by the mass matrix."""
+        body = self._body
         try:
             return u + self._solve(
                 bullet.calculateMassMatrix(body.id, q, 0, body.client),
                 bullet.calculateInverseDynamics(body.id, q, u, body.zeros, 0, body.client),
-                self._forces(t, q, u, self.loads),
+                forces,
             )
         except SingularMassError as error:
-            raise self._singular(error, y) from None
+            raise self._singular(error, q + u) from None
 
-    def _motion_by_step(self, t: float, y: list[float]) -> list[float]:
-        q, u = y[: self._count], y[self._count :]
-        return u + self._body.accelerations_by_step(q, u, self._forces(t, q, u, self.loads))
+    def _motion_by_step(self, q: list[float], u: list[float], forces: list[float]) -> list[float]:
+        return u + self._body.accelerations_by_step(q, u, forces)
 
-    def _motion_with_speeds(self, t: float, y: list[float]) -> list[float]:
-        count, body = self._count, self._body
-        q, u = y[:count], y[count:]
-        rates = self._speeds.rates(q, u)
-        forces = self._joint_forces(t, q, rates, u)
+    def _motion_with_speeds(self, q: list[float], u: list[float], forces: list[float]) -> list[float]:
+        body, rates = self._body, self._speeds.rates(q, u)
+        forces = self._speeds.joint_forces(q, forces)
         if self.route == MASS_MATRIX:
             try:
                 qddot = self._solve(body.mass_matrix(q), body.bias(q, rates), forces)
             except SingularMassError as error:
-                raise self._singular(error, y) from None
+                raise self._singular(error, q + u) from None
         else:
             qddot = body.accelerations_by_step(q, rates, forces)
         return rates + self._speeds.accelerations(q, u, qddot)
 
     @staticmethod
-    def _nothing_moves(t: float, y: list[float]) -> list[float]:
+    def _nothing_moves(q: list[float], u: list[float], forces: list[float]) -> list[float]:
         return []
-
-    def _joint_forces(self, t: float, q: list[float], rates: list[float], u: list[float]) -> Sequence[float]:
-        """Forces on the one-axis joints; `rates` are theirs, `u` the generalized speeds."""
-        if not self.field.separate:
-            return self._forces(t, q, rates, self.loads)
-        both, count = self._forces(t, q, rates, q, u, self.loads), self._count
-        converted = self._speeds.joint_forces(q, both[count:])
-        return [a + b for a, b in zip(both[:count], converted, strict=True)]
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
@@ -228,25 +217,15 @@ class BulletEngine:
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: list[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
-        self.state.require(y)
-        q, u = y[: self._count], y[self._count : 2 * self._count]
-        self._joint_forces(t, q, self._speeds.rates(q, u), u)
-        return int(self.loads[-1])
+        return self.system.touching(t, y)
 
     def force_records(self, t: float, y: list[float]) -> list[float]:
         """One number for each of the columns."""
-        return self.field.records(t, *self._joints(y))
+        return self.system.force_records(t, y)
 
     def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
-        return self.field.energies(t, *self._joints(y))
-
-    def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
-        """Values and rates of the joints, and the state where it is told apart from these."""
-        self.state.require(y)
-        q, u = y[: self._count], y[self._count : 2 * self._count]
-        rates = self._speeds.rates(q, u)
-        return (q, rates, q, u) if self.field.separate else (q, rates)
+        return self.system.energies(t, y)
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
@@ -283,3 +262,14 @@ class BulletEngine:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def own_coordinates(joints: Sequence[RobotJoint]) -> list[int]:
+    """The coordinate that the value of each joint is; fewer than joints if one is another function."""
+    return [joint.coordinate for joint in joints if joint.coordinate is not None]
+
+
+def carriers(joints: Sequence[RobotJoint]) -> list[int]:
+    """The joint that carries each joint, -1 if ground does."""
+    above = {joint.child: place for place, joint in enumerate(joints)}
+    return [above.get(joint.parent, -1) for joint in joints]

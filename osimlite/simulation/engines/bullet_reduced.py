@@ -26,9 +26,10 @@ from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RE
 from osimlite.simulation.engines.bullet_file import excess
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
-from osimlite.simulation.field import ForceField
+from osimlite.simulation.chain import Chain
 from osimlite.simulation.reduction import Reduction
 from osimlite.simulation.stepper import Observer, Stepper
+from osimlite.simulation.system import System
 
 
 class ReducedBulletEngine(BulletEngine):
@@ -49,14 +50,9 @@ class ReducedBulletEngine(BulletEngine):
     def _prepare(self, mechanism: Mechanism, forces: Forces, robot: Robot, route: str) -> None:
         body = self._body
         self.mechanism = mechanism
-        self.order = tuple(free_coordinates(mechanism))
+        self._take(System(mechanism, forces, free_coordinates(mechanism)))
         self._places = np.array(self.order, dtype=int)
         self._still = np.array([info.default_value for info in mechanism.coordinates])
-        self._count = len(self.order)
-        self.field = ForceField(robot, body.joints, forces.elements, self.order)
-        self.state = self.field.state
-        self.contacts, self.columns = self.field.contacts, self.field.columns
-        self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.reduction = Reduction(mechanism, body.joints, self.order)
         self.constrained = Constrained(mechanism, self.order, self._state)
         indices = {item.path: index for index, item in enumerate(mechanism.bodies)}
@@ -65,35 +61,38 @@ class ReducedBulletEngine(BulletEngine):
         ]
         self._looked_at = bool(self._added or self.constrained.names)
         looked_at = [*self.constrained.bodies, *(index for index, _ in self._added)]
-        self._states = BodyStates(self.field.chain, looked_at, self.order)
-        self._forces = self.field.generalized
+        self._states = BodyStates(Chain(robot, body.joints), looked_at, self.order)
         if route == ARTICULATED_BODY:
             raise UnsupportedError(
                 f"the route {ARTICULATED_BODY} is for models without constraints whose coordinates move one axis each; "
                 f"take {MASS_MATRIX} for '{mechanism.name}'"
             )
         self.route = MASS_MATRIX if route == "auto" else route
-        if not self._count:
-            self._motion = self._nothing_moves  # type: ignore[method-assign]
 
     # ---------------------------------------------------------------------------------------- accelerations
-    def equations(self, t: float, y: list[float]) -> tuple[Array, Array, Array, Kinematics | None]:
-        """M (n, n) and f (n,) of the motion M udot = f without constraints, xdot (n,), and what bodies do, if known."""
-        x, u = np.array(y[: self._count]), np.array(y[self._count :])
+    def equations(
+        self, t: float, x: Array, u: Array, forces: Array
+    ) -> tuple[Array, Array, Array, Kinematics | None]:
+        """M (n, n) and f (n,) of the motion M udot = f without constraints, xdot (n,), and what bodies do, if known.
+
+        Args:
+            t: time, s.
+            x: coordinates (n,).
+            u: generalized speeds (n,).
+            forces: that are applied (n,).
+        """
         joints = self.reduction.at(x, u)
         jacobian = joints.jacobian
         q, rates = joints.values.tolist(), joints.rates.tolist()
-        both = np.array(self._forces(t, q, rates, y[: self._count], y[self._count :], self.loads))
-        applied = both[: len(q)] @ jacobian + both[len(q) :]
         if self.route == RECURSION:
             state = kinematics(self.mechanism, *self.constrained.spread(x, u), t)
             bodies = MassCentres.of(state)
             matrix = bodies.mass_matrix()[np.ix_(self._places, self._places)]
             inner = bodies.gravity_forces() - bodies.inertia_forces(state.biases)
-            return matrix, applied + inner[self._places], joints.coordinate_rates, state
+            return matrix, forces + inner[self._places], joints.coordinate_rates, state
         body = self._body
         matrix = jacobian.T @ np.array(body.mass_matrix(q)) @ jacobian
-        right = applied - np.array(body.joint_forces(q, rates, joints.bias.tolist())) @ jacobian
+        right = forces - np.array(body.joint_forces(q, rates, joints.bias.tolist())) @ jacobian
         if not self._looked_at:
             return matrix, right, joints.coordinate_rates, None
         state = self._states.at(t, *self.constrained.spread(x, u), joints)
@@ -104,28 +103,19 @@ class ReducedBulletEngine(BulletEngine):
             right += added * state.biases[index][:3] @ turning
         return matrix, right, joints.coordinate_rates, state
 
-    def _motion(self, t: float, y: list[float]) -> list[float]:
-        matrix, right, rates, state = self.equations(t, y)
-        x, u = np.array(y[: self._count]), np.array(y[self._count :])
-        found: list[float] = rates.tolist() + self.constrained.accelerations(t, x, u, matrix, right, state).tolist()
-        return found
+    def derivative(self, t: float, y: list[float]) -> list[float]:
+        """(qdot, udot, zdot) at a state."""
+        applied, count = self.system.applied(t, y), self._count
+        if not count:
+            return applied
+        x, u = np.array(y[:count]), np.array(y[count : 2 * count])
+        matrix, right, rates, state = self.equations(t, x, u, np.array(applied[count : 2 * count]))
+        found = self.constrained.accelerations(t, x, u, matrix, right, state)
+        return [*rates.tolist(), *found.tolist(), *applied[2 * count :]]
 
     def _state(self, t: float, x: Array, u: Array) -> Kinematics:
         """What the bodies do that constraints look at."""
         return self._states.at(t, *self.constrained.spread(x, u), self.reduction.at(x, u))
-
-    # ---------------------------------------------------------------------------------------------- reports
-    def touching(self, t: float, y: list[float]) -> int:
-        """The bits of the contacts that touch; sets `loads`."""
-        self._forces(t, *self._joints(y), self.loads)
-        return int(self.loads[-1])
-
-    def _joints(self, y: list[float]) -> tuple[Sequence[float], ...]:
-        """Values and rates of the joints, values and speeds of the state."""
-        self.state.require(y)
-        x, u = y[: self._count], y[self._count : 2 * self._count]
-        joints = self.reduction.at(np.array(x), np.array(u))
-        return joints.values.tolist(), joints.rates.tolist(), x, u
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
@@ -160,8 +150,9 @@ class _Shown:
 
     def __call__(self, t: float, y: list[float]) -> None:
         self._observe(t, y)
-        values, rates, _, _ = self._engine._joints(y)
-        self._engine._body.set_state(values, rates)
+        engine, count = self._engine, self._engine._count
+        joints = engine.reduction.at(np.array(y[:count]), np.array(y[count : 2 * count]))
+        engine._body.set_state(joints.values.tolist(), joints.rates.tolist())
         ahead = (t - self._start[0]) - (time.perf_counter() - self._start[1])
         if ahead > 0.0:
             time.sleep(ahead)

@@ -87,8 +87,7 @@ class BulletStepper(Stepper):
 
     def _evaluate_forces(self, y: list[float]) -> Sequence[float]:
         self.evaluations += 1
-        engine = self._engine
-        q, u = y[: engine._count], y[engine._count : 2 * engine._count]
-        torques = engine._joint_forces(self.time, q, engine._speeds.rates(q, u), u)
-        self._auxiliary_rates = list(engine.field.powers)
-        return torques
+        engine, count = self._engine, self._engine._count
+        applied = engine.system.applied(self.time, y)
+        self._auxiliary_rates = applied[2 * count :]
+        return engine._speeds.joint_forces(y[:count], applied[count : 2 * count])

@@ -12,22 +12,18 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.multibody.dynamics import massless
-from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.constrained import Constrained
-from osimlite.simulation.contact_elements import PairContact
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.engines.machine_code import VERSION, address_of, entry_point
+from osimlite.simulation.engines.linking import version
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.kernels import layout, merson
-from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
-from osimlite.simulation.kernels.table import LAW_NUMBERS
-from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
+from osimlite.simulation.system import System
 
 LOGGED_STEPS = 512
 """So many steps are taken in one call of a motion that is watched."""
@@ -42,53 +38,24 @@ def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> CompiledEn
     return CompiledEngine(mechanism, forces)
 
 
-class CompiledEngine:
+class CompiledEngine(System):
     """The accelerations of a mechanism in machine code; see the protocol for what it offers.
 
     Args:
         mechanism: what moves.
         forces: what pushes it, besides gravity.
 
-    Attributes:
-        structure: what is connected to what, integers; equal for models that differ in numbers only.
-        numbers: all numbers in one vector.
-        program: the structure with the addresses of the machine code, good in this process only.
-
     Raises:
         UnsupportedError: a joint, a function, a constraint or a force that it does not know.
     """
 
     name = "compiled"
-    version = VERSION
+    version = version()
     route = "composite-rigid-body"
 
     def __init__(self, mechanism: Mechanism, forces: Forces) -> None:
-        packed = pack(mechanism, forces)
-        self.mechanism = mechanism
-        self.forces = forces
-        self.structure = packed.structure
-        self.numbers = packed.numbers
-        self.order = packed.order
-        self.placements = packed.placements
-        self.state = StateLayout(mechanism, self.order, forces.elements)
+        super().__init__(mechanism, forces)
         self.constrained = Constrained(mechanism, self.order)
-        contacts = [element for element in forces.elements if isinstance(element, PairContact)]
-        self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
-        self.columns = tuple(label for element in forces.elements for label in element.columns)
-        self.loads: list[Any] = [None] * len(self.contacts) + [0]
-        self.program = packed.structure.copy()
-        for law in packed.laws:
-            self.program[layout.LAWS + LAW_NUMBERS[law]] = address_of(law)
-        self._items = packed.items
-        self._w = np.zeros(self.structure[layout.WORK_SIZE])
-        start, links = self.structure[layout.WORK_LINK], self.structure[layout.LINKS]
-        self._links = self._w[start : start + layout.LINK_WORK * links].reshape(links, layout.LINK_WORK)
-        start = self.structure[layout.WORK_CONTACT]
-        self._pairs = self._w[start : start + layout.CONTACT_WORK * len(self.contacts)].reshape(-1, layout.CONTACT_WORK)
-        self._y, self._f = (np.zeros(self.structure[layout.STATE_SIZE]) for _ in range(2))
-        self._evaluate = entry_point("evaluate")
-        self._addresses = tuple(part.ctypes.data for part in (self._w, self._y, self._f))
-        self.program_address: int = self.program.ctypes.data
 
     def __reduce__(self) -> Any:
         # Addresses mean nothing in another process.
@@ -97,109 +64,16 @@ class CompiledEngine:
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
         """(qdot, udot, zdot) at a state."""
-        status = self._at(t, y, layout.WHOLE)
+        status = self.realize(t, y, layout.WHOLE)
         if status != layout.FINE:
-            raise self._refusal(status, t, y)
-        self._note_loads(self._pairs[:, :3])
-        found: list[float] = self._f.tolist()
-        return found
-
-    def _at(self, t: float, y: Sequence[float], how_far: int) -> int:
-        if len(y) != len(self._y):
-            raise self.state.wrong_length(len(y))
-        self._w[layout.TIME] = t
-        self._y[:] = y
-        return self._evaluate(self.program_address, self.numbers.ctypes.data, *self._addresses, how_far)
+            raise self.refusal(status, t, y)
+        self.note_loads(self._pairs[:, :3])
+        return self.found()
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
         """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
         udot = self.derivative(t, self.state.pack(q, u))[len(self.order) : 2 * len(self.order)]
         return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
-
-    def _refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
-        if not np.isfinite(np.array(y)).all():
-            return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
-        if status == layout.SINGULAR_RATES:
-            try:
-                self.mechanism.rate_matrix(self.state.values(y))
-            except SimulationError as error:
-                return error
-        if status == layout.SINGULAR_MASS and self.constrained.names:
-            try:
-                self.mechanism.acceleration(self.state.values(y), self.state.speeds(y), time=t)
-            except SimulationError as error:
-                return error
-        elif status == layout.SINGULAR_MASS:
-            return massless(self.mechanism.coordinates[self.order[int(self._f[0])]].name)
-        return SimulationError("the motion cannot be computed any further; ask for more accuracy")
-
-    # ---------------------------------------------------------------------------------------------- reports
-    def touching(self, t: float, y: Sequence[float]) -> int:
-        """The bits of the contacts that touch; sets `loads`."""
-        self._touch(t, y)
-        return int(self.loads[-1])
-
-    def force_records(self, t: float, y: Sequence[float]) -> list[float]:
-        """One number for each of the columns."""
-        self._touch(t, y)
-        origins = [self._origin(body) for body in range(len(self.placements))] + [(0.0, 0.0, 0.0)]
-        row: list[float] = []
-        for element, values in self._reported(y):
-            row += element.record(values, origins)
-        return row
-
-    def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
-        """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
-        self._touch(t, y)
-        kinetic, gravity = self._mechanical()
-        for (link, frame), body in zip(self.placements, self.mechanism.bodies, strict=True):
-            if link == GROUND:
-                center = frame[:3, :3] @ body.mass_properties.center + frame[:3, 3]
-                gravity -= body.mass_properties.mass * float(self.mechanism.gravity @ center)
-        stored = sum(value[-1] for _, values in self._reported(y) for value in values if value is not None)
-        return float(kinetic), float(gravity), float(stored)
-
-    def _mechanical(self) -> tuple[float, float]:
-        """Kinetic energy and potential energy of gravity of all links, after `_touch`."""
-        w, links = self._links, len(self._links)
-        inertia = self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + 10 * links].reshape(links, 10)
-        rotations, velocity = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 6]
-        position, origin = (w[:, place : place + 3] for place in (layout.POSITION, layout.ORIGIN))
-        turning, arms = velocity[:, :3], position - origin + (rotations @ inertia[:, 1:4, None])[:, :, 0]
-        v = velocity[:, 3:] + np.cross(turning, arms)
-        own = (turning[:, None, :] @ rotations)[:, 0]
-        moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
-        spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
-        kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
-        return kinetic, -float(inertia[:, 0] @ (arms + origin) @ self.mechanism.gravity)
-
-    def _touch(self, t: float, y: Sequence[float]) -> None:
-        self._at(t, y, layout.TOUCHED)
-        self._note_loads(self._pairs[:, :3])
-
-    def _reported(self, y: Sequence[float]) -> Iterator[tuple[Any, list[Any]]]:
-        """Each element with what it wants for its record, after `_touch`."""
-        values, speeds, work = self.state.values(y), self.state.speeds(y), self._w.tolist()
-        for element, items in zip(self.forces.elements, self._items, strict=True):
-            yield element, [kept for item, place in items for kept in item.kept(work[place:], values, speeds)]
-
-    def _origin(self, body: int) -> tuple[float, float, float]:
-        link, frame = self.placements[body]
-        x, y, z = frame[:3, 3].tolist()
-        if link == GROUND:
-            return x, y, z
-        here = self._links[link]
-        place = here[layout.POSITION : layout.POSITION + 3] + here[:9].reshape(3, 3) @ frame[:3, 3]
-        x, y, z = place.tolist()
-        return x, y, z
-
-    def _note_loads(self, forces: Floats) -> None:
-        bits = 0
-        for number, force in enumerate(forces.tolist()):
-            if any(force):
-                bits |= 1 << number
-                self.loads[number] = tuple(force)
-        self.loads[-1] = bits
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
@@ -336,7 +210,7 @@ class CompiledMerson(RungeKuttaMerson):
                 t, y, f = row[0], row[1 : 1 + size], row[1 + size :]
                 self._previous = self._seen
                 self.time, self.state, self.derivative = self._seen = t, y, f
-                engine._note_loads(pushes)
+                engine.note_loads(pushes)
                 if self._observe is not None:
                     self._observe(t, y)
         self.time, self.state = now, end

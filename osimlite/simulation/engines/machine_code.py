@@ -6,14 +6,11 @@ nothing is compiled twice. The compiler is loaded for what is in no file yet.
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import logging
-from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
-from inspect import signature
 from pathlib import Path
 
 from osimlite._require import require
@@ -47,14 +44,6 @@ def address_of(name: str) -> int:
         _log.info("compiling '%s'", name)
         found = store(name, _digest(), *compiled(law_function(name)))
     return found
-
-
-@cache
-def entry_point(name: str) -> Callable[..., int]:
-    """The code of a law as a function of addresses and numbers; it runs without Python's lock."""
-    parts = signature(law_function(name)).parameters.values()
-    kinds = [ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64 for part in parts]
-    return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(address_of(name))
 
 
 @cache

@@ -8,8 +8,6 @@ degrees of freedom times the square of how many of them carry one another.
 
 from __future__ import annotations
 
-from osimlite.forces.coordinate_limit import limit_force
-from osimlite.simulation.kernels.contacts import touch_half_space
 from osimlite.simulation.kernels.layout import (
     ABOVE,
     ACCELERATION,
@@ -23,7 +21,6 @@ from osimlite.simulation.kernels.layout import (
     FREEDOM_AT,
     FREEDOM_INTS,
     FREEDOMS,
-    HALF_SPACE,
     HELD,
     HOLD,
     INERTIA,
@@ -32,15 +29,12 @@ from osimlite.simulation.kernels.layout import (
     ITEMS,
     LAW,
     LAWS,
-    LIMIT,
     LINK_AT,
     LINK_INTS,
     LINK_WORK,
     LINKS,
     MOVED,
-    NUMBERS,
     ORIGIN,
-    OWN,
     PARENT,
     PLACED,
     POSITION,
@@ -75,10 +69,15 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, how_far: int) 
     status = move(s, x, w, y, f)
     if status != FINE or how_far == MOVED:
         return status
-    weigh(s, x, w)
-    push_all(s, x, w, y, f)
     if how_far == TOUCHED:
-        return FINE
+        unload(s, w)
+        status = push_all(s, x, w, y, f)
+        collect(s, w, at(f, s[FREEDOMS]))
+        return status
+    weigh(s, x, w)
+    status = push_all(s, x, w, y, f)
+    if status != FINE:
+        return status
     right = at(f, s[FREEDOMS])
     gather(s, w, right)
     if s[HELD] > 0:
@@ -140,28 +139,47 @@ def weigh(s: Ints, x: Floats, w: Floats) -> None:
         load[5] = -hz - (wx * ly - wy * lx)
 
 
-def push_all(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
-    """Add what all items push to the wrenches, or to the generalized forces behind the rates in f."""
-    size = s[FREEDOMS]
-    for number in range(size, s[STATE_SIZE]):
+def unload(s: Ints, w: Floats) -> None:
+    """No wrench on any link."""
+    for link in range(s[LINKS]):
+        load = at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
+        for k in range(6):
+            load[k] = 0.0
+
+
+def push_all(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
+    """Add what all items push to the wrenches, or to the generalized forces behind the rates in f.
+
+    Returns:
+        FINE, or what the kernel of an item says; then f[0] is the number of the item.
+    """
+    for number in range(s[FREEDOMS], s[STATE_SIZE]):
         f[number] = 0.0
     for number in range(s[CONTACTS]):
         found = at(w, s[WORK_CONTACT] + CONTACT_WORK * number)
         found[0], found[1], found[2], found[DEPTH_OF] = 0.0, 0.0, 0.0, 0.0
     for number in range(s[ITEMS]):
         item = s[s[ITEM_AT] + number]
-        i = at(s, item)
-        law, p = i[LAW], at(x, i[NUMBERS])
-        if law == HALF_SPACE:
-            touch_half_space(s, x, w, y, f, item)
-        elif law == LIMIT:
-            freedom = i[OWN]
-            value = y[freedom]
-            if not p[3] <= value <= p[1]:
-                speed = y[size + freedom]
-                f[size + freedom] += limit_force(value, speed, p[0], p[1], p[2], p[3], p[4], p[5])
-        else:
-            call(s[LAWS + law], s, x, w, y, f, item)
+        status = call(s[item + LAW], s, x, w, y, f, item)
+        if status != FINE:
+            f[0] = number
+            return status
+    return FINE
+
+
+def collect(s: Ints, w: Floats, right: Floats) -> None:
+    """The generalized forces of the wrenches, inwards from the leaves."""
+    columns = at(w, s[WORK_COLUMN])
+    for link in range(s[LINKS] - 1, -1, -1):
+        j, load = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
+        for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
+            c = at(columns, 6 * freedom)
+            for k in range(6):
+                right[freedom] += c[k] * load[k]
+        if j[PARENT] >= 0:
+            above = at(w, s[WORK_LINK] + LINK_WORK * j[PARENT] + WRENCH)
+            for k in range(6):
+                above[k] += load[k]
 
 
 def gather(s: Ints, w: Floats, right: Floats) -> None:

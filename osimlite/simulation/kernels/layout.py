@@ -58,7 +58,7 @@ ABOVE, ROW, DEPTH = 0, 1, 2
 many there are on the way."""
 
 LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
-"""Of an item: its law, places in x and w of what it owns there, number of the first contact of its element, and from
+"""Of an item: address of its kernel, places in x and w of what it owns there, number of the first contact of its element, and from
 OWN on integers of its own."""
 
 HOLD, PROJECT, BONDS, BOND_AT, EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
@@ -105,13 +105,9 @@ TURN, SLIDE, BALL, BALL_BACK, DRIFT = 0, 1, 2, 3, 4
 start, a SimbodyDrift."""
 NOTHING, SHIFT, MOVE = 0, 1, 2
 """Fixed transforms: none, a translation, any."""
-HALF_SPACE, LIMIT = 0, 1
-"""Laws that the evaluation has within; the others are called by their address."""
-
-FINE, SINGULAR_MASS, SINGULAR_RATES, FAR = 0, 1, 2, 3
+FINE, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED = 0, 1, 2, 3, 4
 """What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined; of a
-projection: too far from where the constraints hold."""
+projection: too far from where the constraints hold; of a kernel in Python: it raised an error."""
 WHOLE, PLACED, TOUCHED, MOVED = 0, 1, 2, 3
-"""How far an evaluation goes: to the end, to the places of the links, to the contacts, to the velocities."""
-WITHIN = {"touch_half_space": HALF_SPACE, "limit": LIMIT}
-"""Their numbers by name."""
+"""How far an evaluation goes: to the accelerations, to the places of the links, to the forces (those that items apply
+are then in the place of the accelerations), to the velocities."""

@@ -17,18 +17,17 @@ MESH_WORK = 10
 def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """A mesh (surface 2) on a half space or a sphere.
 
-    The integers are the links of both, the number of the springs, whether surface 1 is a half space, and the place of
-    the pair among those of the force; the numbers centre, normal and radius of surface 1 in its link, centre and radius
+    The integers are the links of both, the place of the pair among those of the force, the number of the springs, and
+    whether surface 1 is a half space; the numbers centre, normal and radius of surface 1 in its link, centre and radius
     of the ball around the mesh in its link, and c, us, ud, uv, vt of the law.
     """
     i = at(s, item)
-    one, two, count, is_plane = i[OWN], i[OWN + 1], i[OWN + 2], i[OWN + 3]
+    one, two, count, is_plane = i[OWN], i[OWN + 1], i[OWN + 3], i[OWN + 4]
     p, found = at(x, i[NUMBERS]), at(w, i[RECORD])
     for k in range(MESH_WORK):
         found[k] = 0.0
     ox, oy, oz = station(s, w, one, p[0], p[1], p[2])
     ax, ay, az = station(s, w, two, p[7], p[8], p[9])
-    found[3], found[4], found[5] = ax, ay, az
     nx, ny, nz = direction(s, w, one, p[3], p[4], p[5])
     gx, gy, gz = ax - ox, ay - oy, az - oz
     if is_plane:
@@ -62,14 +61,35 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
             ty += qy
             tz += qz
             energy += stored
-    found[0], found[1], found[2] = fx, fy, fz
+    load_mesh(s, w, item, ax, ay, az, fx, fy, fz, tx, ty, tz, energy)
+    return FINE
+
+
+def load_mesh(
+    s: Ints,
+    w: Floats,
+    item: int,
+    ax: float,
+    ay: float,
+    az: float,
+    fx: float,
+    fy: float,
+    fz: float,
+    tx: float,
+    ty: float,
+    tz: float,
+    energy: float,
+) -> None:
+    """Apply a force at a point, and a torque, to the mesh, and their opposites to surface 1; fill both records."""
+    i = at(s, item)
+    one, two, found = i[OWN], i[OWN + 1], at(w, i[RECORD])
+    found[0], found[1], found[2], found[3], found[4], found[5] = fx, fy, fz, ax, ay, az
     found[6], found[7], found[8], found[9] = tx, ty, tz, energy
     push(s, w, two, ax, ay, az, fx, fy, fz)
     turn(s, w, two, tx, ty, tz)
     push(s, w, one, ax, ay, az, -fx, -fy, -fz)
     turn(s, w, one, -tx, -ty, -tz)
-    contact = at(w, s[s[s[CONTACT_AT] + i[FIRST_CONTACT] + i[OWN + 4]] + RECORD])
+    contact = at(w, s[s[s[CONTACT_AT] + i[FIRST_CONTACT] + i[OWN + 2]] + RECORD])
     contact[0], contact[1], contact[2], contact[3], contact[4], contact[5] = fx, fy, fz, ax, ay, az
     if fx != 0.0 or fy != 0.0 or fz != 0.0:
         contact[DEPTH_OF] = 1.0
-    return FINE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,9 +16,9 @@ from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyDrift, 
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.items import ForceElement, Placement, Places
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
-from osimlite.simulation.kernels.items import Item, Placement, Places, items_of
 from osimlite.simulation.kernels.merson import STATES
 from osimlite.simulation.kernels.pack_bonds import bond_of, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
@@ -38,20 +38,22 @@ class Packed:
     """A mechanism with its forces, packed.
 
     Attributes:
-        structure: the integers, with no addresses of laws in them.
+        structure: the integers, with no addresses in them.
         numbers: the numbers.
-        laws: names of those that must be there.
+        laws: names of the engine's own functions that must be there.
+        kernels: by place in the structure what computes an item: a name, or a function of Python.
         order: place in the mechanism of the coordinate of each degree of freedom.
         placements: of every body its link (-1 for ground) and its frame in that.
-        items: of every force element what it became, with the places of their records in the work vector.
+        items: of every force element the records of its items in the work vector, as place and length.
     """
 
     structure: Ints
     numbers: Floats
     laws: tuple[str, ...]
+    kernels: dict[int, str | Callable[..., None]]
     order: tuple[int, ...]
     placements: list[Placement]
-    items: list[list[tuple[Item, int]]]
+    items: list[list[tuple[int, int]]]
 
 
 @dataclass
@@ -100,10 +102,7 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         order += sorted(own & free)
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
-    items = [items_of(element, places) for element in forces.elements]
-    state = StateLayout(mechanism, order, forces.elements)
-    first_states = [state.first_of(element) for element in forces.elements]
-    return _Packer(places, links, ends, items, state.size, first_states).packed(tuple(order))
+    return _Packer(places, links, ends, forces.elements).packed(tuple(order))
 
 
 def _operations(
@@ -195,20 +194,13 @@ class _Packer:
     """Puts everything at its place in the vectors."""
 
     def __init__(
-        self,
-        places: Places,
-        links: list[_Link],
-        ends: list[int],
-        items: list[list[Item]],
-        state_size: int,
-        first_states: list[int],
+        self, places: Places, links: list[_Link], ends: list[int], elements: Sequence[ForceElement]
     ) -> None:
         self.places = places
         self.links = links
         self.ends = ends
-        self.items = items
-        self.state_size = state_size
-        self.first_states = first_states  # place of the first one of each element, -1 without any
+        self.elements = elements
+        self.states = StateLayout(places.mechanism, (), elements).variables
         self.operations = [operation for link in links for operation in link.operations]
         self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
@@ -216,6 +208,7 @@ class _Packer:
         self.entries = 0
         self.balls: dict[tuple[int, ...], int] = {}
         self.laws: list[str] = ["evaluate"]
+        self.kernels: dict[int, str | Callable[..., None]] = {}
 
     def packed(self, order: tuple[int, ...]) -> Packed:
         """Everything."""
@@ -235,12 +228,12 @@ class _Packer:
         self.operation_records()
         self.bond_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
-        ints[at.STATE_SIZE] = self.state_size
+        ints[at.STATE_SIZE] = 2 * size + len(self.states)
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
         ints[at.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
-        return Packed(structure, numbers, laws, order, self.places.placements, found)
+        return Packed(structure, numbers, laws, self.kernels, order, self.places.placements, found)
 
     def room(self, count: int) -> int:
         """Place of some more numbers in the work vector."""
@@ -349,28 +342,30 @@ class _Packer:
             head[place] = self.room(count)
         self.ints[start : start + at.HELD_INTS] = head
 
-    def item_records(self) -> list[list[tuple[Item, int]]]:
+    def item_records(self) -> list[list[tuple[int, int]]]:
         """Write the items; the records of the contacts come first, in their order."""
-        flat = [item for group in self.items for item in group]
-        self.ints[at.CONTACTS] = sum(item.is_contact for item in flat)
+        groups = [element.items(self.places) for element in self.elements]
+        self.ints[at.CONTACTS] = sum(item.is_contact for group in groups for item in group)
         contact = self.ints[at.WORK_CONTACT] = self.room(at.CONTACT_WORK * self.ints[at.CONTACTS])
+        place_of = {id(state): 2 * self.ints[at.FREEDOMS] + number for number, state in enumerate(self.states)}
         records: list[int] = []
         pairs: list[int] = []
-        found: list[list[tuple[Item, int]]] = []
-        for state, group in zip(self.first_states, self.items, strict=True):
+        found: list[list[tuple[int, int]]] = []
+        for element, group in zip(self.elements, groups, strict=True):
             found.append([])
             first = len(pairs)
             for item in group:
                 place = contact + at.CONTACT_WORK * len(pairs) if item.is_contact else self.room(item.room)
-                found[-1].append((item, place))
-                if item.law is None:
-                    continue
+                found[-1].append((place, at.CONTACT_WORK if item.is_contact else item.room))
                 if item.is_contact:
                     pairs.append(len(self.ints))
                 if not item.is_part:
                     records.append(len(self.ints))
-                law = at.WITHIN[item.law] if item.law in at.WITHIN else self.law(item.law)
-                self.ints += [law, len(self.numbers), place, first, *item.ints, *([state] if item.has_state else [])]
+                self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
+                own = list(item.ints)
+                for at_state, state in zip(item.states, element.states, strict=False):
+                    own[at_state] = place_of[id(state)]
+                self.ints += [0, len(self.numbers), place, first, *own]
                 self.numbers += item.numbers
         self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)
         self.ints += records

@@ -23,6 +23,12 @@ laws: dict[int, Law] = {}
 """The laws by address, as Python knows them."""
 
 
+def address(law: Law) -> int:
+    """What stands for the address of a law in Python."""
+    laws[id(law)] = law
+    return id(law)
+
+
 def at(vector: Vector, place: int) -> Vector:
     """The vector from a place on."""
     return vector[place:]

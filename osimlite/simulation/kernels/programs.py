@@ -1,4 +1,4 @@
-"""Forces by formulas: a formula is a list of steps, each of which puts one number into a register."""
+"""Formulas in kernels: a formula is a list of steps, each of which puts one number into a register."""
 
 from __future__ import annotations
 
@@ -31,21 +31,8 @@ from osimlite.forces.formulas import (
     tangent,
     unit_step,
 )
-from osimlite.forces.springs import stretch
-from osimlite.simulation.kernels.layout import FINE, FREEDOMS, NUMBERS, OWN, RECORD
-from osimlite.simulation.kernels.paths import measure, own_numbers, pull
+from osimlite.simulation.elements.formula import Formula
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.springs import (
-    BUSHING_DEVIATIONS,
-    BUSHING_LOADS,
-    BUSHING_RATES,
-    BUSHING_REGISTERS,
-    coordinate,
-    deviate,
-    line,
-    load_bushing,
-    pull_line,
-)
 
 STEPS = (
     "number",
@@ -175,56 +162,20 @@ def of_one(kind: int, a: float) -> float:
     return value
 
 
-def coordinate_formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A force on a coordinate: its record has value, speed, then the registers.
-
-    The integers are the degree of freedom, the count of steps and the steps; the numbers the value of a locked
-    coordinate, and the constants.
-    """
-    i = at(s, item)
-    freedom, p, found = i[OWN], at(x, i[NUMBERS]), at(w, i[RECORD])
-    registers = at(found, 1)
-    registers[0], registers[1] = coordinate(s, y, freedom, p[0])
-    found[0] = compute(at(i, OWN + 2), i[OWN + 1], at(p, 1), registers, 2)
-    if freedom >= 0:
-        f[s[FREEDOMS] + freedom] += found[0]
-    return FINE
+def of_two(one: float, two: float, steps: Ints, constants: Floats, registers: Floats) -> float:
+    """The result of a program of two variables, whose count of steps stands before them."""
+    registers[0], registers[1] = one, two
+    return compute(at(steps, 1), steps[0], constants, registers, 2)
 
 
-def point_formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A tension between two points."""
-    i = at(s, item)
-    p, found = at(x, i[NUMBERS]), at(w, i[RECORD])
-    registers = at(found, 12)
-    registers[0], registers[1] = line(s, w, i[OWN], i[OWN + 1], p, found)
-    tension = compute(at(i, OWN + 3), i[OWN + 2], at(p, 12), registers, 2)
-    pull_line(s, w, i[OWN], i[OWN + 1], p, found, tension)
-    return FINE
-
-
-def path_formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A tension along a path: after those of the path stand resting length and whether a slack one has no stretch."""
-    length, rate = measure(s, x, w, item)
-    i, p, found = at(s, item), own_numbers(s, x, item), at(w, s[item + RECORD])
-    own, registers = at(i, OWN + 1 + i[OWN]), at(found, 3)
-    registers[0], registers[1] = stretch(length, p[0], p[1] > 0.0), rate
-    found[2] = compute(at(own, 1), own[0], at(p, 2), registers, 2)
-    pull(s, x, w, item, found[2])
-    return FINE
-
-
-def bushing_formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A bushing whose loads are formulas of all deviations: after the links stand, for each, place and count of its
-    steps and the place of its constants."""
-    i = at(s, item)
-    p, found = at(x, i[NUMBERS]), at(w, i[RECORD])
-    deviate(s, w, i[OWN], i[OWN + 1], p, found)
-    registers, loads = at(found, BUSHING_REGISTERS), at(found, BUSHING_LOADS)
-    for k in range(6):
-        registers[k] = found[BUSHING_DEVIATIONS + k]
-    for k in range(6):
-        own = at(i, OWN + 2 + 3 * k)
-        value = compute(at(i, OWN + own[0]), own[1], at(p, own[2]), registers, 6)
-        loads[k] = -value - p[24 + k] * found[BUSHING_RATES + k]
-    load_bushing(s, w, i[OWN], i[OWN + 1], p, found)
-    return FINE
+def program(formula: Formula) -> tuple[list[int], list[float]]:
+    """Steps and constants of a formula, as `compute` takes them."""
+    steps: list[int] = []
+    constants: list[float] = []
+    for step in formula.steps:
+        one, two, *_ = *step.arguments, 0, 0
+        if step.law == "number":
+            one = len(constants)
+            constants.append(step.value)
+        steps += STEPS.index(step.law), one, two
+    return steps, constants

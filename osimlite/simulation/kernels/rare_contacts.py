@@ -5,19 +5,18 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
-from osimlite.simulation.kernels.contacts import press, touch_half_space, touch_spheres
+from osimlite.simulation.kernels.contacts import press
 from osimlite.simulation.kernels.layout import (
     CONTACT_AT,
     DEPTH_OF,
     FINE,
     FIRST_CONTACT,
-    HALF_SPACE,
     LAW,
     NUMBERS,
     OWN,
     RECORD,
 )
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
 
 
@@ -127,9 +126,6 @@ def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
 
 def separates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, part: int) -> bool:
     """Compute one contact; whether it touches and does not push."""
-    if s[part + LAW] == HALF_SPACE:
-        touch_half_space(s, x, w, y, f, part)
-    else:
-        touch_spheres(s, x, w, y, f, part)
+    call(s[part + LAW], s, x, w, y, f, part)
     found = at(w, s[part + RECORD])
     return bool(found[DEPTH_OF] > 0.0 and found[0] == 0.0 and found[1] == 0.0 and found[2] == 0.0)

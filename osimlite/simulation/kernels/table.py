@@ -1,7 +1,7 @@
-"""Which laws there are, and which kernels make what pushes out of which element.
+"""Which functions are compiled by themselves and called by their address, by name.
 
-A law is compiled when the first model that has it is made ready, and kept; the evaluation calls it by its address. A
-new kind of force is a law in a module of its own, a line in each of the tables here, and a function that packs it.
+Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; the kernel of
+a kind of force is written from its declaration, and has the name of the module that declares it.
 """
 
 from __future__ import annotations
@@ -26,62 +26,24 @@ LAW_MODULES = {
     "amount_by_one": "functions",
     "amount_by_several": "functions",
     "amount_by_arc": "arcs",
+    "touch_half_space": "contacts",
     "touch_spheres": "contacts",
     "touch_ellipsoid": "rare_contacts",
     "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",
     "touch_mesh": "meshes",
-    "limit_power": "springs",
-    "coordinate_spring": "springs",
-    "point_spring": "springs",
-    "bushing": "springs",
-    "smooth_contact": "springs",
-    "station_contact": "springs",
-    "path_spring": "paths",
-    "ligament": "paths",
-    "blankevoort": "paths",
-    "coordinate_formula": "programs",
-    "point_formula": "programs",
-    "path_formula": "programs",
-    "bushing_formula": "programs",
-    "drive": "drives",
-    "path_drive": "drives",
-    "prescribed": "drives",
 }
-"""The module of each law. The first two are no items: their numbers are those of the laws within the evaluation."""
+"""The module of each of the engine's own."""
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Place of a law's address after `layout.LAWS`."""
 
-PACKERS = {
-    "HuntCrossley": ("pack_contacts", "pack_pairs"),
-    "EllipsoidContact": ("pack_contacts", "pack_pairs"),
-    "ElasticFoundation": ("pack_contacts", "pack_foundation"),
-    "CoordinateLimit": ("pack_contacts", "pack_limit"),
-    "CoordinateSpring": ("pack_springs", "pack_coordinate_spring"),
-    "CoordinateFormula": ("pack_springs", "pack_coordinate_formula"),
-    "PointSpring": ("pack_springs", "pack_point_spring"),
-    "Bushing": ("pack_springs", "pack_bushing"),
-    "StationContact": ("pack_springs", "pack_station_contact"),
-    "SmoothContact": ("pack_springs", "pack_smooth_contact"),
-    "PathSpringElement": ("pack_springs", "pack_path_spring"),
-    "PathFormula": ("pack_springs", "pack_path_formula"),
-    "LigamentElement": ("pack_springs", "pack_ligament"),
-    "Blankevoort": ("pack_springs", "pack_blankevoort"),
-    "PathDrive": ("pack_drives", "pack_path_drive"),
-    "McKibben": ("pack_drives", "pack_path_drive"),
-    "CoordinateDrive": ("pack_drives", "pack_coordinate_drive"),
-    "TorqueDrive": ("pack_drives", "pack_torque_drive"),
-    "PointDrive": ("pack_drives", "pack_point_drive"),
-    "PointToPointDrive": ("pack_drives", "pack_point_to_point_drive"),
-    "IdleActuator": ("pack_drives", "pack_idle"),
-    "Prescribed": ("pack_drives", "pack_prescribed"),
-    "ExternalLoad": ("pack_drives", "pack_external_load"),
-}
-"""Module and function that pack each class of elements."""
-
 
 def law_function(name: str) -> Callable[..., Any]:
-    """The function of a law."""
-    function: Callable[..., Any] = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
+    """The function of a name."""
+    function: Callable[..., Any]
+    if name in LAW_MODULES:
+        function = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
+    else:
+        function = import_module(f"osimlite.simulation.elements.kinds.{name}").KIND.kernel
     return function

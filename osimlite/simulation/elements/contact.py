@@ -1,0 +1,290 @@
+"""Contact between half spaces, spheres and ellipsoids by the law of Hunt and Crossley, in sets of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.forces.hunt_crossley import combine_materials, contact_energy
+from osimlite.multibody.spatial import Array, offset
+from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
+from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.tree import Use
+from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of, triple
+from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.kernels.layout import DEPTH_OF, RADIUS_OF
+from osimlite.simulation.states import StateVariable
+
+if TYPE_CHECKING:
+    from osimlite.simulation.elements.triangle_mesh import TriangleMesh
+
+Material = tuple[float, float, float, float, float]
+"""Stiffness, dissipation, and coefficients of static, dynamic and viscous friction of a surface, as in the model."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSurface:
+    """A half space, a sphere, an ellipsoid or a mesh, fixed to a body (index, -1 for ground).
+
+    Attributes:
+        frame: name of the frame that holds it in the model.
+        center: of the sphere, or a point on the plane, in the body frame (m).
+        radius: of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for a half
+            space.
+        normal: unit vector out of the half space, in the body frame.
+        material: the law's K (Pa), c (s/m), us, ud (1), uv (s/m).
+        radii: half axes of an ellipsoid (m), None for the others.
+        axes: their directions in the body frame, as the columns of a matrix.
+        mesh: the triangles of a mesh, in the body frame.
+    """
+
+    name: str
+    body: int
+    frame: str
+    center: Triple
+    radius: float
+    normal: Triple
+    material: Material
+    radii: Triple | None = None
+    axes: tuple[Triple, Triple, Triple] | None = None
+    mesh: TriangleMesh | None = None
+
+    @property
+    def is_half_space(self) -> bool:
+        """Whether it is a half space."""
+        return self.radius == inf
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPair:
+    """Two surfaces (places in the element) that may touch; of a half space and a sphere, the half space is first.
+
+    k, a, c, us, ud, uv are the effective parameters of the law.
+    """
+
+    first: int
+    second: int
+    effective: tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class PairContact:
+    """Contact of all surfaces of one force on different bodies, in pairs.
+
+    Attributes:
+        vt: transition velocity, m/s.
+        early_return: reproduce Simbody's defect, see `osimlite.forces.hunt_crossley.contact_forces`.
+        records: the surfaces in the order of OpenSim's record.
+    """
+
+    path: str
+    name: str
+    surfaces: tuple[ContactSurface, ...]
+    pairs: tuple[ContactPair, ...]
+    vt: float
+    early_return: bool = False
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """None."""
+        return ()
+
+    def items(self, places: Places) -> list[Item]:
+        """An item for each pair, and what computes them one by one if they depend on one another."""
+        found = []
+        for pair in self.pairs:
+            one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+            links, numbers = self.pair_numbers(pair, places)
+            kernel = "touch_half_space" if one.is_half_space else "touch_spheres"
+            if one.radii or two.radii:
+                kernel = "touch_ellipsoid" if one.is_half_space else "touch_ellipsoids"
+                shapes = (surface for surface in (one, two) if not surface.is_half_space)
+                numbers = (*numbers, *(x for surface in shapes for x in _shape(surface, places)))
+            found.append(Item(kernel, links, numbers, is_contact=True, is_part=self.early_return))
+        if self.early_return:
+            found.append(self._early_return(places))
+        return found
+
+    def pair_numbers(self, pair: ContactPair, places: Places) -> tuple[tuple[int, int], tuple[float, ...]]:
+        """Links and numbers of a pair."""
+        one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+        first, center = places.station(one.body, one.center)
+        second, other = places.station(two.body, two.center)
+        normal, radius = places.direction(one.body, one.normal), 0.0 if one.is_half_space else one.radius
+        return (first, second), (*center, *normal, radius, *other, two.radius, *pair.effective, self.vt)
+
+    def _early_return(self, places: Places) -> Item:
+        """What computes the pairs one by one in Simbody's order."""
+        stations = [places.station(surface.body, surface.center) for surface in self.surfaces]
+        links = (link for link, _ in stations)
+        pairs = (place for pair in self.pairs for place in (pair.first, pair.second))
+        numbers = (
+            x for (_, center), surface in zip(stations, self.surfaces, strict=True) for x in (*center, surface.radius)
+        )
+        ints = len(stations), len(self.pairs), *links, *pairs
+        return Item("early_return", ints, tuple(numbers), room=5 * len(stations))
+
+    def pair_name(self, place: int) -> str:
+        """What to call a pair: the force, and the surfaces if it has more than one pair."""
+        if len(self.pairs) == 1:
+            return self.name
+        pair = self.pairs[place]
+        return f"{self.name} ({self.surfaces[pair.second].name}, {self.surfaces[pair.first].name})"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Force and torque on the frame of each surface."""
+        labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
+        return tuple(f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels)
+
+    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+        """Total force on the body of each surface, and its torque about the body's origin, in ground."""
+        loads: dict[int, list[float]] = {}
+        for pair, record in zip(self.pairs, records, strict=False):
+            if not record[DEPTH_OF] > 0.0:
+                continue
+            fx, fy, fz, px, py, pz = record[:6]
+            tx, ty, tz = self.torque(records, pair)
+            for surface, sign in ((self.surfaces[pair.first], -1.0), (self.surfaces[pair.second], 1.0)):
+                load = loads.setdefault(surface.body, [0.0] * 6)
+                ox, oy, oz = origins[surface.body]
+                x, y, z = px - ox, py - oy, pz - oz
+                torque = tx + y * fz - z * fy, ty + z * fx - x * fz, tz + x * fy - y * fx
+                for axis, part in enumerate((fx, fy, fz, *torque)):
+                    load[axis] += sign * part
+        row: list[float] = []
+        for surface in self.surfaces:
+            row += loads.get(surface.body, [0.0] * 6)
+        return row
+
+    def torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
+        """The torque (N.m) on surface 2 of a contact besides that of the force at its point."""
+        return 0.0, 0.0, 0.0
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Potential energy, J."""
+        return sum(
+            contact_energy(record[DEPTH_OF], record[RADIUS_OF], pair.effective[0])
+            for pair, record in zip(self.pairs, records, strict=False)
+            if record[DEPTH_OF] > 0.0
+        )
+
+
+@dataclass(frozen=True)
+class HuntCrossley(PairContact):
+    """One HuntCrossleyForce on half spaces and spheres."""
+
+
+@dataclass(frozen=True)
+class EllipsoidContact(PairContact):
+    """One HuntCrossleyForce with ellipsoids among its surfaces."""
+
+
+class HuntCrossleyContacts:
+    """The kind of a HuntCrossleyForce."""
+
+    component = HuntCrossleyForce
+
+    @staticmethod
+    def make(builder: ElementBuilder, force: HuntCrossleyForce) -> PairContact:
+        """The element of a HuntCrossleyForce."""
+        surfaces = [surface_of(builder, force, *found) for found in geometries(builder, force)]
+        builder.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
+        pairs = []
+        for first, second in combinations(range(len(surfaces)), 2):
+            a, b = surfaces[first], surfaces[second]
+            if a.body == b.body or (a.is_half_space and b.is_half_space):
+                continue
+            if b.is_half_space:
+                first, second, a, b = second, first, b, a
+            try:
+                pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
+            except ValueError as error:
+                raise ModelError(f"the force '{builder.path(force)}': {error}") from None
+        has_ellipsoid = any(surface.radii for surface in surfaces)
+        early_return = builder.early_return and len(pairs) > 1
+        if has_ellipsoid and early_return:
+            raise builder.unsupported(force, " with an ellipsoid, and Simbody's early return")
+        kind = EllipsoidContact if has_ellipsoid else HuntCrossley
+        path, vt = builder.path(force), force.transition_velocity
+        return kind(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
+
+
+def _shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
+    """Axes in the link, and half axes, of an ellipsoid or a sphere."""
+    if surface.radii is None or surface.axes is None:
+        return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, surface.radius, surface.radius, surface.radius
+    axes = (places.direction(surface.body, axis) for axis in zip(*surface.axes, strict=True))
+    return (*(x for axis in axes for x in axis), *surface.radii)
+
+
+def geometries(builder: ElementBuilder, force: Any) -> Iterator[tuple[ContactGeometry, Material]]:
+    """The contact geometry of a force in its order, with the material that the force gives it.
+
+    Raises:
+        ModelError: the model has no geometry of a name.
+    """
+    for parameters in force.contact_parameters.objects:
+        material = (
+            parameters.stiffness,
+            parameters.dissipation,
+            parameters.static_friction,
+            parameters.dynamic_friction,
+            parameters.viscous_friction,
+        )
+        spec = type(parameters).field_specs()["geometry"]
+        for position, word in enumerate(parameters.geometry):
+            use = Use(parameters, builder.tree.owner_of(parameters), spec, word, position)
+            geometry: Any = builder.tree.resolve(use).target
+            if geometry is None:
+                text = word if isinstance(word, str) else word.name
+                raise ModelError(
+                    f"the force '{builder.path(force)}' names the contact geometry '{text}', which the model does not "
+                    "have; run 'osimlite validate'"
+                )
+            yield geometry, material
+
+
+def surface_of(builder: ElementBuilder, force: Any, geometry: Any, material: Material) -> ContactSurface:
+    """A contact geometry as the surface of a contact.
+
+    Raises:
+        UnsupportedError: it is no half space, sphere or ellipsoid, or not fixed to a body.
+    """
+    if not isinstance(geometry, ContactHalfSpace | ContactSphere | ContactEllipsoid):
+        raise builder.unsupported(force, f" on the {kind_of(geometry)} '{builder.path(geometry)}'")
+    frame, body, placed = place_of(builder, geometry)
+    center, axes = placed[:3, 3], placed[:3, :3]
+    # The half space is x > 0 of the geometry's own frame.
+    normal = -axes[:, 0]
+    if isinstance(geometry, ContactEllipsoid):
+        builder.check(geometry, (*center, *axes.ravel(), *geometry.radii))
+        if not min(geometry.radii) > 0.0:
+            raise ModelError(f"the radii of '{builder.path(geometry)}' are not all positive; give such")
+        place, still = triple(center), (0.0, 0.0, 0.0)
+        rows = triple(axes[0]), triple(axes[1]), triple(axes[2])
+        longest, radii = max(geometry.radii), triple(geometry.radii)
+        return ContactSurface(geometry.name, body, frame, place, longest, still, material, radii, rows)
+    radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
+    builder.check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
+    return ContactSurface(geometry.name, body, frame, triple(center), radius, triple(normal), material)
+
+
+def place_of(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, int, Array]:
+    """Name of the frame that holds a contact geometry, its body, and the geometry's own frame (4, 4) in the body.
+
+    Raises:
+        UnsupportedError: it is not fixed to a body.
+    """
+    frame = builder.tree.target(geometry, "socket_frame", geometry.socket_frame)
+    if not isinstance(frame, PhysicalFrame):
+        raise UnsupportedError(
+            f"the contact geometry '{builder.path(geometry)}' on the {kind_of(frame)} '{builder.path(frame)}'"
+        )
+    body, placed = builder.placement(frame)
+    return frame.name, body, placed @ offset(geometry.location, geometry.orientation)

@@ -1,0 +1,207 @@
+"""Measured forces: the ExternalLoads of a document and the columns of their data file.
+
+As in OpenSim, a column is a natural cubic spline through all its values, straight lines if there are two or three, and
+a constant if there is one. Before the first time and after the last, a spline goes on straight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.document.part import read_object
+from osimlite.errors import DocumentError, ModelError
+from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
+from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.mechanism import FramePlacement, Mechanism
+from osimlite.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.multibody.spatial import Array
+from osimlite.schema.prescribed import ExternalForce, ExternalLoads
+from osimlite.simulation.elements.geometries.load import Load
+from osimlite.simulation.elements.integral import value_of
+from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.storage import StoTable, read_beside
+from osimlite.text import listed, nearest
+
+if TYPE_CHECKING:
+    from osimlite.simulation.elements.gather import ElementBuilder
+
+Functions = tuple[Function, Function, Function]
+
+
+def external_load(path: str, name: str, load: Load) -> DeclaredForce:
+    """The force element of a load."""
+    return DeclaredForce(ExternalForce, path, name, load, ())
+
+
+def generalized(load: Load, state: Kinematics, time: float) -> Array:
+    """What a load does to each of the n generalized speeds."""
+
+    def placed(frame: FramePlacement) -> Array:
+        return state.transform(frame.body) @ frame.transform
+
+    def vector(functions: Sequence[Function]) -> Array:
+        return np.array([value_of(function, time) for function in functions] or (0.0, 0.0, 0.0))
+
+    turn = placed(load.force_frame)[:3, :3]
+    there = placed(load.point_frame if load.point else load.frame)
+    point = there[:3, 3] + there[:3, :3] @ vector(load.point)
+    station = state.rotations[load.frame.body].T @ (point - state.origins[load.frame.body])
+    wrench = np.concatenate((turn @ vector(load.torque), turn @ vector(load.force)))
+    return np.asarray(wrench @ state.point_jacobian(load.frame.body, station))
+
+
+def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[DeclaredForce, ...]:
+    """The loads of a document of ExternalLoads, those whose `appliesForce` is false left out.
+
+    Its data file is looked for beside it, then from the folder that the program runs in.
+
+    Raises:
+        DocumentError: a file is missing, or holds something else.
+        ModelError: the mechanism has no body of a name, or the data file no three columns for an identifier.
+    """
+    loads, file = read_object(path, ExternalLoads), str(path)
+    columns = _data(loads, Path(path).parent, file)
+    forces = (force for force in loads.objects if force.appliesForce)
+    return tuple(
+        external_load(f"/componentset/{loads.name}/{force.name}", force.name, _load(mechanism, force, columns, file))
+        for force in forces
+    )
+
+
+def load_in_model(builder: ElementBuilder, force: ExternalForce) -> Load:
+    """The load of an ExternalForce in a set of ExternalLoads that is part of the model.
+
+    Raises:
+        UnsupportedError: it stands elsewhere, where OpenSim finds no data for it either.
+    """
+    loads: Any = builder.tree.parent_of(force)
+    if not isinstance(loads, ExternalLoads):
+        raise builder.unsupported(force, " outside of ExternalLoads, so that it has no data file")
+    columns = _data(loads, builder.folder, builder.path(loads))
+    return _load(builder.mechanism, force, columns, builder.path(loads))
+
+
+def _data(loads: ExternalLoads, folder: Path, file: str) -> _Columns:
+    """The data of some loads, looked for in a folder first."""
+    name = loads.datafile.strip()
+    if not name:
+        raise ModelError("it names no data file; give it a <datafile>", file=file)
+    return _Columns(read_beside(folder, name))
+
+
+def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str) -> Load:
+    identifiers = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in ("force", "point", "torque")}
+    given = {
+        what: columns.three(identifier, f"the {what}_identifier of '{force.name}'", file)
+        for what, identifier in identifiers.items()
+        if identifier not in ("", "Unassigned")
+    }
+    if not given.keys() & {"force", "torque"}:
+        raise ModelError(f"'{force.name}' has no force_identifier and no torque_identifier; give it one", file=file)
+    if "point" in given and "force" not in given:
+        raise ModelError(f"'{force.name}' has a point_identifier without a force_identifier; leave it out", file=file)
+
+    def place(field: str) -> FramePlacement:
+        return _place(mechanism, getattr(force, field), f"the {field} of '{force.name}'", file)
+
+    start = f"{force.applied_to_body}_{force.name}"
+    return Load(
+        (f"{start}_F", f"{start}_p", f"{start}_T"),
+        place("applied_to_body"),
+        place("force_expressed_in_body"),
+        place("point_expressed_in_body"),
+        given.get("force", ()),
+        given.get("point", ()),
+        given.get("torque", ()),
+    )
+
+
+def _place(mechanism: Mechanism, value: Any, what: str, file: str) -> FramePlacement:
+    """The frame of a path or the name of a body."""
+    name = value if isinstance(value, str) else value.name
+    try:
+        return mechanism.placement(f"/{name.lstrip('./')}" if "/" in name else name)
+    except ModelError as error:
+        raise ModelError(f"{what} is '{name}', but {error.message}", file=file) from None
+
+
+class _Columns:
+    """The columns of a table as functions of time, each made once."""
+
+    def __init__(self, table: StoTable) -> None:
+        self.table = table
+        late = np.flatnonzero(np.diff(table.times) <= 0.0)
+        if len(late):
+            before, after = table.times[late[0] : late[0] + 2]
+            raise DocumentError(f"the time {after:g} does not come after {before:g}; sort the rows", file=table.file)
+        if not len(table.times):
+            raise DocumentError("the table has no rows", file=table.file)
+        self._made: dict[str, Functions] = {}
+
+    def three(self, identifier: str, what: str, file: str) -> Functions:
+        """The functions of the three columns whose labels begin with an identifier."""
+        if identifier not in self._made:
+            labels = self.table.columns
+            places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
+            if len(places) != 3:
+                raise ModelError(f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file)
+            rows = self.table.rows[:, places]
+            bad = np.argwhere(~np.isfinite(rows))
+            if len(bad):
+                row, column = bad[0]
+                raise DocumentError(
+                    f"'{labels[places[column]]}' is {rows[row, column]} at {self.table.times[row]:g} s; fill the gap",
+                    file=self.table.file,
+                )
+            x, y, z = functions_of(self.table.times, rows)
+            self._made[identifier] = x, y, z
+        return self._made[identifier]
+
+    def _why(self, identifier: str, places: Sequence[int]) -> str:
+        file, labels = self.table.file, self.table.columns
+        if places:
+            found = listed([labels[place] for place in places])
+            return f"exactly three columns must begin so, and '{file}' has {found}"
+        starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
+        near = nearest(identifier, starts) or nearest(identifier, labels)
+        hint = f"; did you mean '{near}'?" if near else f"; its columns are {listed(labels)}"
+        return f"no column of '{file}' begins so{hint}"
+
+
+def functions_of(times: Array, columns: Array) -> list[Function]:
+    """Columns (n, k) at times (n,) that increase, as functions of time."""
+    if len(times) == 1:
+        return [Constant(float(value)) for value in columns[0]]
+    if len(times) < 4:
+        return [PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()]
+    return natural_cubics(times, columns)
+
+
+def natural_cubics(times: Array, columns: Array) -> list[Function]:
+    """The k natural cubic splines through columns (n, k) over times (n,), n > 2, straight before and after."""
+    widths = np.diff(times)[:, None]
+    slopes = np.diff(columns, axis=0) / widths
+    # The second derivatives, which vanish at both ends, solve a tridiagonal system: forwards and back.
+    seconds = np.zeros_like(columns)
+    factor = np.zeros(len(times))
+    for k in range(1, len(times) - 1):
+        left, right = widths[k - 1, 0], widths[k, 0]
+        pivot = 2.0 * (left + right) - left * factor[k - 1]
+        factor[k] = right / pivot
+        seconds[k] = (6.0 * (slopes[k] - slopes[k - 1]) - left * seconds[k - 1]) / pivot
+    for k in range(len(times) - 2, 0, -1):
+        seconds[k] -= factor[k] * seconds[k + 1]
+    firsts = slopes - widths * (2.0 * seconds[:-1] + seconds[1:]) / 6.0
+    last = slopes[-1] + widths[-1] * seconds[-2] / 6.0
+    thirds = np.diff(seconds, axis=0) / widths
+    inner = np.stack([columns[:-1], firsts, seconds[:-1] / 2.0, thirds / 6.0], axis=2)
+    ends = np.zeros((2, *inner.shape[1:]))
+    ends[0, :, 0], ends[0, :, 1], ends[1, :, 0], ends[1, :, 1] = columns[0], firsts[0], columns[-1], last
+    pieces = np.concatenate([ends[:1], inner, ends[1:]])
+    # The piece before the first time counts from there too.
+    knots = np.append(times[0], times)
+    return [PiecewisePolynomial(knots, np.ascontiguousarray(pieces[:, k])) for k in range(columns.shape[1])]

@@ -1,0 +1,272 @@
+"""Contact of meshes by an elastic foundation, in sets of pairs.
+
+As in Simbody, meshes touch half spaces, spheres and each other; nothing else touches in such a force. The springs of
+two meshes are both taken, each with half its area.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from osimlite.errors import ModelError
+from osimlite.forces.elastic_foundation import spring_in_half_space, spring_in_sphere, spring_load
+from osimlite.multibody.spatial import Array, transform
+from osimlite.schema.contact import ContactMesh
+from osimlite.schema.contact_forces import ElasticFoundationForce
+from osimlite.simulation.elements.contact import (
+    ContactPair,
+    ContactSurface,
+    Material,
+    PairContact,
+    geometries,
+    place_of,
+    surface_of,
+)
+from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.items import Item, Placement, Places
+from osimlite.simulation.elements.triangle_mesh import TriangleMesh
+from osimlite.simulation.kernels.layout import LINK_WORK, RECORD, WORK_LINK
+from osimlite.simulation.kernels.meshes import MESH_WORK, load_mesh
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.points import station, turning, velocity
+
+Load = tuple[float, float, float, float, float, float, float]
+"""Force (N), torque about a point (N·m), and energy (J)."""
+
+Moving = tuple[float, float, float, float, float, float]
+"""Velocity of a point (m/s), and angular velocity (1/s)."""
+
+
+@dataclass(frozen=True)
+class ElasticFoundation(PairContact):
+    """One ElasticFoundationForce; surface 2 of each pair is a mesh, surface 1 may be one."""
+
+    component: ClassVar = ElasticFoundationForce
+
+    @classmethod
+    def make(cls, builder: ElementBuilder, force: ElasticFoundationForce) -> ElasticFoundation:
+        """The element of a force.
+
+        Raises:
+            ModelError: a mesh file is missing or not a closed surface.
+            OsimliteError: a mesh file cannot be read.
+            UnsupportedError: a surface is neither a mesh, a half space, a sphere nor an ellipsoid.
+        """
+        surfaces = []
+        for geometry, material in geometries(builder, force):
+            if isinstance(geometry, ContactMesh):
+                surfaces.append(_mesh_surface(builder, force, geometry, material))
+            else:
+                surfaces.append(surface_of(builder, force, geometry, material))
+        builder.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
+        pairs = []
+        for first, second in combinations(range(len(surfaces)), 2):
+            if surfaces[second].mesh is None:
+                first, second = second, first
+            a, b = surfaces[first], surfaces[second]
+            if a.body != b.body and b.mesh is not None and a.radii is None:
+                pairs.append(ContactPair(first, second, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        return cls(builder.path(force), force.name, tuple(surfaces), tuple(pairs), force.transition_velocity)
+
+    def items(self, places: Places) -> list[Item]:
+        """The contacts, and after them what computes each."""
+        contacts = [Item("touch_mesh", is_contact=True, is_part=True) for _ in self.pairs]
+        return contacts + [self._pair(number, pair, places) for number, pair in enumerate(self.pairs)]
+
+    def _pair(self, number: int, pair: ContactPair, places: Places) -> Item:
+        one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+        links, numbers = self.pair_numbers(pair, places)
+        assert two.mesh is not None
+        ints = *links, number, len(two.mesh.areas), int(one.is_half_space)
+        if one.mesh is not None:
+            touching = _Meshes(Springs(one, two, self.vt), places.placement(one.body), places.placement(two.body))
+            return Item("", ints, numbers, room=MESH_WORK, python=touching)
+        stiffness, *material = two.material
+        middles = (places.station(two.body, middle)[1] for middle in two.mesh.centroids.tolist())
+        springs = (
+            x
+            for area, middle in zip(two.mesh.areas.tolist(), middles, strict=True)
+            for x in (stiffness * area, *middle)
+        )
+        return Item("touch_mesh", ints, (*numbers[:11], *material, self.vt, *springs), room=MESH_WORK)
+
+    def torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
+        """What turns surface 2 besides the force."""
+        return records[len(self.pairs) + self.pairs.index(pair)][6:9]
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Potential energy, J."""
+        return sum(record[9] for record in records[len(self.pairs) :])
+
+
+def _mesh_surface(builder: ElementBuilder, force: Any, geometry: ContactMesh, material: Material) -> ContactSurface:
+    frame, body, placed = place_of(builder, geometry)
+    builder.check(geometry, placed.ravel().tolist())
+    if not geometry.filename:
+        raise ModelError(f"the contact mesh '{builder.path(geometry)}' names no file; give it one")
+    if material[0] < 0.0:
+        raise ModelError(f"the force '{builder.path(force)}': a contact stiffness must not be negative")
+    mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).moved(placed)
+    center, still = triple(mesh.center), (0.0, 0.0, 0.0)
+    return ContactSurface(geometry.name, body, frame, center, mesh.radius, still, material, mesh=mesh)
+
+
+class Springs:
+    """The springs of a pair of surfaces.
+
+    Args:
+        one: surface 1.
+        two: surface 2, a mesh.
+        vt: transition velocity, m/s.
+    """
+
+    def __init__(self, one: ContactSurface, two: ContactSurface, vt: float) -> None:
+        assert two.mesh is not None
+        self.one, self.two, self.mesh, self.vt = one, two, two.mesh, vt
+        meshes = [surface for surface in (one, two) if surface.mesh is not None]
+        # Of two meshes, each has half the area.
+        self._stiffness = [
+            surface.material[0] / len(meshes) * surface.mesh.areas for surface in meshes if surface.mesh is not None
+        ]
+
+    def load(self, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
+        """The load on surface 2.
+
+        Args:
+            one: where the body of surface 1 is, in ground.
+            two: where the body of surface 2 is.
+            about: point for the torque, m.
+            motion: velocity at that point (m/s) and angular velocity (1/s) of surface 1 relative to surface 2.
+        """
+        if self.one.mesh is not None:
+            return self._between_meshes(self.one.mesh, one, two, about, motion)
+        middles = two.points(self.mesh.centroids)
+        place = one.points(np.array(self.one.center))
+        find: Callable[..., tuple[float, float, float, float]]
+        if self.one.is_half_space:
+            normal = one.turn @ self.one.normal
+            inside = (middles - place) @ normal < 0.0
+            find = partial(spring_in_half_space, *triple(place), *triple(normal))
+        else:
+            inside = np.linalg.norm(middles - place, axis=1) <= self.one.radius
+            find = partial(spring_in_sphere, *triple(place), self.one.radius)
+        acting = []
+        for k, x, y, z in np.column_stack((self._stiffness[-1], middles))[inside].tolist():
+            depth, *end = find(x, y, z)
+            if depth > 0.0:
+                acting.append((k, x, y, z, *end))
+        return self._sum(self.two, acting, about, motion)
+
+    def _between_meshes(self, first: TriangleMesh, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
+        own = _inside(self._stiffness[0], first, one, self.mesh, two)
+        others = _inside(self._stiffness[1], self.mesh, two, first, one)
+        # As in Simbody, a mesh that is wholly within another does not touch it.
+        if not (own or others) or not (
+            any(
+                mesh.is_one_piece and 0 < len(found) < len(mesh.triangles)
+                for mesh, found in ((first, own), (self.mesh, others))
+            )
+            or first.crosses(self.mesh.moved(one.inverse_times(two)))
+        ):
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        vx, vy, vz, wx, wy, wz = motion
+        *first_load, first_energy = self._sum(self.one, own, about, (-vx, -vy, -vz, -wx, -wy, -wz))
+        *second_load, second_energy = self._sum(self.two, others, about, motion)
+        fx, fy, fz, tx, ty, tz = (b - a for a, b in zip(first_load, second_load, strict=True))
+        return fx, fy, fz, tx, ty, tz, first_energy + second_energy
+
+    def _sum(self, surface: ContactSurface, acting: Iterable[Sequence[float]], about: Triple, motion: Moving) -> Load:
+        """The load on a mesh of the springs that act: stiffness, middle and end of each."""
+        _, c, us, ud, uv = surface.material
+        ax, ay, az = about
+        vx, vy, vz, wx, wy, wz = motion
+        vt, law = self.vt, spring_load
+        fx = fy = fz = tx = ty = tz = energy = 0.0
+        for k, x, y, z, ex, ey, ez in acting:
+            px, py, pz, qx, qy, qz, stored = law(
+                k, c, us, ud, uv, vt, x, y, z, ex, ey, ez, ax, ay, az, vx, vy, vz, wx, wy, wz
+            )
+            fx += px
+            fy += py
+            fz += pz
+            tx += qx
+            ty += qy
+            tz += qz
+            energy += stored
+        return fx, fy, fz, tx, ty, tz, energy
+
+
+class Pose(NamedTuple):
+    """Where a body is in ground: rotation (3, 3) and origin (3,)."""
+
+    turn: Array
+    origin: Array
+
+    def points(self, stations: Array) -> Array:
+        """Stations of the body, in ground."""
+        return stations @ self.turn.T + self.origin
+
+    def inverse_times(self, other: Pose) -> Array:
+        """The other pose seen from this one, as a matrix (4, 4)."""
+        return transform(self.turn.T @ other.turn, self.turn.T @ (other.origin - self.origin))
+
+
+def _inside(stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose) -> list[list[float]]:
+    """The springs of a mesh that are inside another: stiffness, middle and end of each."""
+    middles = own.points(mesh.centroids)
+    seen = (middles - theirs.origin) @ theirs.turn
+    boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)
+    places = np.flatnonzero(boxed)
+    if not len(places):
+        return []
+    ends, inside = other.nearest(seen[places])
+    acting = places[inside]
+    found: list[list[float]] = np.column_stack(
+        (stiffness[acting], middles[acting], theirs.points(ends[inside]))
+    ).tolist()
+    return found
+
+
+@dataclass(frozen=True)
+class _Meshes:
+    """What computes the contact of two meshes, in Python.
+
+    Attributes:
+        springs: of the meshes.
+        one: where the body of surface 1 is in its link.
+        two: where the body of surface 2 is in its link.
+    """
+
+    springs: Springs
+    one: Placement
+    two: Placement
+
+    def __call__(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> None:
+        """Compute and apply the contact."""
+        w[s[item + RECORD] :][:MESH_WORK] = 0.0
+        one, two = self._pose(s, w, self.one), self._pose(s, w, self.two)
+        first, second = self.springs.one, self.springs.two
+        about, other = two.points(np.array(second.center)), one.points(np.array(first.center))
+        ax, ay, az = about.tolist()
+        load: Sequence[float] = [0.0] * 7
+        if np.linalg.norm(about - other) < first.radius + second.radius:
+            u, v = (np.array(velocity(s, w, link, ax, ay, az)) for link in (self.one.link, self.two.link))
+            a, b = (np.array(turning(s, w, link)) for link in (self.one.link, self.two.link))
+            (vx, vy, vz), (wx, wy, wz) = (u - v).tolist(), (a - b).tolist()
+            load = self.springs.load(one, two, (ax, ay, az), (vx, vy, vz, wx, wy, wz))
+        load_mesh(s, w, item, ax, ay, az, *load)
+
+    @staticmethod
+    def _pose(s: Ints, w: Floats, placement: Placement) -> Pose:
+        link, frame = placement
+        if link < 0:
+            return Pose(frame[:3, :3], frame[:3, 3])
+        start = s[WORK_LINK] + LINK_WORK * link
+        x, y, z = frame[:3, 3].tolist()
+        return Pose(w[start : start + 9].reshape(3, 3) @ frame[:3, :3], np.array(station(s, w, link, x, y, z)))

@@ -1,0 +1,198 @@
+"""The forces of a model, gathered as force elements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.multibody.functions import Function
+from osimlite.multibody.mechanism import FramePlacement, Mechanism
+from osimlite.multibody.schema_functions import numeric
+from osimlite.schema.base import Unknown
+from osimlite.schema.forces import Force
+from osimlite.schema.model import Model
+from osimlite.text import listed
+
+if TYPE_CHECKING:
+    from osimlite.meshes.folders import MeshFolders
+    from osimlite.simulation.elements.items import ForceElement
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Forces:
+    """The force elements of a model in its order, and the forces that were left out, as ``path (class)``."""
+
+    elements: tuple[ForceElement, ...]
+    skipped: tuple[str, ...] = ()
+
+
+def force_elements(
+    model: Model,
+    mechanism: Mechanism,
+    *,
+    skip_unsupported: bool = False,
+    simbody_early_return: bool = False,
+    external_loads: str | Path | None = None,
+    folder: str | Path | None = None,
+) -> Forces:
+    """Gather the forces of a model.
+
+    Forces whose `appliesForce` is false are no forces.
+
+    Args:
+        model: whose forces.
+        mechanism: of the same model.
+        skip_unsupported: leave out what cannot be computed instead of raising.
+        simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
+        external_loads: a file of ExternalLoads, which follow the forces of the model.
+        folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
+
+    Raises:
+        UnsupportedError: some forces cannot be computed; the message names them.
+        ModelError: a force names what does not exist, or a parameter has no meaning.
+        OsimliteError: a file that is named cannot be read.
+    """
+    builder = ElementBuilder(model, mechanism, simbody_early_return, Path(folder or "."))
+    elements: list[ForceElement] = []
+    skipped: list[str] = []
+    for component in builder.forces():
+        try:
+            elements.append(builder.element(component))
+        except UnsupportedError as error:
+            skipped.append(error.message)
+    if skipped and not skip_unsupported:
+        raise UnsupportedError(
+            f"osimlite cannot compute {listed(by_class(skipped))}; switch off their appliesForce, "
+            "or leave them out with --skip-unsupported (skip_unsupported=True); docs/forces.md says what is computed"
+        )
+    if external_loads is not None:
+        from osimlite.simulation.elements.external_loads import read_external_loads
+
+        elements += read_external_loads(mechanism, external_loads)
+    return Forces(tuple(elements), tuple(skipped))
+
+
+FEW = 4
+"""So many forces that are left out are told of one by one."""
+
+
+def by_class(skipped: Sequence[str]) -> list[str]:
+    """What was left out for people: one by one if it is few, else how many of each class."""
+    if len(skipped) <= FEW:
+        return list(skipped)
+    groups: dict[str, list[str]] = {}
+    for words in skipped:
+        path, _, kind = words.partition(" (")
+        groups.setdefault(kind.removesuffix(")") or "others", []).append(path)
+    return [f"{len(paths)} of {kind}: {listed(paths, most=2)}" for kind, paths in groups.items()]
+
+
+class ElementBuilder:
+    """Makes the elements of one model.
+
+    Attributes:
+        tree: of the model.
+        mechanism: of the model.
+        folder: of the model's file.
+    """
+
+    def __init__(self, model: Model, mechanism: Mechanism, early_return: bool, folder: Path) -> None:
+        self.model = model
+        self.tree = model.tree()
+        self.mechanism = mechanism
+        self.early_return = early_return
+        self.folder = folder
+
+    @property
+    def mesh_folders(self) -> MeshFolders:
+        """Where mesh files may be."""
+        from osimlite.meshes.folders import MeshFolders
+
+        return MeshFolders(self.folder)
+
+    def forces(self) -> Iterator[Any]:
+        """Yield everything that applies a force, known or not."""
+        for component in self.tree.components:
+            unknown = isinstance(component, Unknown) and self.tree.parent_of(component) is self.model.force_set
+            if unknown or (isinstance(component, Force) and component.appliesForce):
+                yield component
+
+    def element(self, force: Any) -> ForceElement:
+        """The element of a force; UnsupportedError, with its path and class for a message, if there is none."""
+        from osimlite.simulation.elements.kind import kind_of_class
+
+        kind = kind_of_class(type(force))
+        if kind is None:
+            raise self.unsupported(force)
+        element: ForceElement = kind.make(self, force)
+        return element
+
+    # ---------------------------------------------------------------------------------- what kinds ask for
+    def coordinate(self, force: Any) -> int:
+        """Place of the coordinate that a force names."""
+        if not force.coordinate:
+            raise ModelError(f"the force '{self.path(force)}' names no coordinate; give it one")
+        return self.mechanism.coordinate_index(self.path(self.target(force, "coordinate", force.coordinate)))
+
+    def target(self, holder: Any, field: str, value: Any) -> Any:
+        """The component that a property refers to.
+
+        Raises:
+            ModelError: there is none.
+        """
+        if not value:
+            raise ModelError(f"the '{field}' of '{self.path(holder)}' is empty; give it a name")
+        found = self.tree.target(holder, field, value)
+        if found is None:
+            raise ModelError(
+                f"the '{field}' of '{self.path(holder)}' names '{value}', which the model does not have; "
+                "run 'osimlite validate'"
+            )
+        return found
+
+    def placement(self, frame: Any) -> FramePlacement:
+        """Body and place in it of a frame."""
+        return self.mechanism.placement(self.path(frame))
+
+    def function(self, force: Any, function: Any, what: str) -> Function:
+        """A function of one number that belongs to a force.
+
+        Raises:
+            UnsupportedError: it is none that osimlite knows.
+        """
+        try:
+            return numeric(function, 1, f"'{what}' of '{self.path(force)}'")
+        except UnsupportedError:
+            raise self.unsupported(force, f" with the {kind_of(function)} '{what}'") from None
+
+    def check(self, component: Any, numbers: Sequence[float]) -> None:
+        """Raise a ModelError if a number is not finite."""
+        if not all(isfinite(number) for number in numbers):
+            raise ModelError(f"'{self.path(component)}' has a parameter that is not a finite number; give one")
+
+    def unsupported(self, force: Any, why: str = "") -> UnsupportedError:
+        """The error that names a force that cannot be computed."""
+        return UnsupportedError(f"'{self.path(force)}' ({kind_of(force)}{why})")
+
+    def path(self, component: Any) -> str:
+        """Absolute path of a component."""
+        path = self.tree.path_of(component)
+        assert path is not None
+        return path
+
+
+def kind_of(component: Any) -> str:
+    """Name of a component's class."""
+    return getattr(component, "class_name", "") or type(component).__name__
+
+
+def triple(values: Any) -> Triple:
+    """Three numbers."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z

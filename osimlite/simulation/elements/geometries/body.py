@@ -1,0 +1,185 @@
+"""Bodies that are pushed at points or turned: the geometries of actuators and of contact with the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite.errors import ModelError
+from osimlite.multibody.mechanism import GROUND
+from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.items import Places
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.points import direction, push, station, turn, velocity
+
+
+def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:
+    """Turn a body about an axis, and another the other way."""
+    ax, ay, az = direction(s, w, g[2], gp[0], gp[1], gp[2])
+    turn(s, w, g[0], torque * ax, torque * ay, torque * az)
+    turn(s, w, g[1], -torque * ax, -torque * ay, -torque * az)
+
+
+def push_along(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
+    """Push a body along a direction at a point."""
+    px, py, pz = station(s, w, g[1], gp[0], gp[1], gp[2])
+    ax, ay, az = direction(s, w, g[2], gp[3], gp[4], gp[5])
+    push(s, w, g[0], px, py, pz, force * ax, force * ay, force * az)
+
+
+def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
+    """Push two points apart."""
+    ax, ay, az = station(s, w, g[2], gp[0], gp[1], gp[2])
+    bx, by, bz = station(s, w, g[3], gp[3], gp[4], gp[5])
+    dx, dy, dz = ax - bx, ay - by, az - bz
+    length = sqrt(dx * dx + dy * dy + dz * dz)
+    size = force / length if length > 0.0 else 0.0
+    push(s, w, g[0], ax, ay, az, size * dx, size * dy, size * dz)
+    push(s, w, g[1], ax, ay, az, -size * dx, -size * dy, -size * dz)
+
+
+def station_motion(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
+    """Height of a station in ground, and its velocity; its place goes into the record."""
+    room[0], room[1], room[2] = station(s, w, g[0], gp[0], gp[1], gp[2])
+    vx, vy, vz = velocity(s, w, g[0], room[0], room[1], room[2])
+    return room[1], vx, vy, vz
+
+
+def push_station(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
+    """Push a station; the record then has the force."""
+    push(s, w, g[0], room[0], room[1], room[2], fx, fy, fz)
+    room[0], room[1], room[2] = fx, fy, fz
+
+
+class Anchors(NamedTuple):
+    """What an actuator acts on.
+
+    Attributes:
+        bodies: that it pushes or turns.
+        vectors: points (m) and directions, each with the body that it is fixed in.
+    """
+
+    bodies: tuple[int, ...]
+    points: tuple[tuple[int, Triple], ...] = ()
+    directions: tuple[tuple[int, Triple], ...] = ()
+
+
+class OnBodies(Geometry):
+    """Bodies, and points and directions that are fixed in them or in ground."""
+
+    def pack(self, place: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Links of the bodies, then of what is fixed; the vectors in these."""
+        links, numbers = [places.placement(body).link for body in place.bodies], []
+        for body, point in place.points:
+            link, found = places.station(body, point)
+            links.append(link)
+            numbers += found
+        for body, along in place.directions:
+            links.append(places.placement(body).link)
+            numbers += places.direction(body, along)
+        return links, numbers
+
+
+class AboutAxis(OnBodies):
+    """An axis of ground or of the first of two bodies: the output `torque` (N.m) turns the first against the other."""
+
+    after = ("turn_bodies(s, w, g, gp, torque)",)
+    calls = (turn_bodies,)
+
+    def read(self, builder: ElementBuilder, force: Any) -> Anchors:
+        """The bodies and the axis of an actuator."""
+        (one, placed), (two, _) = (
+            builder.placement(builder.target(force, field, getattr(force, field))) for field in ("bodyA", "bodyB")
+        )
+        axis = _unit(builder, force, force.axis)
+        if not force.torque_is_global:
+            axis = triple(placed[:3, :3] @ axis)
+        return Anchors((one, two), (), ((GROUND if force.torque_is_global else one, axis),))
+
+
+class AtPoint(OnBodies):
+    """A point of a body and a direction: the output `force` (N) pushes the body."""
+
+    after = ("push_along(s, w, g, gp, force)",)
+    calls = (push_along,)
+
+    def read(self, builder: ElementBuilder, force: Any) -> Anchors:
+        """The body, the point and the direction of an actuator, the last two fixed in ground or in the body."""
+        body = builder.placement(builder.target(force, "body", force.body)).body
+        builder.check(force, force.point)
+        point = GROUND if force.point_is_global else body, triple(force.point)
+        along = GROUND if force.force_is_global else body, _unit(builder, force, force.direction)
+        return Anchors((body,), (point,), (along,))
+
+
+class ApartPoints(OnBodies):
+    """Two points: the output `force` (N) pushes them apart."""
+
+    after = ("push_apart(s, w, g, gp, force)",)
+    calls = (push_apart,)
+
+    def read(self, builder: ElementBuilder, force: Any) -> Anchors:
+        """The bodies and the points of an actuator, fixed in ground or in the bodies."""
+        one, two = (
+            builder.placement(builder.target(force, field, getattr(force, field))).body for field in ("bodyA", "bodyB")
+        )
+        builder.check(force, (*force.pointA, *force.pointB))
+        first, second = (GROUND, GROUND) if force.points_are_global else (one, two)
+        return Anchors((one, two), ((first, triple(force.pointA)), (second, triple(force.pointB))))
+
+
+class NamedStation(NamedTuple):
+    """A station of the model: its name, its body, and where it is there (m)."""
+
+    name: str
+    body: int
+    point: Triple
+
+
+class AtStation(Geometry):
+    """A station: its height y (m) and velocity in ground; the outputs fx, fy, fz (N) push it."""
+
+    inputs = ("height", "vx", "vy", "vz")
+    before = ("height, vx, vy, vz = station_motion(s, w, g, gp, room)",)
+    after = ("push_station(s, w, g, room, fx, fy, fz)",)
+    calls = (station_motion, push_station)
+
+    def read(self, builder: ElementBuilder, force: Any) -> NamedStation:
+        """The station that a force names."""
+        found = builder.target(force, "socket_station", force.socket_station)
+        body, placed = builder.placement(builder.target(found, "socket_parent_frame", found.socket_parent_frame))
+        point = triple(placed[:3, :3] @ found.location + placed[:3, 3])
+        builder.check(force, point)
+        return NamedStation(found.name, body, point)
+
+    def pack(self, place: NamedStation, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Link and point."""
+        link, point = places.station(place.body, place.point)
+        return (link,), point
+
+    def room(self, place: Any) -> int:
+        """The force."""
+        return 3
+
+    def columns(self, force: Any) -> tuple[str, ...]:
+        """The force on the station, in ground."""
+        return tuple(f"{force.name}.{force.place.name}.force.{axis}" for axis in "XYZ")
+
+    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+        """It."""
+        return list(record[:3])
+
+
+AXIS, POINT, POINTS, STATION = AboutAxis(), AtPoint(), ApartPoints(), AtStation()
+
+
+def _unit(builder: ElementBuilder, force: Any, along: Sequence[float]) -> Triple:
+    builder.check(force, along)
+    size = float(np.linalg.norm(along))
+    if size == 0.0:
+        raise ModelError(f"'{builder.path(force)}' has a direction of length 0; give it one")
+    return triple(np.array(along) / size)

@@ -1,0 +1,39 @@
+"""A generalized force on a coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.items import Places
+from osimlite.simulation.kernels.layout import FREEDOMS
+from osimlite.simulation.kernels.pointers import Floats, Ints
+
+
+def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
+    """Value and speed of a coordinate, which has its own value if it is locked."""
+    if g[0] < 0:
+        return gp[0], 0.0
+    return y[g[0]], y[s[FREEDOMS] + g[0]]
+
+
+class OnCoordinate(Geometry):
+    """A coordinate: value q (rad, m) and speed u; the output `force` is conjugate to the speed."""
+
+    inputs = ("q", "u")
+    before = ("q, u = coordinate(s, y, g, gp)",)
+    after = ("if g[0] >= 0:", "    f[s[FREEDOMS] + g[0]] += force")
+    calls = (coordinate,)
+
+    def read(self, builder: ElementBuilder, force: Any) -> int:
+        """Place of the coordinate in the mechanism."""
+        return builder.coordinate(force)
+
+    def pack(self, place: int, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Its degree of freedom (-1 if it is locked), and its value then."""
+        return (places.freedom(place),), (places.locked_value(place),)
+
+
+COORDINATE = OnCoordinate()

@@ -1,0 +1,60 @@
+"""What a geometry is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.items import Places
+
+
+class Geometry:
+    """Where a force acts.
+
+    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part of the record; `s`,
+    `x`, `w`, `y`, `f` are as every kernel has them.
+
+    Attributes:
+        inputs: what it computes for a law, in the code before the law is called.
+        before: that code.
+        after: the code that applies the outputs of the law.
+        calls: the functions that both call.
+    """
+
+    inputs: ClassVar[tuple[str, ...]] = ()
+    before: ClassVar[tuple[str, ...]] = ()
+    after: ClassVar[tuple[str, ...]] = ()
+    calls: ClassVar[tuple[Callable[..., Any], ...]] = ()
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """What the code calls, by name."""
+        return {function.__name__: function for function in self.calls}
+
+    def read(self, builder: ElementBuilder, force: Any) -> Any:
+        """Where a component acts, in terms of the mechanism.
+
+        Raises:
+            ModelError: it names what does not exist.
+            UnsupportedError: it acts where osimlite cannot compute it.
+        """
+
+    def pack(self, place: Any, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Its integers and numbers, for what `read` gave."""
+        return (), ()
+
+    def room(self, place: Any) -> int:
+        """How many numbers of the record it fills."""
+        return 0
+
+    def columns(self, force: Any) -> tuple[str, ...]:
+        """Labels of its record, where a kind has none of its own."""
+        return ()
+
+    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+        """One row of these columns, from its part of the record."""
+        return []
+
+
+NOTHING = Geometry()
+"""Where a force acts that does nothing."""

@@ -1,0 +1,126 @@
+"""A force at a point of a body, and a torque, that are functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from osimlite.multibody.functions import Function
+from osimlite.multibody.mechanism import FramePlacement
+from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.items import Places
+from osimlite.simulation.kernels.functions import table_of_one, value_at
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.points import direction, push, station, turn
+
+FRAME = 12
+"""Numbers of a frame: rotation by columns and origin in its link."""
+
+
+def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) -> None:
+    """Apply force and torque; the record has the force, the point in the first frame, and the torque.
+
+    The integers are the links of three frames (where the force acts, along whose axes force and torque are, in which
+    the point is), whether there are a force, a point and a torque, and the places of nine tables.
+    """
+    for k in range(9):
+        if g[3 + k // 3] > 0:
+            room[k], _, _ = value_at(at(gp, g[6 + k]), t)
+    link = g[0]
+    if g[3] > 0:
+        turn_vector(s, w, g[1], at(gp, FRAME), room)
+        px, py, pz = station(s, w, link, gp[9], gp[10], gp[11])
+        if g[4] > 0:
+            ox, oy, oz = px, py, pz
+            turn_vector(s, w, g[2], at(gp, 2 * FRAME), at(room, 3))
+            px, py, pz = station(s, w, g[2], gp[33], gp[34], gp[35])
+            px, py, pz = px + room[3], py + room[4], pz + room[5]
+            ax, ay, az = px - ox, py - oy, pz - oz
+            for k in range(3):
+                ex, ey, ez = direction(s, w, link, gp[3 * k], gp[3 * k + 1], gp[3 * k + 2])
+                room[3 + k] = ex * ax + ey * ay + ez * az
+        push(s, w, link, px, py, pz, room[0], room[1], room[2])
+    if g[5] > 0:
+        turn_vector(s, w, g[1], at(gp, FRAME), at(room, 6))
+        turn(s, w, link, room[6], room[7], room[8])
+
+
+def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, vector: Floats) -> None:
+    """From along the axes of a frame, which are given by columns in its link, to along those of ground."""
+    a, b, c = vector[0], vector[1], vector[2]
+    vector[0], vector[1], vector[2] = direction(
+        s,
+        w,
+        link,
+        axes[0] * a + axes[3] * b + axes[6] * c,
+        axes[1] * a + axes[4] * b + axes[7] * c,
+        axes[2] * a + axes[5] * b + axes[8] * c,
+    )
+
+
+class Load(NamedTuple):
+    """What acts, and where.
+
+    Attributes:
+        labels: of force, point and torque in the record; without the axes.
+        frame: where the force acts, if no point is given, and in which the point is recorded.
+        force_frame: along whose axes force and torque are.
+        point_frame: in which the point is.
+        force: three functions of time (N), or none; `point` (m) and `torque` (N.m) likewise.
+    """
+
+    labels: tuple[str, str, str]
+    frame: FramePlacement
+    force_frame: FramePlacement
+    point_frame: FramePlacement
+    force: Sequence[Function]
+    point: Sequence[Function]
+    torque: Sequence[Function]
+
+    @property
+    def groups(self) -> tuple[Sequence[Function], Sequence[Function], Sequence[Function]]:
+        """Force, point and torque; a point without a force is none."""
+        return self.force, self.point if self.force else (), self.torque
+
+
+class GivenLoad(Geometry):
+    """A load that is given; there is no law."""
+
+    after = ("apply_load(s, w, g, gp, room, w[TIME])",)
+    calls = (apply_load,)
+
+    def pack(self, place: Load, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Frames, and tables of the functions."""
+        links: list[int] = []
+        numbers: list[float] = []
+        for body, frame in (place.frame, place.force_frame, place.point_frame):
+            link, of_body = places.placement(body)
+            placed = of_body @ frame
+            links.append(link)
+            numbers += [*placed[:3, :3].T.ravel().tolist(), *placed[:3, 3].tolist()]
+        tables: list[int] = []
+        for functions in place.groups:
+            for function in functions or (None, None, None):
+                tables.append(len(numbers))
+                if function is not None:
+                    numbers += table_of_one(function, f"a function of {place.labels[0]}")
+        return (*links, *(int(bool(functions)) for functions in place.groups), *tables), numbers
+
+    def room(self, place: Any) -> int:
+        """Force, point, torque."""
+        return 9
+
+    def columns(self, force: Any) -> tuple[str, ...]:
+        """Force and torque in ground, and the point in the frame that they act on; those that there are."""
+        load: Load = force.place
+        given = zip(load.labels, load.groups, strict=True)
+        return tuple(f"{label}{axis}" for label, functions in given if functions for axis in "xyz")
+
+    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+        """They."""
+        groups = force.place.groups
+        return [record[3 * number + axis] for number in range(3) if groups[number] for axis in range(3)]
+
+
+class PrescribedLoad(GivenLoad):
+    """The load of a component that has its functions itself."""

@@ -1,0 +1,99 @@
+"""A sphere and a half space that touch smoothly, at any distance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import ModelError
+from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.simulation.elements.contact import ContactSurface, surface_of
+from osimlite.simulation.elements.gather import ElementBuilder, kind_of
+from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.items import Places
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.points import direction, push, station, velocity
+
+NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def sphere_depth(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float, float]:
+    """Depth, radius and normal; the point of contact goes into the record."""
+    ox, oy, oz = station(s, w, g[0], gp[0], gp[1], gp[2])
+    nx, ny, nz = direction(s, w, g[0], gp[3], gp[4], gp[5])
+    cx, cy, cz = station(s, w, g[1], gp[6], gp[7], gp[8])
+    d = gp[9] - ((cx - ox) * nx + (cy - oy) * ny + (cz - oz) * nz)
+    # Half the depth is either surface's.
+    below = 0.5 * d - gp[9]
+    room[3], room[4], room[5] = cx + below * nx, cy + below * ny, cz + below * nz
+    return d, gp[9], nx, ny, nz
+
+
+def approach(s: Ints, w: Floats, g: Ints, room: Floats) -> tuple[float, float, float]:
+    """Velocity of the half space relative to the sphere, at the point of contact."""
+    ux, uy, uz = velocity(s, w, g[0], room[3], room[4], room[5])
+    vx, vy, vz = velocity(s, w, g[1], room[3], room[4], room[5])
+    return ux - vx, uy - vy, uz - vz
+
+
+def push_both(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
+    """Push the sphere and, the other way, the half space at the point of contact; the force goes into the record."""
+    room[0], room[1], room[2] = fx, fy, fz
+    push(s, w, g[1], room[3], room[4], room[5], fx, fy, fz)
+    push(s, w, g[0], room[3], room[4], room[5], -fx, -fy, -fz)
+
+
+class SphereOnPlane(Geometry):
+    """A half space and a sphere: depth and radius (m), normal, and velocity of the half space relative to the sphere.
+
+    The outputs fx, fy, fz (N) push the sphere.
+    """
+
+    inputs = ("d", "radius", "nx", "ny", "nz", "vx", "vy", "vz")
+    before = ("d, radius, nx, ny, nz = sphere_depth(s, w, g, gp, room)", "vx, vy, vz = approach(s, w, g, room)")
+    after = ("push_both(s, w, g, room, fx, fy, fz)",)
+    calls = (sphere_depth, approach, push_both)
+
+    def read(self, builder: ElementBuilder, force: Any) -> tuple[ContactSurface, ContactSurface]:
+        """The half space and the sphere that a force names."""
+        surfaces = []
+        for field, wanted in (("socket_half_space", ContactHalfSpace), ("socket_sphere", ContactSphere)):
+            geometry = builder.target(force, field, getattr(force, field))
+            if not isinstance(geometry, wanted):
+                raise ModelError(
+                    f"the '{field}' of '{builder.path(force)}' is a {kind_of(geometry)}; name a {wanted.__name__}"
+                )
+            surfaces.append(surface_of(builder, force, geometry, NO_MATERIAL))
+        return surfaces[0], surfaces[1]
+
+    def pack(
+        self, place: tuple[ContactSurface, ContactSurface], places: Places
+    ) -> tuple[Sequence[int], Sequence[float]]:
+        """Links; a point of the plane and its normal, centre and radius of the sphere, each in its link."""
+        one, two = place
+        first, on_plane = places.station(one.body, one.center)
+        second, center = places.station(two.body, two.center)
+        return (first, second), (*on_plane, *places.direction(one.body, one.normal), *center, two.radius)
+
+    def room(self, place: Any) -> int:
+        """Force and point."""
+        return 6
+
+    def columns(self, force: Any) -> tuple[str, ...]:
+        """Force and torque on the body of the sphere, then on that of the half space."""
+        labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
+        return tuple(f"{force.name}.{surface}.{label}" for surface in ("Sphere", "HalfSpace") for label in labels)
+
+    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+        """Forces, and torques about the origins of the bodies, in ground."""
+        half_space, sphere = force.place
+        pushed, point = np.array(record[:3], dtype=float), np.array(record[3:6], dtype=float)
+        row: list[float] = []
+        for sign, body in ((1.0, sphere.body), (-1.0, half_space.body)):
+            row += [*(sign * pushed).tolist(), *np.cross(point - np.array(origins[body]), sign * pushed).tolist()]
+        return row
+
+
+SPHERE_ON_PLANE = SphereOnPlane()

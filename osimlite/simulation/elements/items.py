@@ -1,0 +1,115 @@
+"""What a force element is to the kernels: items, each with a kernel, integers, numbers and a record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.states import StateVariable
+
+
+class Placement(NamedTuple):
+    """The link that a body belongs to (-1 for ground), and the body's frame (4, 4) in it."""
+
+    link: int
+    frame: Array
+
+
+@dataclass(frozen=True)
+class Item:
+    """One item.
+
+    Attributes:
+        kernel: name of what computes it, see :func:`osimlite.simulation.kernels.table.law_function`.
+        ints: of its own.
+        numbers: of its own.
+        room: length of its record, if it is not that of a contact.
+        is_contact: whether its record is that of a contact.
+        is_part: whether another item of the element calls its kernel.
+        states: places among its integers where those of its element's states in y are put, in their order.
+        python: what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays.
+    """
+
+    kernel: str = ""
+    ints: tuple[int, ...] = ()
+    numbers: tuple[float, ...] = ()
+    room: int = 0
+    is_contact: bool = False
+    is_part: bool = False
+    states: tuple[int, ...] = ()
+    python: Callable[..., None] | None = None
+
+
+class ForceElement(Protocol):
+    """Anything that pushes bodies or coordinates."""
+
+    @property
+    def path(self) -> str:
+        """Absolute path of the component."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """Its auxiliary states."""
+
+    def items(self, places: Places) -> list[Item]:
+        """What the kernels compute."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Labels of what :meth:`report` gives, as OpenSim's ForceReporter has them."""
+
+    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+        """One row of the columns.
+
+        Args:
+            records: of its items after an evaluation.
+            origins: origin of each body in ground, m; ground's own last.
+        """
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Potential energy, J."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where coordinates and bodies are.
+
+    Attributes:
+        mechanism: of the model.
+        freedoms: degree of freedom of each coordinate that is free.
+        placements: of the bodies.
+    """
+
+    mechanism: Mechanism
+    freedoms: Mapping[int, int]
+    placements: list[Placement]
+
+    def freedom(self, coordinate: int) -> int:
+        """Degree of freedom of a coordinate, -1 if it is locked."""
+        return self.freedoms.get(coordinate, -1)
+
+    def locked_value(self, coordinate: int) -> float:
+        """Value that a coordinate has if it is locked."""
+        return float(self.mechanism.coordinates[coordinate].default_value)
+
+    def placement(self, body: int) -> Placement:
+        """Link and frame of a body, or of ground."""
+        return self.placements[body] if body != GROUND else Placement(GROUND, np.eye(4))
+
+    def station(self, body: int, point: Sequence[float]) -> tuple[int, tuple[float, ...]]:
+        """Link of a body, and a point of the body in the link."""
+        link, frame = self.placement(body)
+        return link, tuple((frame[:3, :3] @ np.array(point) + frame[:3, 3]).tolist())
+
+    def direction(self, body: int, vector: Sequence[float]) -> tuple[float, ...]:
+        """A direction of a body in its link."""
+        return tuple((self.placement(body).frame[:3, :3] @ np.array(vector)).tolist())

@@ -1,0 +1,42 @@
+"""Springs and dampers that act once a coordinate has left its limits."""
+
+from osimlite.forces.coordinate_limit import limit_constants, limit_dissipation, limit_energy, limit_force
+from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.geometries.coordinate import COORDINATE
+from osimlite.simulation.elements.kind import Kind, State
+from osimlite.simulation.elements.parameters import Numbers
+
+
+def limit(
+    q: float, u: float, Ku: float, qu: float, Kl: float, ql: float, D: float, t: float
+) -> tuple[float, float, float]:
+    """Force, power that the damper takes up, energy."""
+    if ql <= q <= qu:
+        return 0.0, 0.0, 0.0
+    force = limit_force(q, u, Ku, qu, Kl, ql, D, t)
+    return force, limit_dissipation(q, u, qu, ql, D, t), limit_energy(q, Ku, qu, Kl, ql, t)
+
+
+def _constants(builder: ElementBuilder, force: CoordinateLimitForce) -> tuple[float, ...]:
+    coordinate = builder.mechanism.coordinates[builder.coordinate(force)]
+    return limit_constants(
+        force.upper_stiffness,
+        force.upper_limit,
+        force.lower_stiffness,
+        force.lower_limit,
+        force.damping,
+        force.transition,
+        coordinate.motion_type == "rotational",
+    )
+
+
+KIND = Kind(
+    CoordinateLimitForce,
+    COORDINATE,
+    limit,
+    outputs=("force", "dissipatedEnergy_rate", "energy"),
+    parameters=(Numbers(6, _constants),),
+    states=(State("dissipatedEnergy", exists=lambda force: force.compute_dissipation_energy, given=False),),
+    columns={"": "force", ".PotentialEnergy": "energy"},
+)

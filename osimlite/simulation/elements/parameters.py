@@ -1,0 +1,295 @@
+"""What a law is given of a component: numbers, curves, formulas, the control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from osimlite.errors import ModelError
+from osimlite.multibody.functions import Function
+from osimlite.simulation.elements.controls import control_functions
+from osimlite.simulation.elements.formula import Formula
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.kernels.functions import table_of_one, value_at
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.programs import program
+
+
+class Tail:
+    """What stands behind the parts of fixed length of an item.
+
+    Args:
+        ints: place of the first integer, from the item's record on.
+        numbers: place of the first number, from the item's numbers on.
+        room: place of the first number of the record.
+    """
+
+    def __init__(self, ints: int, numbers: int, room: int) -> None:
+        self._first = ints, numbers
+        self.ints: list[int] = []
+        self.numbers: list[float] = []
+        self.room = room
+
+    def put_ints(self, ints: Sequence[int]) -> int:
+        """Add integers; returns their place."""
+        self.ints += ints
+        return self._first[0] + len(self.ints) - len(ints)
+
+    def put_numbers(self, numbers: Sequence[float]) -> int:
+        """Add numbers; returns their place."""
+        self.numbers += numbers
+        return self._first[1] + len(self.numbers) - len(numbers)
+
+    def put_room(self, count: int) -> int:
+        """Make room in the record; returns its place."""
+        self.room += count
+        return self.room - count
+
+
+class Parameter(Protocol):
+    """Something that a law is given of a component.
+
+    Attributes:
+        size: how many numbers of fixed place it takes.
+        heads: how many integers that say where something of variable length is.
+    """
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def heads(self) -> int: ...
+
+    def read(self, builder: ElementBuilder, force: Any) -> Any:
+        """Its value, from a component."""
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """What the law is called with; `head` is the place of its integers, `number` that of its numbers."""
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """What the arguments call."""
+
+    def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Its integers and numbers; what is of variable length goes into the tail."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A property that is a number, or a yes or no that the law is given as 1 or 0.
+
+    Attributes:
+        name: of the property.
+        accepts: whether a number will do.
+        needs: what is said of one that does not, after "the <name> of '<path>' ".
+    """
+
+    name: str
+    accepts: Callable[[float], bool] = lambda value: True
+    needs: str = ""
+    size = 1
+    heads = 0
+
+    def read(self, builder: ElementBuilder, force: Any) -> float:
+        """The number."""
+        value = float(getattr(force, self.name))
+        builder.check(force, (value,))
+        if not self.accepts(value):
+            raise ModelError(f"the {self.name} of '{builder.path(force)}' {self.needs}")
+        return value
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """It."""
+        return [f"p[{number}]"]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """None."""
+        return {}
+
+    def pack(self, value: float, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """It."""
+        return (), (value,)
+
+
+def positive(name: str) -> Number:
+    """A property that is a positive number."""
+    return Number(name, lambda value: value > 0.0, "is not positive; give it one that is")
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Several numbers that are computed together.
+
+    Attributes:
+        size: how many.
+        of: from a component and the builder.
+    """
+
+    size: int
+    of: Callable[[ElementBuilder, Any], Sequence[float]]
+    heads = 0
+
+    def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+        """The numbers."""
+        values = tuple(float(value) for value in self.of(builder, force))
+        builder.check(force, values)
+        return values
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """They, one by one."""
+        return [f"p[{number + k}]" for k in range(self.size)]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """None."""
+        return {}
+
+    def pack(self, value: Sequence[float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """They."""
+        return (), value
+
+
+@dataclass(frozen=True)
+class Vector(Numbers):
+    """Several numbers, of which the law is given the place."""
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """Where they begin."""
+        return [f"at(p, {number})"]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A property that is a function of one number; the law is given its table, for `value_at`."""
+
+    name: str
+    size = 0
+    heads = 1
+
+    def read(self, builder: ElementBuilder, force: Any) -> Function:
+        """The function."""
+        return builder.function(force, getattr(force, self.name), self.name)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """Its table."""
+        return [f"at(p, i[{head}])"]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """None."""
+        return {}
+
+    def pack(self, value: Function, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Place of the table."""
+        return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A property that is a formula; the law is given its steps, constants and registers, for `compute`.
+
+    Attributes:
+        name: of the property.
+        variables: that it may name.
+    """
+
+    name: str
+    variables: tuple[str, ...]
+    size = 0
+    heads = 3
+
+    def read(self, builder: ElementBuilder, force: Any) -> Formula:
+        """The formula."""
+        where = f"the {self.name} of '{builder.path(force)}'"
+        return Formula.parse(getattr(force, self.name), self.variables, where)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """Steps, constants, registers."""
+        return [f"at(i, i[{head}])", f"at(p, i[{head + 1}])", f"at(found, i[{head + 2}])"]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """None."""
+        return {}
+
+    def pack(self, value: Formula, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Places of steps (their count first), constants and registers."""
+        steps, constants = program(value)
+        count = len(steps) // 3
+        registers = tail.put_room(len(self.variables) + count)
+        return (tail.put_ints((count, *steps)), tail.put_numbers(constants), registers), ()
+
+
+@dataclass(frozen=True)
+class Expressions:
+    """Properties that are formulas in the same variables.
+
+    The law is given the steps of each, with their count and the place of its constants before them; the numbers that
+    these places count from; and the registers that they share.
+
+    Attributes:
+        names: of the properties.
+        variables: that they may name.
+    """
+
+    names: tuple[str, ...]
+    variables: tuple[str, ...]
+    size = 0
+    heads = 2
+
+    def read(self, builder: ElementBuilder, force: Any) -> tuple[Formula, ...]:
+        """The formulas."""
+        return tuple(Expression(name, self.variables).read(builder, force) for name in self.names)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """Steps, numbers, registers."""
+        return [f"at(i, i[{head}])", "p", f"at(found, i[{head + 1}])"]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """None."""
+        return {}
+
+    def pack(self, value: Sequence[Formula], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Places of the steps and of the registers."""
+        ints: list[int] = []
+        most = 0
+        for formula in value:
+            steps, constants = program(formula)
+            ints += (len(steps) // 3, tail.put_numbers(constants), *steps)
+            most = max(most, len(steps) // 3)
+        return (tail.put_ints(ints), tail.put_room(len(self.variables) + most)), ()
+
+
+@dataclass(frozen=True)
+class _Control:
+    """What the controllers of the model set: the sum of some functions of time."""
+
+    size = 0
+    heads = 1
+
+    def read(self, builder: ElementBuilder, force: Any) -> tuple[Function, ...]:
+        """The functions."""
+        return control_functions(builder, force)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """The control."""
+        return [f"control(at(i, i[{head}]), p, w[TIME])"]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """What sums up."""
+        return {"control": control}
+
+    def pack(self, value: Sequence[Function], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Place of the count of the functions, which the places of their tables follow."""
+        tables = [tail.put_numbers(table_of_one(function, f"a control of {where}")) for function in value]
+        return (tail.put_ints((len(tables), *tables)),), ()
+
+
+CONTROL = _Control()
+
+
+def control(tables: Ints, p: Floats, t: float) -> float:
+    """The sum of some functions of time, whose count stands before the places of their tables."""
+    total = 0.0
+    for k in range(tables[0]):
+        value, _, _ = value_at(at(p, tables[1 + k]), t)
+        total += value
+    return total
+

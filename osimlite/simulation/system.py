@@ -1,0 +1,196 @@
+"""A mechanism with its forces, evaluated stage by stage; every engine has its forces from here.
+
+The stages are those of Simbody: where the links are (position), how they move (velocity), what is applied to them
+(force), how they accelerate. What an evaluation finds stays in the work vector that reports read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import SimulationError
+from osimlite.multibody.constraints import Lock
+from osimlite.multibody.dynamics import massless
+from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.elements.items import ForceElement
+from osimlite.simulation.engines.linking import Program, bound
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.states import StateLayout
+
+
+class System:
+    """A mechanism and its forces, laid out for the kernels.
+
+    Args:
+        mechanism: what moves.
+        forces: what pushes it, besides gravity.
+        order: place in the mechanism of each coordinate of the state; the order of the kernels if left out.
+
+    Attributes:
+        structure: what is connected to what, integers; equal for models that differ in numbers only.
+        numbers: all numbers in one vector.
+        program: the structure with the addresses of what it calls.
+        order: of the coordinates of the state.
+        state: what the numbers of a state are.
+        placements: link of each body (-1 for ground), and the body's frame in it.
+        contacts: names of the contacts, by number.
+        columns: labels of the force records.
+        loads: after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N,
+            in ground) of contact i if it does.
+
+    Raises:
+        UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
+    """
+
+    def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int] | None = None) -> None:
+        packed = pack(mechanism, forces)
+        self.mechanism, self.forces = mechanism, forces
+        self.structure, self.numbers, self.placements = packed.structure, packed.numbers, packed.placements
+        self.order = packed.order if order is None else tuple(order)
+        self.state = StateLayout(mechanism, self.order, forces.elements)
+        contacts = [element for element in forces.elements if isinstance(element, PairContact)]
+        self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
+        self.columns = tuple(label for element in forces.elements for label in element.columns)
+        self.loads: list[Any] = [None] * len(self.contacts) + [0]
+        self.program = Program(packed)
+        self._items, self._packed_order = packed.items, packed.order
+        self._w = np.zeros(self.structure[layout.WORK_SIZE])
+        self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
+        self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
+        self._y, self._f = np.zeros(self.state.size), np.zeros(self.state.size)
+        self._evaluate = bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
+        self._into, self._from = self._orders(packed.order)
+
+    def _rows(self, start: int, count: int, size: int) -> Floats:
+        first, rows = self.structure[start], self.structure[count]
+        return self._w[first : first + size * rows].reshape(rows, size)
+
+    def _orders(self, packed: Sequence[int]) -> tuple[Any, Any]:
+        """Where the numbers of a state come from for the kernels, and for the state; a slice is the quickest."""
+        n = len(self.order)
+        places = [self.order.index(place) for place in packed]
+        if places == list(range(n)):
+            return slice(None), slice(None)
+        both = [*places, *(n + place for place in places), *range(2 * n, self.state.size)]
+        return np.array(both), np.argsort(both)
+
+    # ------------------------------------------------------------------------------------------- evaluation
+    def realize(self, t: float, y: Sequence[float], stage: int) -> int:
+        """Evaluate a state (y,) up to a stage; returns what the kernels say.
+
+        Raises:
+            OsimliteError: the state has a wrong length, or a part in Python has raised.
+        """
+        if len(y) != len(self._y):
+            raise self.state.wrong_length(len(y))
+        self._w[layout.TIME] = t
+        self._y[:] = y if type(self._into) is slice else np.array(y)[self._into]
+        status = self._evaluate(stage)
+        if status == layout.FAILED:
+            raise self.program.failures.pop()
+        return status
+
+    def found(self) -> list[float]:
+        """The derivative (y,) of the state; after the stage of forces, generalized forces in the place of udot."""
+        row: list[float] = self._f[self._from].tolist()
+        return row
+
+    def applied(self, t: float, y: Sequence[float]) -> list[float]:
+        """The derivative (y,) at a state, with the applied generalized forces (n,) in the place of udot.
+
+        They are conjugate to the generalized speeds; gravity is not among them.
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined there.
+        """
+        status = self.realize(t, y, layout.TOUCHED)
+        if status != layout.FINE:
+            raise self.refusal(status, t, y)
+        self.note_loads(self._pairs[:, :3])
+        return self.found()
+
+    def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
+        """The error for what the kernels say of a state."""
+        if not np.isfinite(np.array(y)).all():
+            return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
+        if status == layout.SINGULAR_RATES:
+            try:
+                self.mechanism.rate_matrix(self.state.values(y))
+            except SimulationError as error:
+                return error
+        if status == layout.SINGULAR_MASS and not all(isinstance(item, Lock) for item in self.mechanism.constraints):
+            try:
+                self.mechanism.acceleration(self.state.values(y), self.state.speeds(y), time=t)
+            except SimulationError as error:
+                return error
+        elif status == layout.SINGULAR_MASS:
+            return massless(self.mechanism.coordinates[self._packed_order[int(self._f[0])]].name)
+        return SimulationError("the motion cannot be computed any further; ask for more accuracy")
+
+    # ---------------------------------------------------------------------------------------------- reports
+    def touching(self, t: float, y: Sequence[float]) -> int:
+        """The bits of the contacts that touch; sets `loads`."""
+        self.applied(t, y)
+        return int(self.loads[-1])
+
+    def force_records(self, t: float, y: Sequence[float]) -> list[float]:
+        """One number for each of the columns."""
+        self.applied(t, y)
+        origins = [self._origin(body) for body in range(len(self.placements))] + [(0.0, 0.0, 0.0)]
+        return [value for element, records in self._records() for value in element.report(records, origins)]
+
+    def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
+        """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
+        self.applied(t, y)
+        kinetic, gravity = self._mechanical()
+        for (link, frame), body in zip(self.placements, self.mechanism.bodies, strict=True):
+            if link == GROUND:
+                center = frame[:3, :3] @ body.mass_properties.center + frame[:3, 3]
+                gravity -= body.mass_properties.mass * float(self.mechanism.gravity @ center)
+        return kinetic, float(gravity), float(sum(element.energy(records) for element, records in self._records()))
+
+    def _mechanical(self) -> tuple[float, float]:
+        """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
+        w, links = self._links, len(self._links)
+        inertia = self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + 10 * links].reshape(links, 10)
+        rotations, velocity = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 6]
+        position, origin = (w[:, place : place + 3] for place in (layout.POSITION, layout.ORIGIN))
+        turning, arms = velocity[:, :3], position - origin + (rotations @ inertia[:, 1:4, None])[:, :, 0]
+        v = velocity[:, 3:] + np.cross(turning, arms)
+        own = (turning[:, None, :] @ rotations)[:, 0]
+        moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
+        spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
+        kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
+        return kinetic, -float(inertia[:, 0] @ (arms + origin) @ self.mechanism.gravity)
+
+    def _records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
+        """Each element with the records of its items, after an evaluation."""
+        work = self._w.tolist()
+        for element, items in zip(self.forces.elements, self._items, strict=True):
+            yield element, [work[place : place + room] for place, room in items]
+
+    def _origin(self, body: int) -> tuple[float, float, float]:
+        link, frame = self.placements[body]
+        x, y, z = frame[:3, 3].tolist()
+        if link == GROUND:
+            return x, y, z
+        here = self._links[link]
+        place = here[layout.POSITION : layout.POSITION + 3] + here[:9].reshape(3, 3) @ frame[:3, 3]
+        x, y, z = place.tolist()
+        return x, y, z
+
+    def note_loads(self, forces: Floats) -> None:
+        """Set `loads` from the forces (P, 3) of the contacts."""
+        bits = 0
+        for number, force in enumerate(forces.tolist()):
+            if any(force):
+                bits |= 1 << number
+                self.loads[number] = tuple(force)
+        self.loads[-1] = bits
