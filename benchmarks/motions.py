@@ -24,7 +24,7 @@ import osimlite
 from _pair import pair, report
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, FreeJoint, HuntCrossleyForce, Model, PinJoint
 from osimlite.errors import OsimliteError
-from osimlite.schema.forces import CoordinateLimitForce, Force
+from osimlite.schema.forces import Force
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.kind import kind_of_class

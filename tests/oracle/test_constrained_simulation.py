@@ -11,7 +11,7 @@ import pytest
 
 import osimlite
 from osimlite.document.reader import read_text
-from osimlite.schema.forces import CoordinateLimitForce, Force
+from osimlite.schema.forces import Force
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.kind import kind_of_class

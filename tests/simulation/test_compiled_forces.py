@@ -10,7 +10,6 @@ import pytest
 
 import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
-from osimlite.errors import UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.functions import Constant as NumericConstant
 from osimlite.multibody.functions import Linear as NumericLinear
@@ -56,10 +55,10 @@ from osimlite.simulation.elements.kind import kinds as declared_kinds
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
-from osimlite.simulation.engines.bullet import BulletEngine
-from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.elements.external_loads import external_load
 from osimlite.simulation.elements.geometries.load import Load
+from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.compiled import CompiledEngine
 
 
 def chain() -> Model:

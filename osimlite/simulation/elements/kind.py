@@ -216,7 +216,8 @@ class DeclaredForce:
     @property
     def kind(self) -> Kind:
         """The declaration."""
-        return kind_of_class(self.component)
+        kind: Kind = kind_of_class(self.component)
+        return kind
 
     @property
     def states(self) -> tuple[StateVariable, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function
@@ -47,7 +47,7 @@ class Tail:
         return self.room - count
 
 
-class Parameter(Protocol):
+class Parameter:
     """Something that a law is given of a component.
 
     Attributes:
@@ -55,27 +55,28 @@ class Parameter(Protocol):
         heads: how many integers that say where something of variable length is.
     """
 
-    @property
-    def size(self) -> int: ...
-
-    @property
-    def heads(self) -> int: ...
+    size: int = 0
+    heads: int = 0
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
         """Its value, from a component."""
+        raise NotImplementedError
 
     def arguments(self, head: int, number: int) -> list[str]:
         """What the law is called with; `head` is the place of its integers, `number` that of its numbers."""
+        raise NotImplementedError
 
     def functions(self) -> dict[str, Callable[..., Any]]:
-        """What the arguments call."""
+        """What the arguments call, by name."""
+        return {}
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Its integers and numbers; what is of variable length goes into the tail."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Number:
+class Number(Parameter):
     """A property that is a number, or a yes or no that the law is given as 1 or 0.
 
     Attributes:
@@ -88,7 +89,6 @@ class Number:
     accepts: Callable[[float], bool] = lambda value: True
     needs: str = ""
     size = 1
-    heads = 0
 
     def read(self, builder: ElementBuilder, force: Any) -> float:
         """The number."""
@@ -102,10 +102,6 @@ class Number:
         """It."""
         return [f"p[{number}]"]
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """None."""
-        return {}
-
     def pack(self, value: float, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """It."""
         return (), (value,)
@@ -117,7 +113,7 @@ def positive(name: str) -> Number:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class Numbers(Parameter):
     """Several numbers that are computed together.
 
     Attributes:
@@ -127,7 +123,6 @@ class Numbers:
 
     size: int
     of: Callable[[ElementBuilder, Any], Sequence[float]]
-    heads = 0
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
         """The numbers."""
@@ -138,10 +133,6 @@ class Numbers:
     def arguments(self, head: int, number: int) -> list[str]:
         """They, one by one."""
         return [f"p[{number + k}]" for k in range(self.size)]
-
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """None."""
-        return {}
 
     def pack(self, value: Sequence[float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """They."""
@@ -158,11 +149,10 @@ class Vector(Numbers):
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(Parameter):
     """A property that is a function of one number; the law is given its table, for `value_at`."""
 
     name: str
-    size = 0
     heads = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> Function:
@@ -173,17 +163,13 @@ class Curve:
         """Its table."""
         return [f"at(p, i[{head}])"]
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """None."""
-        return {}
-
     def pack(self, value: Function, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Place of the table."""
         return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
 
 
 @dataclass(frozen=True)
-class Expression:
+class Expression(Parameter):
     """A property that is a formula; the law is given its steps, constants and registers, for `compute`.
 
     Attributes:
@@ -193,7 +179,6 @@ class Expression:
 
     name: str
     variables: tuple[str, ...]
-    size = 0
     heads = 3
 
     def read(self, builder: ElementBuilder, force: Any) -> Formula:
@@ -205,10 +190,6 @@ class Expression:
         """Steps, constants, registers."""
         return [f"at(i, i[{head}])", f"at(p, i[{head + 1}])", f"at(found, i[{head + 2}])"]
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """None."""
-        return {}
-
     def pack(self, value: Formula, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Places of steps (their count first), constants and registers."""
         steps, constants = program(value)
@@ -218,7 +199,7 @@ class Expression:
 
 
 @dataclass(frozen=True)
-class Expressions:
+class Expressions(Parameter):
     """Properties that are formulas in the same variables.
 
     The law is given the steps of each, with their count and the place of its constants before them; the numbers that
@@ -231,7 +212,6 @@ class Expressions:
 
     names: tuple[str, ...]
     variables: tuple[str, ...]
-    size = 0
     heads = 2
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Formula, ...]:
@@ -241,10 +221,6 @@ class Expressions:
     def arguments(self, head: int, number: int) -> list[str]:
         """Steps, numbers, registers."""
         return [f"at(i, i[{head}])", "p", f"at(found, i[{head + 1}])"]
-
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """None."""
-        return {}
 
     def pack(self, value: Sequence[Formula], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Places of the steps and of the registers."""
@@ -258,10 +234,9 @@ class Expressions:
 
 
 @dataclass(frozen=True)
-class _Control:
+class _Control(Parameter):
     """What the controllers of the model set: the sum of some functions of time."""
 
-    size = 0
     heads = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Function, ...]:
@@ -292,4 +267,3 @@ def control(tables: Ints, p: Floats, t: float) -> float:
         value, _, _ = value_at(at(p, tables[1 + k]), t)
         total += value
     return total
-

@@ -10,7 +10,7 @@ several axes, and constraints, take the engine of :mod:`osimlite.simulation.engi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 

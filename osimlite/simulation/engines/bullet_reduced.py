@@ -8,8 +8,6 @@ on the coordinates of the model, and the constraints are kept up by :mod:`osimli
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -20,13 +18,13 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.robot.robot import Robot
 from osimlite.simulation.body_code import BodyStates
+from osimlite.simulation.chain import Chain
 from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RECURSION, BulletEngine
 from osimlite.simulation.engines.bullet_file import excess
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
-from osimlite.simulation.chain import Chain
 from osimlite.simulation.reduction import Reduction
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
@@ -70,9 +68,7 @@ class ReducedBulletEngine(BulletEngine):
         self.route = MASS_MATRIX if route == "auto" else route
 
     # ---------------------------------------------------------------------------------------- accelerations
-    def equations(
-        self, t: float, x: Array, u: Array, forces: Array
-    ) -> tuple[Array, Array, Array, Kinematics | None]:
+    def equations(self, t: float, x: Array, u: Array, forces: Array) -> tuple[Array, Array, Array, Kinematics | None]:
         """M (n, n) and f (n,) of the motion M udot = f without constraints, xdot (n,), and what bodies do, if known.
 
         Args:

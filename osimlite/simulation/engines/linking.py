@@ -99,9 +99,9 @@ class Program:
     def _callback(self, python: Callable[..., None]) -> int:
         """Address of a kernel that stays Python."""
 
-        def kernel(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
+        def kernel(*vectors: Any, item: int) -> int:
             try:
-                python(s, x, w, y, f, item)
+                python(*vectors, item)
             except Exception as error:
                 # It cannot pass through machine code; whoever asked for the evaluation raises it.
                 self.failures.append(error)
@@ -109,13 +109,13 @@ class Program:
             return layout.FINE
 
         if not has_compiler():
-            self._kept.append(kernel)
-            return pointers.address(kernel)
+            return pointers.address(lambda *arguments: kernel(*arguments[:-1], item=arguments[-1]))
         numbers, work, state = self._sizes
 
         def called(s: int, x: int, w: int, y: int, f: int, item: int) -> int:
-            floats = (_view(start, ctypes.c_double, size) for start, size in ((x, numbers), (w, work), (y, state), (f, state)))
-            return kernel(_view(s, ctypes.c_int64, len(self.ints)), *floats, item)
+            starts = (x, numbers), (w, work), (y, state), (f, state)
+            views = (_view(start, ctypes.c_double, size) for start, size in starts)
+            return kernel(_view(s, ctypes.c_int64, len(self.ints)), *views, item=item)
 
         callback = KERNEL(called)
         self._kept.append(callback)

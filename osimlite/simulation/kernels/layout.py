@@ -58,8 +58,8 @@ ABOVE, ROW, DEPTH = 0, 1, 2
 many there are on the way."""
 
 LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
-"""Of an item: address of its kernel, places in x and w of what it owns there, number of the first contact of its element, and from
-OWN on integers of its own."""
+"""Of an item: address of its kernel, places in x and w of what it owns there, number of the first contact of its
+element, and from OWN on integers of its own."""
 
 HOLD, PROJECT, BONDS, BOND_AT, EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 """Of all constraints: the laws that find accelerations and that project states; count of the bonds, and where the

@@ -193,9 +193,7 @@ def _inertia(link: _Link) -> list[float]:
 class _Packer:
     """Puts everything at its place in the vectors."""
 
-    def __init__(
-        self, places: Places, links: list[_Link], ends: list[int], elements: Sequence[ForceElement]
-    ) -> None:
+    def __init__(self, places: Places, links: list[_Link], ends: list[int], elements: Sequence[ForceElement]) -> None:
         self.places = places
         self.links = links
         self.ends = ends

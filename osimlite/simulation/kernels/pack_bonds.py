@@ -14,10 +14,10 @@ from osimlite.multibody.constraints import Constraint, Coupler, Prescribed
 from osimlite.multibody.mechanism import FramePlacement, StationPlacement
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
+from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.bonds import ARM, AXIS, DISTANCE, PRODUCT, SLIP
 from osimlite.simulation.kernels.functions import function_table, table_of_one
-from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.least_squares import factor_room
 
 Balls = Mapping[tuple[int, ...], int]

@@ -73,7 +73,8 @@ class OnBodies(Geometry):
 
     def pack(self, place: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
         """Links of the bodies, then of what is fixed; the vectors in these."""
-        links, numbers = [places.placement(body).link for body in place.bodies], []
+        links = [places.placement(body).link for body in place.bodies]
+        numbers: list[float] = []
         for body, point in place.points:
             link, found = places.station(body, point)
             links.append(link)

@@ -83,10 +83,12 @@ class BetweenPoints(Geometry):
         frames = [builder.target(force, field, word) for field, word in zip(self.fields, words, strict=True)]
         points = triple(force.point1), triple(force.point2)
         (one, first), (two, second) = (builder.placement(frame) for frame in frames)
-        names = [word if isinstance(word, str) and self.as_written else frame.name for word, frame in zip(words, frames, strict=True)]
+        names = [
+            word if isinstance(word, str) and self.as_written else frame.name
+            for word, frame in zip(words, frames, strict=True)
+        ]
         recorded = (
-            triple(frame[:3, :3] @ point + frame[:3, 3])
-            for frame, point in zip((first, second), points, strict=True)
+            triple(frame[:3, :3] @ point + frame[:3, 3]) for frame, point in zip((first, second), points, strict=True)
         )
         return Ends((names[0], names[1]), (one, two), points, tuple(recorded))  # type: ignore[arg-type]
 
