@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.engines.batch import NO_LIMIT, Batch
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.engines.linking import entry_point
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.contacts import RADIUS
@@ -149,7 +148,7 @@ def contact_places(
     which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     places = np.zeros((len(given), len(engine.contacts), 9))
     w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(engine.state.size)
-    entry_point("contact_places")(
+    engine.program.code.entry("contact_places")(
         engine.program.ints,
         vectors,
         w,

@@ -18,7 +18,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.items import ForceElement
-from osimlite.simulation.engines.linking import Program, bound
+from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
@@ -32,6 +32,7 @@ class System:
         mechanism: what moves.
         forces: what pushes it, besides gravity.
         order: place in the mechanism of each coordinate of the state; the order of the kernels if left out.
+        code: what runs the kernels; the best that is installed if left out.
 
     Attributes:
         structure: what is connected to what, integers; equal for models that differ in numbers only.
@@ -49,7 +50,9 @@ class System:
         UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
     """
 
-    def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int] | None = None) -> None:
+    def __init__(
+        self, mechanism: Mechanism, forces: Forces, order: Sequence[int] | None = None, code: Code | None = None
+    ) -> None:
         packed = pack(mechanism, forces)
         self.mechanism, self.forces = mechanism, forces
         self.structure, self.numbers, self.placements = packed.structure, packed.numbers, packed.placements
@@ -59,13 +62,13 @@ class System:
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
-        self.program = Program(packed)
+        self.program = Program(packed, best() if code is None else code)
         self._items, self._packed_order = packed.items, packed.order
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
         self._y, self._f = np.zeros(self.state.size), np.zeros(self.state.size)
-        self._evaluate = bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
+        self._evaluate = self.program.code.bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
         self._into, self._from = self._orders(packed.order)
 
     def _rows(self, start: int, count: int, size: int) -> Floats:

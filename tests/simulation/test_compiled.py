@@ -40,9 +40,10 @@ pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.simulation.engines.bullet import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels import layout, pointers
-from osimlite.simulation.kernels.table import LAW_NUMBERS, law_function
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.system import System
 
 
 def within(ours, expected, tolerance=1e-9):
@@ -296,18 +297,15 @@ def test_compiled_loop_rounds_as_the_one_in_python_does(fast):
     assert (ours.taken, ours.attempted, ours.evaluations) == (theirs.taken, theirs.attempted, theirs.evaluations)
 
 
-def test_kernels_are_what_they_mean_in_python(fast, fixtures, monkeypatch):
+def test_kernels_are_what_they_mean_in_python(fast, fixtures):
     """The same numbers to the last bit, with joints of all kinds and contact."""
-    monkeypatch.setattr(pointers, "laws", {number: law_function(name) for name, number in LAW_NUMBERS.items()})
     mixed = build_mechanism(osimlite.read(fixtures / "kinematics" / "mixed_joint_tree.osim"))
     for engine in (fast.engine, CompiledEngine(mixed, Forces(()))):
-        program = engine.structure.copy()
-        program[layout.LAWS : layout.LAWS + len(LAW_NUMBERS)] = range(len(LAW_NUMBERS))
-        room, found = np.zeros(program[layout.WORK_SIZE]), np.zeros(2 * len(engine.order))
+        python = System(engine.mechanism, engine.forces, code=PYTHON)
         q, u = state_of(engine.mechanism, 3)
-        y = np.array(engine.state.pack(0.2 * q, u))
-        assert law_function("evaluate")(program, engine.numbers, room, y, found, layout.WHOLE) == layout.FINE
-        assert found.tolist() == engine.derivative(0.0, y)
+        y = engine.state.pack(0.2 * q, u)
+        assert python.realize(0.0, y, layout.WHOLE) == layout.FINE
+        assert python.found() == engine.derivative(0.0, y)
 
 
 def test_log_in_pieces(fast, monkeypatch):
@@ -381,14 +379,16 @@ def test_window_and_route_are_refused(walker):
         Simulation(walker, "compiled", route="mass-matrix")
 
 
-def test_without_numba_the_user_learns_what_to_install(fixtures):
+def test_without_numba_the_kernels_run_as_python(fixtures, fast):
+    """Slowly, to the same digits, and the user learns what to install."""
     program = (
-        "import sys; sys.modules['numba'] = None; from osimlite.cli import main; "
-        f"sys.argv = ['osimlite', 'simulate', {str(fixtures / 'walker' / 'DynamicWalkerModel.osim')!r}, "
-        "'--engine', 'compiled']; main()"
+        "import sys; sys.modules['numba'] = None; import osimlite; "
+        f"model = osimlite.read({str(fixtures / 'walker' / 'DynamicWalkerModel.osim')!r}); "
+        "found = osimlite.simulate(model, 0.02, 'compiled', accuracy=1e-5); "
+        "print(found.values[-1].tolist()); print(found.summary['versions'])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert "the compiled engine needs numba" in done.stderr
-    assert "pip install 'osimlite[fast]'" in " ".join(done.stderr.split())
-    assert "Traceback" not in done.stderr
+    assert done.returncode == 0, done.stderr
+    end, versions = done.stdout.splitlines()
+    assert json.loads(end) == fast.run(0.02, accuracy=1e-5).values[-1].tolist()
+    assert "without numba" in versions

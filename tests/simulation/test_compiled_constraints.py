@@ -26,10 +26,12 @@ from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels import layout, pointers
+from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels import least_squares as ls
-from osimlite.simulation.kernels.table import LAW_NUMBERS, law_function
+from osimlite.simulation.kernels.table import law_function
 from osimlite.simulation.many import ENDINGS, Watch, run_many
+from osimlite.simulation.system import System
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:
@@ -159,21 +161,19 @@ def test_fixed_steps(make: Any):
 
 
 @pytest.mark.parametrize("make", ALL.values(), ids=ALL)
-def test_kernels_are_what_they_mean_in_python(make: Any, monkeypatch: pytest.MonkeyPatch):
+def test_kernels_are_what_they_mean_in_python(make: Any):
     """The same numbers to the last bit: accelerations and projections."""
-    monkeypatch.setattr(pointers, "laws", {number: law_function(name) for name, number in LAW_NUMBERS.items()})
     with Simulation(make(), "compiled") as simulation:
         engine: Any = simulation.engine
         y = np.array(simulation.initial_state({}, {}))
     y += np.random.default_rng(1).uniform(-0.02, 0.02, len(y))
-    program = engine.structure.copy()
-    program[layout.LAWS : layout.LAWS + len(LAW_NUMBERS)] = range(len(LAW_NUMBERS))
-    room, found = np.zeros(program[layout.WORK_SIZE]), np.zeros(len(y))
-    assert law_function("evaluate")(program, engine.numbers, room, y, found, layout.WHOLE) == layout.FINE
-    assert found.tolist() == engine.derivative(0.0, y)
+    python = System(engine.mechanism, engine.forces, code=PYTHON)
+    assert python.realize(0.0, y.tolist(), layout.WHOLE) == layout.FINE
+    assert python.found() == engine.derivative(0.0, y)
     ends = run_many(engine, [y], 1e-30, accuracy=1e-8)
+    room, found = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(len(y))
     room[layout.SCRATCH : layout.SCRATCH + 2] = 1e-9, np.inf
-    assert law_function("project")(program, engine.numbers, room, y, found, 0) == layout.FINE
+    assert law_function("project")(python.program.ints, engine.numbers, room, y, found, 0) == layout.FINE
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()
 
 

@@ -117,12 +117,17 @@ class Numbers(Parameter):
     """Several numbers that are computed together.
 
     Attributes:
-        size: how many.
+        count: how many.
         of: from a component and the builder.
     """
 
-    size: int
+    count: int
     of: Callable[[ElementBuilder, Any], Sequence[float]]
+
+    @property
+    def size(self) -> int:  # type: ignore[override]
+        """How many."""
+        return self.count
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
         """The numbers."""
@@ -132,7 +137,7 @@ class Numbers(Parameter):
 
     def arguments(self, head: int, number: int) -> list[str]:
         """They, one by one."""
-        return [f"p[{number + k}]" for k in range(self.size)]
+        return [f"p[{number + k}]" for k in range(self.count)]
 
     def pack(self, value: Sequence[float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """They."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.simulation.engines.linking import entry_point
 from osimlite.simulation.integrators import INITIAL_STEP
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats, Ints
@@ -105,7 +104,7 @@ class Batch:
     def run(self, first: int = 0, last: int | None = None) -> None:
         """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
         vectors, room = self._vectors, np.zeros(self._room)
-        entry_point("run_several")(
+        self._engine.program.code.entry("run_several")(
             self._engine.program.ints,
             vectors,
             room,

@@ -133,8 +133,8 @@ class BulletEngine:
             raise ValueError(
                 f"'{mechanism.name}' has coordinates that move several axes; engine_class() tells its engine"
             )
+        self._speeds = Speeds(mechanism, places)
         self._take(System(mechanism, forces, places))
-        self._speeds = Speeds(mechanism, self.order)
         self._count = len(self.order)
         if route == "auto":
             few = self._count <= FEW_JOINTS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.util import find_spec
 from inspect import signature
@@ -40,32 +40,90 @@ def version() -> str:
     return f"Python {platform.python_version()}, without numba"
 
 
-@cache
-def entry_point(name: str) -> Callable[..., int]:
-    """A function of the kernels, called with arrays and integers; machine code runs without Python's lock."""
-    function = law_function(name)
-    if not has_compiler():
-        return function
-    from osimlite.simulation.engines.machine_code import address_of
+class Code:
+    """What runs the kernels; `COMPILED` and `PYTHON` are the two.
 
-    kinds = [
-        ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64
-        for part in signature(function).parameters.values()
-    ]
-    code = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(address_of(name))
-    return lambda *arguments: code(*(item.ctypes.data if isinstance(item, np.ndarray) else item for item in arguments))
+    Args:
+        name: for people.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def address(self, function: str) -> int:
+        """What stands for the address of a function of the kernels."""
+        raise NotImplementedError
+
+    def entry(self, function: str) -> Callable[..., int]:
+        """A function of the kernels, called with contiguous arrays and integers."""
+        raise NotImplementedError
+
+    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        """The same with its arrays, which the caller keeps; what is left is one integer."""
+        raise NotImplementedError
+
+    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        """What stands for the address of a kernel in Python, and what the caller has to keep for it.
+
+        Args:
+            python: takes the five arrays and an integer.
+            sizes: of the arrays.
+        """
+        raise NotImplementedError
 
 
-def bound(name: str, *arrays: Any) -> Callable[[int], int]:
-    """A function of the kernels with its arrays, which the caller keeps; what is left is one integer."""
-    function = entry_point(name)
-    if not has_compiler():
-        return lambda number: function(*arrays, number)
-    from osimlite.simulation.engines.machine_code import address_of
+class _Compiled(Code):
+    def address(self, function: str) -> int:
+        from osimlite.simulation.engines.machine_code import address_of
 
-    code = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * len(arrays), ctypes.c_int64)(address_of(name))
-    addresses = [item.ctypes.data for item in arrays]
-    return lambda number: code(*addresses, number)
+        return address_of(function)
+
+    @cache  # noqa: B019 - there is one object
+    def entry(self, function: str) -> Callable[..., int]:
+        code = self._function(function)
+        return lambda *parts: code(*(part.ctypes.data if isinstance(part, np.ndarray) else part for part in parts))
+
+    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        code, addresses = self._function(function), [item.ctypes.data for item in arrays]
+        return lambda number: code(*addresses, number)
+
+    def _function(self, function: str) -> Callable[..., int]:
+        parts = signature(law_function(function)).parameters.values()
+        kinds = [ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64 for part in parts]
+        # It runs without Python's lock.
+        return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.address(function))
+
+    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        def called(*parts: int) -> int:
+            kinds = ctypes.c_int64, *[ctypes.c_double] * 4
+            return python(*map(_view, parts[:5], kinds, sizes), parts[5])
+
+        callback = KERNEL(called)
+        return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
+
+
+class _Python(Code):
+    def address(self, function: str) -> int:
+        return pointers.address(law_function(function))
+
+    def entry(self, function: str) -> Callable[..., int]:
+        kernel = law_function(function)
+        return lambda *parts: kernel(*(part.reshape(-1) if isinstance(part, np.ndarray) else part for part in parts))
+
+    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        kernel = law_function(function)
+        return lambda number: kernel(*arrays, number)
+
+    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        return pointers.address(python), None
+
+
+COMPILED, PYTHON = _Compiled("machine code"), _Python("Python")
+
+
+def best() -> Code:
+    """Machine code where numba is installed, else Python."""
+    return COMPILED if has_compiler() else PYTHON
 
 
 class Program:
@@ -73,54 +131,42 @@ class Program:
 
     Args:
         packed: the model.
+        code: what runs it.
 
     Attributes:
         ints: the structure and the addresses.
         failures: what the parts in Python have raised.
     """
 
-    def __init__(self, packed: Packed) -> None:
+    def __init__(self, packed: Packed, code: Code) -> None:
         self.ints: Ints = packed.structure.copy()
+        self.code = code
         self.failures: list[Exception] = []
-        self._sizes = len(packed.numbers), int(packed.structure[layout.WORK_SIZE]), packed.structure[layout.STATE_SIZE]
         self._kept: list[Any] = []
         for name in packed.laws:
-            self.ints[layout.LAWS + LAW_NUMBERS[name]] = self._address(name)
+            self.ints[layout.LAWS + LAW_NUMBERS[name]] = code.address(name)
+        size = int(packed.structure[layout.STATE_SIZE])
+        sizes = len(self.ints), len(packed.numbers), int(packed.structure[layout.WORK_SIZE]), size, size
         for place, kernel in packed.kernels.items():
-            self.ints[place] = self._address(kernel) if isinstance(kernel, str) else self._callback(kernel)
+            if isinstance(kernel, str):
+                self.ints[place] = code.address(kernel)
+            else:
+                self.ints[place], kept = code.callback(self._guarded(kernel), sizes)
+                self._kept.append(kept)
 
-    def _address(self, name: str) -> int:
-        if not has_compiler():
-            return pointers.address(law_function(name))
-        from osimlite.simulation.engines.machine_code import address_of
+    def _guarded(self, python: Callable[..., None]) -> Callable[..., int]:
+        """A part in Python whose errors do not pass through machine code: who asked for an evaluation raises them."""
 
-        return address_of(name)
-
-    def _callback(self, python: Callable[..., None]) -> int:
-        """Address of a kernel that stays Python."""
-
-        def kernel(*vectors: Any, item: int) -> int:
+        def kernel(*parts: Any) -> int:
             try:
-                python(*vectors, item)
+                python(*parts)
             except Exception as error:
-                # It cannot pass through machine code; whoever asked for the evaluation raises it.
                 self.failures.append(error)
                 return layout.FAILED
             return layout.FINE
 
-        if not has_compiler():
-            return pointers.address(lambda *arguments: kernel(*arguments[:-1], item=arguments[-1]))
-        numbers, work, state = self._sizes
-
-        def called(s: int, x: int, w: int, y: int, f: int, item: int) -> int:
-            starts = (x, numbers), (w, work), (y, state), (f, state)
-            views = (_view(start, ctypes.c_double, size) for start, size in starts)
-            return kernel(_view(s, ctypes.c_int64, len(self.ints)), *views, item=item)
-
-        callback = KERNEL(called)
-        self._kept.append(callback)
-        return int(ctypes.cast(callback, ctypes.c_void_p).value or 0)
+        return kernel
 
 
 def _view(address: int, kind: Any, count: int) -> Any:
-    return np.ctypeslib.as_array((kind * int(count)).from_address(address))
+    return np.ctypeslib.as_array((kind * count).from_address(address))

@@ -1,0 +1,55 @@
+"""The declarations of forces: what follows from each."""
+
+from __future__ import annotations
+
+import inspect
+import re
+
+import pytest
+
+from osimlite.simulation.elements.kind import Kind, kind_of_class, kinds, module_name
+
+DECLARED = [kind for kind in kinds() if isinstance(kind, Kind)]
+
+
+@pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.component.__name__)
+def test_a_kind_is_found_by_its_class_and_is_in_the_manual(kind, repo):
+    assert kind_of_class(kind.component) is kind
+    assert f"`{kind.component.__name__}`" in (repo / "docs" / "forces.md").read_text()
+
+
+@pytest.mark.parametrize("kind", DECLARED, ids=lambda kind: kind.name)
+def test_the_kernel_follows_from_the_declaration(kind):
+    source = inspect.getsource(kind.kernel)
+    assert source.startswith(f"def {kind.name}(") and source.endswith("return FINE\n")
+    assert kind.law is None or " law(" in source
+    # What the geometry applies is given by the law.
+    applied = set(re.findall(r"\w+", " ".join(kind.geometry.after)))
+    assert applied & {"force", "torque", "tension", "fx", "fy", "fz"} <= set(kind.outputs) | applied & {"room"}
+    for state in kind.states:
+        assert state.rate in kind.outputs
+        assert f"= {state.rate}\n" in source
+    for output in (kind.columns or {}).values():
+        assert output in kind.recorded
+
+
+def test_a_law_takes_what_the_kernel_gives():
+    """One argument for each input, state and parameter."""
+    for kind in DECLARED:
+        if kind.law is not None:
+            call = re.search(r"law\((.*)\)\n", kind.source).group(1)
+            given = len(re.sub(r"\([^()]*(\([^()]*\))?[^()]*\)", "", call).split(","))
+            assert given == len(inspect.signature(kind.law).parameters), kind.name
+
+
+@pytest.mark.parametrize(
+    ("name", "module"),
+    [
+        ("PathSpring", "path_spring"),
+        ("Blankevoort1991Ligament", "blankevoort1991_ligament"),
+        ("MeyerFregly2016Force", "meyer_fregly2016_force"),
+        ("McKibbenActuator", "mc_kibben_actuator"),
+    ],
+)
+def test_names_of_modules(name, module):
+    assert module_name(type(name, (), {})) == module
