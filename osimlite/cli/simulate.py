@@ -40,7 +40,7 @@ def simulate(
     report_interval: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
-    output: options.Folder = Path("."),
+    output: options.Folder = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, forces and energy as PNG.")] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[bool, typer.Option("--gui", help="Show it live in PyBullet's window; takes fixed steps.")] = False,
@@ -99,7 +99,7 @@ def simulate(
                 initial_speeds=speeds,
                 progress=progress,
             )
-    files = _write(model, trajectory, output, plot=plot, animate=animate)
+    files = _write(model, trajectory, options.results_folder(file, output), plot=plot, animate=animate)
     _told(trajectory, files).show()
 
 

@@ -39,7 +39,9 @@ def test_fixed_step(walker, tmp_path):
         "simulate", walker, "--to", "0.1", "--fixed-step", "1e-3", "--report-interval", "0.05", folder=tmp_path
     )
     assert code == 0 and "100 of 100" in out
-    assert len(read_sto(tmp_path / "states.sto").times) == 3
+    # Without a folder to write into, one that is named after the model's file.
+    assert len(read_sto(tmp_path / "DynamicWalkerModel" / "states.sto").times) == 3
+    assert [path.name for path in tmp_path.iterdir()] == ["DynamicWalkerModel"]
 
 
 @pytest.mark.parametrize(
@@ -90,13 +92,15 @@ def test_pictures_fail_as_a_whole(walker, tmp_path, monkeypatch):
     assert not (tmp_path / "r").exists()
 
 
-def test_degrees_taken_for_radians_are_warned_of(walker, tmp_path):
-    code, _, err = run("simulate", walker, "--to", "0.01", "--set", "RHip_rz=400", folder=tmp_path)
-    assert code == 0
-    assert err == (
-        "osimlite: warning: RHip_rz = 400 is in rad, and outside its range of -1.75 to 1.75 rad; did you mean 400deg?\n"
-    )
-    for value in ("40deg", "500deg"):
+def test_degrees_taken_for_radians_are_refused(walker, tmp_path):
+    for command in ("simulate", "gait", "view"):
+        code, _, err = run(command, walker, "--set", "RHip_rz=40", folder=tmp_path)
+        assert code == 2 and err == (
+            "osimlite: --set: RHip_rz = 40 is in rad, and outside its range of -1.75 to 1.75 rad; did you mean 40deg? "
+            "(if not, write 40rad)\n"
+        )
+    assert not list(tmp_path.iterdir())
+    for value in ("40deg", "500deg", "40rad", "2"):
         words = ("--set", f"RHip_rz={value}", "--set-speed", "RHip_rz=7")
         code, _, err = run("simulate", walker, "--to", "0.01", *words, folder=tmp_path)
         assert (code, err) == (0, "")

@@ -58,6 +58,8 @@ def missing_mesh(subject: Subject, found: Found) -> None:
             continue
         twin = folders.in_other_case(places, name)
         message = f"the file '{name}' of {called(item)} is not there; looked in {tried}; {remedy}"
+        if any(os.path.lexists(os.path.join(place, name)) for place in places):
+            message = f"'{name}' of {called(item)} is a folder, a device or a link to nothing, and no file"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
         severity = ERROR if isinstance(item, ContactMesh) and twin is None else None
@@ -185,8 +187,9 @@ class _Folders:
         """The file in the first of the folders that is called `name` but for upper and lower case."""
         for place in places:
             listing, last = self._listing(place, name)
-            if last.lower() in listing:
-                return listing[last.lower()]
+            twin = listing.get(last.lower(), last)
+            if twin != last and os.path.isfile(os.path.join(place, os.path.dirname(name), twin)):
+                return twin
         return None
 
     def _listing(self, place: str, name: str) -> tuple[dict[str, str], str]:
