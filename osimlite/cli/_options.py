@@ -33,7 +33,10 @@ StartSpeed = Annotated[
     typer.Option("--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."),
 ]
 To = Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")]
-Engine = Annotated[str, typer.Option(help="What computes the accelerations: 'bullet' or 'compiled'.")]
+Engine = Annotated[
+    str,
+    typer.Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
+]
 Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
 SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
 ExternalLoads = Annotated[

@@ -23,11 +23,11 @@ LIVE_STEP = 1e-3
 def simulate(
     file: options.File,
     to: options.To = 2.0,
-    engine: options.Engine = "bullet",
+    engine: options.Engine = "auto",
     accuracy: options.Accuracy = None,
     fixed_step: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Take PyBullet's own steps instead of controlling the error."),
+        typer.Option(metavar="SECONDS", help="Take the engine's own steps instead of controlling the error."),
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
@@ -71,11 +71,9 @@ def simulate(
     if animate:
         require("PIL", extra="view", purpose="an animation")
     model = read(file)
-    from osimlite.simulation.engines import engine_factory
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
 
-    engine_factory(engine)
     with Simulation(
         model,
         engine,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,10 +12,9 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.simulation import read_sto
+from osimlite.simulation.engines import engine_name
 from tests.cli.command import run
 from tests.simulation.damped import damped
-
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 
 
 @pytest.fixture
@@ -117,3 +118,34 @@ def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
     assert two.rows[0, changed] == 0.25 and one.columns == two.columns
     same = [place for place in range(len(one.columns)) if place != changed]
     assert two.rows[0, same].tolist() == one.rows[-1, same].tolist()
+
+
+WITHOUT_PYBULLET = "import sys; sys.modules['pybullet'] = None; from osimlite.cli import main; main()"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ((), 0, "compiled"),
+        (("--engine", "auto", "--fixed-step", "1e-3"), 0, "compiled"),
+        (("--engine", "bullet"), 2, "pip install 'osimlite[bullet]'"),
+        (("--gui",), 2, "pip install 'osimlite[bullet]'"),
+    ],
+)
+def test_without_pybullet(walker, tmp_path, words, code, said):
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_PYBULLET, "simulate", walker, "--to", "0.1", *words],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    assert said in done.stdout + done.stderr
+    if code == 0:
+        assert json.loads((tmp_path / "summary.json").read_text())["engine"] == "compiled"
+
+
+def test_auto_is_bullet_where_it_is_installed(monkeypatch):
+    monkeypatch.setattr("osimlite.simulation.engines.find_spec", lambda name: name == "pybullet" or None)
+    assert engine_name("auto") == "bullet"
+    monkeypatch.setattr("osimlite.simulation.engines.find_spec", lambda name: None)
+    assert engine_name("auto") == "compiled"

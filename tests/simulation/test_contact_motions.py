@@ -44,7 +44,7 @@ def hertz() -> float:
 @pytest.fixture(params=["bullet", "compiled"])
 def engine(request):
     if request.param == "compiled":
-        pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+        pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     return request.param
 
 

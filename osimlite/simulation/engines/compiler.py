@@ -15,7 +15,7 @@ from typing import Any
 from osimlite._require import require
 from osimlite.simulation.kernels import pointers
 
-numba = require("numba", extra="fast", purpose="the compiled engine")
+numba = require("numba", extra="sim", purpose="the compiled engine")
 
 from llvmlite import ir  # type: ignore[import-untyped]  # noqa: E402
 from numba.core import types  # noqa: E402
