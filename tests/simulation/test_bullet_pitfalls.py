@@ -14,12 +14,12 @@ from osimlite import Body, Coordinate, Model
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines import bullet_file, bullet_world
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 
 bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
+from osimlite.simulation.engines import bullet_file, bullet_world  # noqa: E402
 from osimlite.simulation.engines.bullet import BulletEngine  # noqa: E402
 from osimlite.simulation.engines.bullet_world import World  # noqa: E402
 
