@@ -33,6 +33,7 @@ def test_what_is_taken_up_is_lost(engine):
 
 
 def test_both_engines_take_the_same_steps():
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     ours, theirs = (osimlite.simulate(damped(), to=0.5, accuracy=1e-7, engine=engine) for engine in ENGINES)
     assert ours.summary["steps"] == theirs.summary["steps"]
     assert np.abs(ours.values - theirs.values).max() < 1e-11
