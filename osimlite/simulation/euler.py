@@ -94,7 +94,12 @@ class SemiImplicitEuler(Stepper):
         try:
             self._advance(t, y)
         except IntegrationError as error:
-            raise burst(t, self._h) from error
+            raise IntegrationError(
+                f"{error} If they are right, take a shorter fixed step than {self._h:g} s, or control the error "
+                "(--accuracy).",
+                t,
+                error.index,
+            ) from error
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The straight line between the ends of the last step."""
