@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from io import TextIOWrapper
 from pathlib import Path
-from typing import TextIO
 
-from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
+from osimlite.errors import DocumentError, UnsupportedError
+from osimlite.files import open_file
 
 _SUFFIXES = {
     "double": ("",),
@@ -62,10 +63,7 @@ class TableStream:
 
     def __init__(self, path: str | Path) -> None:
         self.file = str(path)
-        try:
-            self._stream: TextIO = Path(path).open(encoding="utf-8", errors="replace")  # noqa: SIM115
-        except OSError as error:
-            raise MissingFileError(f"cannot read the file: {error.strerror}", file=self.file) from None
+        self._stream = TextIOWrapper(open_file(path), encoding="utf-8", errors="replace")
         try:
             self._read_header()
         except BaseException:
