@@ -76,7 +76,8 @@ def _report(document: Document) -> None:
             meant = (
                 "as nothing" if not note.value else "as it stands" if note.value == note.word else f"as '{note.value}'"
             )
-            say(f"line {note.line}: '{note.word}' is no XML and was read {meant}")
+            fate = f"; {note.value}" if note.kind == "overlooked" else f" and was read {meant}"
+            say(f"line {note.line}: '{note.word}' is no XML{fate}")
     lost: dict[str, list[Change]] = {}
     for change in done:
         if change.lost is not None:

@@ -9,6 +9,7 @@ from lsprotocol import types
 from osimlite.lint.diagnostic import Edit, Finding, Severity
 from osimlite.lint.fixes import edits_of
 from osimlite.lsp.analysis import Analysis
+from osimlite.text import visible
 
 SOURCE = "osimlite"
 """What an editor names as the origin of a diagnostic."""
@@ -29,7 +30,7 @@ def _diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
     hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion is not None else ""
     return types.Diagnostic(
         analysis.text.range(*_offsets(analysis, finding)),
-        f"{finding.message}{hint}",
+        visible(f"{finding.message}{hint}"),
         severity=_SEVERITIES[finding.severity],
         code=finding.code,
         source=SOURCE,
@@ -83,7 +84,7 @@ def _title(finding: Finding) -> str:
     assert finding.fix is not None
     doubt = "" if finding.fix.safe else " (look at the result)"
     if finding.suggestion is not None:
-        return f"Change to '{finding.suggestion}'{doubt}"
+        return visible(f"Change to '{finding.suggestion}'{doubt}")
     return f"Mend {finding.code} ({finding.name}){doubt}"
 
 

@@ -127,3 +127,11 @@ def test_coordinates_that_a_joint_makes_itself_have_names_of_their_own() -> None
     assert [c.name for c in osimlite.read_text(osimlite.to_text(model)).components(osimlite.Coordinate)] == [
         "hinge_coord_0"
     ]
+
+
+@pytest.mark.parametrize("odd", ["\0", "\x1b", "\ud800", "\uffff"])
+def test_what_no_file_can_hold_is_refused(odd: str, tmp_path: Path) -> None:
+    for model in (Model(name=f"m{odd}"), Model(name="m", credits=f"by {odd}")):
+        with pytest.raises(ModelError, match="no file can hold the last character of") as caught:
+            osimlite.write(model, tmp_path / "m.osim")
+        assert str(caught.value).isprintable() and not list(tmp_path.iterdir())
