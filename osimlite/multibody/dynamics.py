@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
 
 
+LARGEST = 1e100
+"""Numbers beyond this, in SI units, are not computed with, nor inertias below its inverse: their squares overflow."""
+
+
 class Wrench(NamedTuple):
     """A force (N) on a body at its origin and a torque (N·m) about it, both (3,) along ground's axes."""
 
@@ -133,12 +137,26 @@ def constrained_accelerations(
     Raises:
         SimulationError: a motion that nothing forbids moves no mass.
     """
+    require_numbers(mechanism, matrix, right, *(equations or ()))
     if equations is None:
         return _solve(mechanism, matrix, right, None, order)
     particular, free = solutions(*equations, NEGLIGIBLE)
     reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free, order)
     udot: Array = particular + free @ reduced
     return udot
+
+
+def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
+    """Check arrays of the equations of motion.
+
+    Raises:
+        SimulationError: an entry is not finite, or too large to be computed with.
+    """
+    if not all((np.abs(array) < LARGEST).all() for array in arrays):
+        raise SimulationError(
+            f"the equations of motion of '{mechanism.name}' are not finite; check the coordinate values and speeds, "
+            "the applied forces, the masses and inertias of the bodies and the places of the frames"
+        )
 
 
 def _skews(vectors: Array) -> Array:
@@ -168,16 +186,11 @@ def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array 
     """Solve with a positive definite matrix whose unknowns are motions along `directions` (k, f)."""
     if not len(right):
         return right
-    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-        raise SimulationError(
-            f"the equations of motion of '{mechanism.name}' are not finite; "
-            "check the coordinate values and speeds, the applied forces, and the masses of the bodies"
-        )
     try:
         pivots = np.linalg.cholesky(matrix).diagonal() ** 2
     except np.linalg.LinAlgError:
         raise massless(_name_of_massless(mechanism, matrix, directions, order)) from None
-    if np.min(pivots / matrix.diagonal()) < 1e-13:
+    if np.min(pivots / matrix.diagonal()) < 1e-13 or np.min(matrix.diagonal()) < 1.0 / LARGEST:
         raise massless(_name_of_massless(mechanism, matrix, directions, order))
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 

@@ -105,8 +105,10 @@ class Sine(Univariate):
 
     def _at(self, x: float) -> tuple[float, float, float]:
         angle = self.omega * x + self.phase
+        if not math.isfinite(angle):
+            return math.nan, math.nan, math.nan
         wave = self.amplitude * math.sin(angle)
-        return wave + self.offset, self.amplitude * self.omega * math.cos(angle), -(self.omega**2) * wave
+        return wave + self.offset, self.amplitude * self.omega * math.cos(angle), -self.omega * self.omega * wave
 
 
 @dataclass(frozen=True)

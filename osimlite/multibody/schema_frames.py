@@ -56,6 +56,8 @@ class Placements:
             return path, np.eye(4)
         if isinstance(frame, PhysicalOffsetFrame):
             base, matrix = self.frame(self.named(frame, "socket_parent"))
+            if not np.isfinite((*frame.translation, *frame.orientation)).all():
+                raise ModelError(f"the frame '{path}' has a place or turning that is not finite; give numbers")
             return base, matrix @ offset(frame.translation, frame.orientation)
         if isinstance(frame, StationDefinedFrame):
             return self._through_stations(frame, path)

@@ -6,7 +6,6 @@ Constraints look at one or two bodies each. The code follows the joints from gro
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -67,7 +66,7 @@ class BodyStates:
         for body in self._bodies:
             found += _written(script, chain, body)
         script.line(f"return ({''.join(f'{scalar}, ' for scalar in found)})")
-        self._code = script.function({"sin": math.sin, "cos": math.cos})
+        self._code = script.function()
 
     def at(self, t: float, q: Array, u: Array, joints: Reduced) -> Kinematics:
         """The mechanism with these bodies, at values q and speeds u of all coordinates; valid until the next call."""

@@ -101,7 +101,7 @@ class RungeKuttaMerson(Stepper):
             cut = limit < t0 + 0.95 * h
             self.attempted += 1
             self.evaluations += 4
-            cause: ArithmeticError | None = None
+            cause: Exception | None = None
             try:
                 y1, companion = merson_step(f, t0, y0, f0, t1)
                 # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
@@ -110,7 +110,7 @@ class RungeKuttaMerson(Stepper):
                 # As in Simbody: what half a step would not mend, neither does the projection.
                 if self._projection is not None and error <= 16.0 * self._accuracy:
                     y1, error = self._projected(t1, y1, errors, weights)
-            except ArithmeticError as failure:
+            except (ArithmeticError, ValueError) as failure:
                 error, cause = inf, failure
             self._next_step = min(next_step_size(h, error, self._accuracy, cut), self._maximum_step)
             if error <= self._accuracy:
@@ -158,7 +158,7 @@ class RungeKuttaMerson(Stepper):
         # The sum carries what is not a number; a comparison could lose it.
         return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf
 
-    def _give_up(self, t1: float, error: float, weights: list[float], cause: ArithmeticError | None) -> None:
+    def _give_up(self, t1: float, error: float, weights: list[float], cause: Exception | None) -> None:
         """Raise the error that tells why the smallest step fails."""
         t0, y0, f0 = self.time, self.state, self.derivative
 

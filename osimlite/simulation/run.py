@@ -9,9 +9,12 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
+from osimlite.multibody.dynamics import require_numbers
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell
 from osimlite.schema.model import Model
@@ -29,6 +32,9 @@ from osimlite.simulation.trajectory import Report, Trajectory
 
 Progress = Callable[[float], object]
 """Called with the simulated time (s) reached."""
+
+QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
+"""What is not finite is refused by name where it counts; numpy need not warn of it too."""
 
 
 def simulate(
@@ -127,6 +133,7 @@ class Simulation:
         paths: of all states, in the order of OpenSim.
     """
 
+    @QUIET
     def __init__(
         self,
         model: Model,
@@ -144,6 +151,7 @@ class Simulation:
         # Only Bullet has a window.
         make = engine_factory("bullet" if show and engine == AUTO else engine)
         self.mechanism: Mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives, rolling=rolling)
+        _require_finite_start(self.mechanism)
         self.forces = force_elements(
             model,
             self.mechanism,
@@ -171,7 +179,9 @@ class Simulation:
             **({} if external_loads is None else {"external_loads": str(external_loads)}),
         }
         self._show = show
+        self._has_inertia = False
 
+    @QUIET
     def run(
         self,
         to: float = 2.0,
@@ -187,7 +197,7 @@ class Simulation:
         started = time.perf_counter()
         times = report_times(to, report_interval)
         if fixed_step is not None:
-            _check_step(fixed_step)
+            _check_step(fixed_step, to)
         if self._show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
@@ -203,6 +213,7 @@ class Simulation:
             for given in (initial, initial_speeds)
         )
         y = self.initial_state(initial, initial_speeds)
+        self._require_inertia(y)
         settings = Settings(accuracy=accuracy, fixed_step=fixed_step, route=self.engine.route, show=self._show)
         recorder = Recorder(self.engine)
         stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
@@ -232,6 +243,12 @@ class Simulation:
         self.close()
 
     # --------------------------------------------------------------------------------------------- helpers
+    def _require_inertia(self, y: Sequence[float]) -> None:
+        """SimulationError, the same for all engines, if the first start is one where a motion has no inertia."""
+        if not self._has_inertia:
+            self.mechanism.acceleration(self.state.values(y), self.state.speeds(y))
+            self._has_inertia = True
+
     def initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
         """State in the engine's order (y,): default values and speeds, and what follows from them, but for those given.
 
@@ -298,6 +315,19 @@ class Simulation:
         )
 
 
+def _require_finite_start(mechanism: Mechanism) -> None:
+    """SimulationError if no engine can compute with the numbers of a mechanism."""
+    for what in ("value", "speed"):
+        for info in mechanism.coordinates:
+            number = getattr(info, f"default_{what}")
+            if not isfinite(number):
+                raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
+    require_numbers(mechanism, mechanism.mass_matrix({}))
+
+
+MOST_STEPS = 1_000_000_000
+"""Of a fixed length, which take hours to days."""
+
 LONGEST_STEP = 0.1
 """A longer fixed step (s) follows no motion of bodies: a thousandth is usual, and MuJoCo takes 0.002 by itself."""
 
@@ -307,7 +337,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, Real)
 
 
-def _check_step(h: float) -> None:
+def _check_step(h: float, to: float) -> None:
     if not (_is_number(h) and isfinite(h) and h > 0.0):
         raise SettingError(f"the fixed step is a positive and finite number of seconds, not {h!r}")
     if h > LONGEST_STEP:
@@ -315,6 +345,8 @@ def _check_step(h: float) -> None:
             f"a fixed step of {h:g} s is too long for any motion of bodies; take at most {LONGEST_STEP:g} s, with "
             "contacts about 0.001 s"
         )
+    if h * MOST_STEPS < to:
+        raise SettingError(f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps")
 
 
 def report_times(to: float, interval: float) -> list[float]:

@@ -10,14 +10,19 @@ A scalar is a number that is known already, or the name of a variable.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import Any
 
 Scalar = float | str
 Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]
 """Three rows."""
+
+ARITHMETIC = {"sin": math.sin, "cos": math.cos, "inf": math.inf, "nan": math.nan}
+"""What any code may call; numbers that are known beforehand print as `inf` or `nan` where they overflow."""
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 
@@ -72,9 +77,9 @@ class Script:
         """The text of the function."""
         return "\n".join([*self._lines, "    pass", ""])
 
-    def function(self, names: Mapping[str, Any]) -> Callable[..., Any]:
-        """Compile the function; `names` is what it may use besides its arguments."""
-        scope = dict(names)
+    def function(self, names: Mapping[str, Any] = MappingProxyType({})) -> Callable[..., Any]:
+        """Compile the function; `names` is what it may use besides its arguments and `ARITHMETIC`."""
+        scope = {**ARITHMETIC, **names}
         exec(compile(self.source(), f"<{self._name}>", "exec"), scope)
         result: Callable[..., Any] = scope[self._name]
         return result

@@ -97,10 +97,6 @@ def starting(
                 )
             row[place] = _number(value, what, name)
             places[-1].append(place)
-    for what, row in (("value", q), ("speed", u)):
-        for info, number in zip(infos, row, strict=True):
-            if not isfinite(number):
-                raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
     return q, u, places
 
 

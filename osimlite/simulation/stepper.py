@@ -164,7 +164,7 @@ class Stepper(ABC):
         """The derivative at a state that is part of the motion, where it must exist."""
         try:
             derivative = self._f(t, y)
-        except ArithmeticError as failure:
+        except (ArithmeticError, ValueError) as failure:
             raise IntegrationError(f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t) from failure
         total = sum(derivative)
         if total - total != 0.0:
