@@ -133,7 +133,6 @@ class Simulation:
         paths: of all states, in the order of OpenSim.
     """
 
-    @QUIET
     def __init__(
         self,
         model: Model,
@@ -181,7 +180,6 @@ class Simulation:
         self._show = show
         self._has_inertia = False
 
-    @QUIET
     def run(
         self,
         to: float = 2.0,
@@ -243,12 +241,14 @@ class Simulation:
         self.close()
 
     # --------------------------------------------------------------------------------------------- helpers
+    @QUIET
     def _require_inertia(self, y: Sequence[float]) -> None:
         """SimulationError, the same for all engines, if the first start is one where a motion has no inertia."""
         if not self._has_inertia:
             self.mechanism.acceleration(self.state.values(y), self.state.speeds(y))
             self._has_inertia = True
 
+    @QUIET
     def initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
         """State in the engine's order (y,): default values and speeds, and what follows from them, but for those given.
 
@@ -315,6 +315,7 @@ class Simulation:
         )
 
 
+@QUIET
 def _require_finite_start(mechanism: Mechanism) -> None:
     """SimulationError if no engine can compute with the numbers of a mechanism."""
     for what in ("value", "speed"):
