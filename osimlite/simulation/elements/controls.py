@@ -6,7 +6,8 @@ A control that nothing sets is 0. OpenSim keeps it within no limits.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -30,14 +31,13 @@ def control_functions(builder: ElementBuilder, actuator: Any) -> tuple[Function,
         ModelError: a controller has not one function for each actuator, or a file that does not fit.
     """
     functions: list[Function] = []
-    for controller in controllers(builder):
-        words = controller.socket_actuators
-        named = [builder.target(controller, "socket_actuators", word) for word in words]
+    for source in _sources(builder):
         functions += [
-            _function(builder, controller, place, actuator) for place, target in enumerate(named) if target is actuator
+            _function(builder, source.controller, place, actuator)
+            for place, target in enumerate(source.named)
+            if target is actuator
         ]
-        if isinstance(controller, PrescribedController) and controller.controls_file:
-            functions += _from_file(builder, controller, actuator, actuator in named)
+        functions += _from_file(builder, source, actuator)
     return tuple(functions)
 
 
@@ -60,42 +60,70 @@ def _function(builder: ElementBuilder, controller: Controller, place: int, actua
     return builder.function(actuator, given[place], f"control by {builder.path(controller)}")
 
 
-def _from_file(
-    builder: ElementBuilder, controller: PrescribedController, actuator: Any, is_named: bool
-) -> Iterator[Function]:
-    """The column of the controller's file for an actuator, if there is one.
+class _Source(NamedTuple):
+    """A controller, the actuators that it names, its file if it has one, and the actuator of each column there.
 
-    As in OpenSim, a column whose actuator the controller names by the same words is passed over.
+    As in OpenSim, a column whose actuator the controller names by the same words is passed over: it has none.
     """
-    path = builder.path(controller)
+
+    controller: Controller
+    named: list[Any]
+    table: StoTable | None
+    columns: list[Any]
+
+
+_known: WeakKeyDictionary[ElementBuilder, list[_Source]] = WeakKeyDictionary()
+"""What was found for the actuators of a model: each file is read once."""
+
+
+def _sources(builder: ElementBuilder) -> list[_Source]:
+    """All enabled controllers."""
+    if builder not in _known:
+        _known[builder] = [_source(builder, controller) for controller in controllers(builder)]
+    return _known[builder]
+
+
+def _source(builder: ElementBuilder, controller: Controller) -> _Source:
+    words = controller.socket_actuators
+    named = [builder.target(controller, "socket_actuators", word) for word in words]
+    if not (isinstance(controller, PrescribedController) and controller.controls_file):
+        return _Source(controller, named, None, [])
+    actuators: dict[str, Any] = {}
+    for component in builder.tree.components:
+        if isinstance(component, Actuator):
+            actuators.setdefault(component.name, component)
+            actuators.setdefault(builder.path(component), component)
     table = read_beside(builder.folder, str(controller.controls_file))
-    words = {word if isinstance(word, str) else builder.path(word) for word in controller.socket_actuators}
-    for place, label in enumerate(table.columns):
-        if label in words:
-            continue
-        target = _actuator(builder, label)
-        if target is None:
+    passed_over = {word if isinstance(word, str) else builder.path(word) for word in words}
+    columns: list[Any] = []
+    for label in table.columns:
+        if label not in passed_over and label not in actuators:
             names = [item.name for item in builder.tree.components if isinstance(item, Actuator)]
             raise ModelError(
-                f"the column '{label}' of the file of '{path}' is no actuator of the model{did_you_mean(label, names)}",
+                f"the column '{label}' of the file of '{builder.path(controller)}' is no actuator of the model"
+                f"{did_you_mean(label, names)}",
                 file=table.file,
             )
+        columns.append(None if label in passed_over else actuators[label])
+    return _Source(controller, named, table, columns)
+
+
+def _from_file(builder: ElementBuilder, source: _Source, actuator: Any) -> Iterator[Function]:
+    """The column of a controller's file for an actuator, if there is one."""
+    controller, table = source.controller, source.table
+    if table is None or not isinstance(controller, PrescribedController):
+        return
+    path = builder.path(controller)
+    for place, target in enumerate(source.columns):
         if target is not actuator:
             continue
-        if is_named:
+        if actuator in source.named:
             raise ModelError(
-                f"'{path}' sets '{builder.path(actuator)}' by a function and by the column '{label}'; leave one out",
+                f"'{path}' sets '{builder.path(actuator)}' by a function and by the column '{table.columns[place]}'; "
+                "leave one out",
                 file=table.file,
             )
         yield _column(table, place, controller, path)
-
-
-def _actuator(builder: ElementBuilder, label: str) -> Any:
-    """The first actuator of a name or path."""
-    for component in builder.tree.components:
-        if isinstance(component, Actuator) and label in (component.name, builder.path(component)):
-            return component
-    return None
 
 
 def _column(table: StoTable, place: int, controller: PrescribedController, path: str) -> Function:
