@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from osimlite.cli import _options as options
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
-    output: options.Folder = None,
+    output: options.Folder = Path("."),
     external_loads: options.ExternalLoads = None,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
@@ -32,4 +33,4 @@ def inverse_dynamics(
         from osimlite.simulation.elements.external_loads import read_external_loads
 
         loads = read_external_loads(recorded.mechanism, external_loads)
-    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, options.results_folder(file, output))
+    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, output)

@@ -23,11 +23,11 @@ LIVE_STEP = 1e-3
 def simulate(
     file: options.File,
     to: options.To = 2.0,
-    engine: options.Engine = "auto",
+    engine: options.Engine = "bullet",
     accuracy: options.Accuracy = None,
     fixed_step: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Take the engine's own steps instead of controlling the error."),
+        typer.Option(metavar="SECONDS", help="Take PyBullet's own steps instead of controlling the error."),
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
@@ -40,7 +40,7 @@ def simulate(
     report_interval: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
-    output: options.Folder = None,
+    output: options.Folder = Path("."),
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, forces and energy as PNG.")] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[bool, typer.Option("--gui", help="Show it live in PyBullet's window; takes fixed steps.")] = False,
@@ -71,9 +71,11 @@ def simulate(
     if animate:
         require("PIL", extra="view", purpose="an animation")
     model = read(file)
+    from osimlite.simulation.engines import engine_factory
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
 
+    engine_factory(engine)
     with Simulation(
         model,
         engine,
@@ -97,7 +99,7 @@ def simulate(
                 initial_speeds=speeds,
                 progress=progress,
             )
-    files = _write(model, trajectory, options.results_folder(file, output), plot=plot, animate=animate)
+    files = _write(model, trajectory, output, plot=plot, animate=animate)
     _told(trajectory, files).show()
 
 

@@ -50,6 +50,9 @@ class System:
         UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
     """
 
+    entries: tuple[str, ...] = ("evaluate",)
+    """Names of the functions of the kernels that it calls."""
+
     def __init__(
         self, mechanism: Mechanism, forces: Forces, order: Sequence[int] | None = None, code: Code | None = None
     ) -> None:
@@ -62,7 +65,7 @@ class System:
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
-        self.program = Program(packed, best() if code is None else code)
+        self.program = Program(packed, best() if code is None else code, self.entries)
         self._items, self._packed_order = packed.items, packed.order
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)

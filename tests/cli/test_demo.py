@@ -11,6 +11,7 @@ import pytest
 import osimlite
 from tests.cli.command import run
 
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
 
 

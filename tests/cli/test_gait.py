@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.cli import main
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 
 def run(*words: str) -> int:

@@ -41,14 +41,14 @@ def test_bar(monkeypatch, stream, second, shows):
 
 @pytest.mark.parametrize("is_terminal", [True, False])
 def test_who_waits_for_the_compiler_is_told_once(tmp_path, is_terminal):
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
     ours, theirs = pty.openpty()
     script = (
         "import sys; from osimlite.cli import main; sys.argv = ['osimlite', 'build', 'dynamic-walker', '-o', '-']\n"
         "try: main()\n"
         "except SystemExit: pass\n"
         "from osimlite.simulation.engines.machine_code import address_of\n"
-        "address_of('drive'), address_of('coordinate_spring')\n"
+        "address_of('place_drift'), address_of('contact_places')\n"
     )
     run = [sys.executable, "-c", script]
     kept = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}

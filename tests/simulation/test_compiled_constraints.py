@@ -23,7 +23,7 @@ from osimlite.simulation.engines.protocol import Settings
 from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
@@ -293,7 +293,7 @@ def test_equations_that_repeat_or_contradict_each_other(count: int, size: int, r
     a[: count * size] = rows.ravel()
     found = ls.factorise(count, size, a, 1e-9)
     assert found == rank
-    ls.shortest(count, size, a, found, values, room, x)
+    ls.minimum_norm(count, size, a, found, values, room, x)
     expected = np.linalg.lstsq(rows, values, rcond=1e-9)[0]
     condition = (
         np.linalg.cond(rows)
@@ -304,6 +304,6 @@ def test_equations_that_repeat_or_contradict_each_other(count: int, size: int, r
     for place in range(rank, size):
         free = np.zeros(size)
         free[place] = 1.0
-        ls.turn_back(size, a, found, free)
+        ls.apply_q(size, a, found, free)
         assert np.linalg.norm(free) == pytest.approx(1.0, abs=1e-13)
         assert np.abs(rows @ free).max(initial=0.0) < 1e-12 * max(1.0, float(np.abs(rows).max()))

@@ -53,8 +53,7 @@ from osimlite.schema.springs import (
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.kind import kinds as declared_kinds
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.simulation.elements.external_loads import external_load
 from osimlite.simulation.elements.geometries.load import Load

@@ -92,7 +92,7 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
         ({"engine": "bulet"}, r"did you mean 'bullet'\?$"),
-        ({"engine": "xyz"}, "there is bullet, compiled and auto$"),
+        ({"engine": "xyz"}, "there is bullet and compiled$"),
         ({"route": "quick"}, "no route"),
     ],
 )
@@ -235,18 +235,16 @@ def test_smallest_step(pendulum):
             transition=1e-9,
         )
     )
-    with pytest.raises(SimulationError, match=r"cannot go on|derivative|not finite"):
+    with pytest.raises(SimulationError, match=r"cannot go on|derivative"):
         osimlite.simulate(pendulum, to=0.1)
 
 
-@pytest.mark.parametrize("engine", ["bullet", "compiled"])
-def test_a_step_that_is_too_long(walker, engine):
+def test_a_step_that_is_too_long(walker):
     with pytest.raises(SimulationError, match="shorter fixed step"):
-        osimlite.simulate(walker, engine=engine, fixed_step=0.1)
+        osimlite.simulate(walker, fixed_step=0.1)
 
 
 def test_a_window_needs_a_screen(pendulum, monkeypatch):
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     monkeypatch.delenv("DISPLAY", raising=False)
     with pytest.raises(SimulationError, match="no screen"):
         osimlite.simulate(pendulum, show=True, fixed_step=1e-3)

@@ -20,7 +20,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.simulation import Simulation
 from osimlite.sweep.plan import plan
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
 from osimlite.gait.cycle import find_cycle
 from osimlite.gait.stepmap import StepMap

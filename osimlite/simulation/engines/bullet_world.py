@@ -40,7 +40,7 @@ def _muted() -> Iterator[None]:
 
 
 with _muted():
-    require("pybullet", extra="bullet", purpose="the PyBullet engine")
+    require("pybullet", extra="sim", purpose="the PyBullet engine")
     import pybullet as bullet
 
 NO_LIMIT = 1e9

@@ -52,6 +52,7 @@ class CompiledEngine(System):
     name = "compiled"
     version = version()
     route = "composite-rigid-body"
+    entries = ("evaluate", "run_several")
 
     def __init__(self, mechanism: Mechanism, forces: Forces) -> None:
         super().__init__(mechanism, forces)

@@ -1,12 +1,15 @@
 """From functions of :mod:`osimlite.simulation.kernels` to the intermediate language of LLVM, by numba.
 
 The kernels know of no compiler. An entry is compiled with the functions that it calls within. It takes addresses of
-arrays and numbers, holds no reference to any Python object, and runs without Python's lock.
+arrays and numbers, holds no reference to any Python object, and runs without Python's lock. Numba would make machine
+code of every function that it meets, and optimise each once more within each that calls it; here it only translates
+them, and what an entry needs is optimised once, as a whole.
 """
 
 from __future__ import annotations
 
 import dis
+from collections.abc import Iterator
 from functools import cache
 from inspect import signature
 from types import FunctionType
@@ -15,10 +18,13 @@ from typing import Any
 from osimlite._require import require
 from osimlite.simulation.kernels import pointers
 
-numba = require("numba", extra="sim", purpose="the compiled engine")
+numba = require("numba", extra="fast", purpose="the compiled engine")
 
-from llvmlite import ir  # type: ignore[import-untyped]  # noqa: E402
-from numba.core import types  # noqa: E402
+from llvmlite import binding as llvm  # type: ignore[import-untyped]  # noqa: E402
+from llvmlite import ir  # noqa: E402
+from numba.core import codegen, typed_passes, types, untyped_passes  # noqa: E402
+from numba.core.compiler import CompilerBase  # noqa: E402
+from numba.core.compiler_machinery import PassManager  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
 
 POINTERS: dict[str, Any] = {
@@ -26,8 +32,6 @@ POINTERS: dict[str, Any] = {
     "Ints": types.CPointer(types.int64),  # type: ignore[no-untyped-call]
 }
 NUMBERS: dict[str, Any] = {"float": types.float64, "int": types.int64}
-LEAN = {"error_model": "numpy", "_nrt": False}
-"""No exceptions where a number is divided by zero; nothing is allocated."""
 
 
 @intrinsic
@@ -52,11 +56,90 @@ INSTRUCTIONS: dict[Any, Any] = {pointers.at: _at, pointers.call: _call}
 """What stands in the place of functions that Python has and machine code has not."""
 
 
+class _Library(codegen.JITCodeLibrary):
+    """A function as it was translated, and the libraries of those that it calls."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    def modules(self) -> Iterator[Any]:
+        """Copies of all that belongs together."""
+        pending: list[Any] = [self]
+        seen = set()
+        while pending:
+            library = pending.pop()
+            if library in seen:
+                continue
+            seen.add(library)
+            if isinstance(library, _Library):
+                pending += library._linking_libraries
+                yield library._final_module.clone()
+            else:
+                yield library._get_module_for_linking().clone()
+
+
+class _Translator(codegen.JITCPUCodegen):
+    _library_class = _Library
+
+    def set_env(self, name: str, env: Any) -> None:
+        """Nothing here needs an environment."""
+
+
+@cache
+def _own_parts() -> dict[str, Any]:
+    """What the kernels do not share with other functions that numba compiles in this process."""
+    translator: Any = _Translator
+    return {"_internal_codegen": translator("osimlite"), "cached_internal_func": {}}
+
+
+class _Pipeline(CompilerBase):
+    """Those passes of numba's that scalar code without Python objects needs."""
+
+    def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
+        super().__init__(typing, target.subtarget(**_own_parts()), *rest)  # type: ignore[no-untyped-call]
+
+    def define_pipelines(self) -> list[Any]:
+        passes: Any = PassManager("kernels")  # type: ignore[no-untyped-call]
+        for step in (
+            untyped_passes.TranslateByteCode,
+            untyped_passes.FixupArgs,
+            untyped_passes.IRProcessing,
+            untyped_passes.ReconstructSSA,
+            typed_passes.NopythonTypeInference,
+            typed_passes.PreLowerStripPhis,
+            typed_passes.IRLegalization,
+            typed_passes.NativeLowering,
+            typed_passes.NoPythonBackend,
+        ):
+            passes.add_pass(step, step.__name__)
+        passes.finalize()
+        return [passes]
+
+
+LEAN = {"error_model": "numpy", "_nrt": False, "pipeline_class": _Pipeline}
+"""No exceptions where a number is divided by zero; nothing is allocated."""
+
+
 def compiled(function: Any) -> tuple[str, str]:
     """Text and symbol of an entry."""
     parts = [{**POINTERS, **NUMBERS}[part.annotation] for part in signature(function).parameters.values()]
     entry = numba.cfunc(types.int64(*parts), nopython=True, **LEAN)(_linked(function))
-    return entry.inspect_llvm(), entry.native_name
+    whole = llvm.parse_assembly("")
+    for module in entry._library.modules():
+        whole.link_in(module)
+    for part in whole.functions:
+        if not part.is_declaration and part.name != entry.native_name:
+            part.linkage = "internal"
+    machine = entry._library.codegen._tm
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+    builder.getModulePassManager().run(whole, builder)
+    return str(whole), entry.native_name
 
 
 @cache

@@ -50,6 +50,9 @@ class Code:
     def __init__(self, name: str) -> None:
         self.name = name
 
+    def make_ready(self, functions: Sequence[str]) -> None:
+        """Compile functions of the kernels together, if that is to be done."""
+
     def address(self, function: str) -> int:
         """What stands for the address of a function of the kernels."""
         raise NotImplementedError
@@ -73,6 +76,11 @@ class Code:
 
 
 class _Compiled(Code):
+    def make_ready(self, functions: Sequence[str]) -> None:
+        from osimlite.simulation.engines.machine_code import make_ready
+
+        make_ready(functions)
+
     def address(self, function: str) -> int:
         from osimlite.simulation.engines.machine_code import address_of
 
@@ -132,17 +140,20 @@ class Program:
     Args:
         packed: the model.
         code: what runs it.
+        entries: names of the functions that will be called from outside, which are made ready with the rest.
 
     Attributes:
         ints: the structure and the addresses.
         failures: what the parts in Python have raised.
     """
 
-    def __init__(self, packed: Packed, code: Code) -> None:
+    def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
         self.code = code
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
+        kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
+        code.make_ready(tuple(dict.fromkeys((*entries, *packed.laws, *kernels))))
         for name in packed.laws:
             self.ints[layout.LAWS + LAW_NUMBERS[name]] = code.address(name)
         size = int(packed.structure[layout.STATE_SIZE])

@@ -6,15 +6,19 @@ nothing is compiled twice. The compiler is loaded for what is in no file yet.
 
 from __future__ import annotations
 
-import hashlib
 import logging
-from functools import cache
+from collections.abc import Sequence
+from contextlib import ExitStack
 from importlib.metadata import version
 from importlib.util import find_spec
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from osimlite._require import require
+from osimlite.simulation.engines.sources import digest_of
 from osimlite.simulation.kernels.table import law_function
+
+if TYPE_CHECKING:
+    from osimlite.simulation.engines.side_by_side import Made
 
 
 def _compiler_version() -> str:
@@ -24,7 +28,7 @@ def _compiler_version() -> str:
             return version("numba")
     except ValueError:
         pass
-    return str(require("numba", extra="sim", purpose="the compiled engine").__version__)
+    return str(require("numba", extra="fast", purpose="the compiled engine").__version__)
 
 
 _log = logging.getLogger(__name__)
@@ -32,26 +36,48 @@ _log = logging.getLogger(__name__)
 VERSION = f"numba {_compiler_version()}"
 
 
-@cache
+_addresses: dict[str, int] = {}
+"""Of the laws that are ready."""
+
+
 def address_of(name: str) -> int:
     """Address of the code of a law, which is compiled if there is no file of it."""
-    from osimlite.simulation.engines.object_code import load, store
+    make_ready([name])
+    return _addresses[name]
 
-    found = load(name, _digest())
-    if found is None:
-        from osimlite.simulation.engines.compiler import compiled
 
+def make_ready(names: Sequence[str]) -> None:
+    """Load the code of laws, and compile what is in no file, side by side if there is much."""
+    missing = [name for name in names if name not in _addresses and not _loaded(name)]
+    if not missing:
+        return
+    from osimlite.simulation.engines.side_by_side import Helper, cores, made, shares
+
+    for name in missing:
         _log.info("compiling '%s'", name)
-        found = store(name, _digest(), *compiled(law_function(name)))
-    return found
+    own, *others = shares(missing, cores())
+    with ExitStack() as stack:
+        helpers = [stack.enter_context(Helper(share)) for share in others]
+        for name in own:
+            _keep(made(name))
+        for helper in helpers:
+            for found in helper.found():
+                _keep(found)
+    for name in missing:
+        if name not in _addresses:
+            _keep(made(name))
 
 
-@cache
-def _digest() -> str:
-    """What tells whether any source of the compiled code has changed."""
-    package = Path(__file__).parents[2]
-    sources = [*sorted(package.glob("forces/*.py")), *sorted(package.glob("simulation/kernels/*.py"))]
-    simulation = package / "simulation"
-    sources += [simulation / "integrators.py", simulation / "constrained.py", package / "multibody" / "linear.py"]
-    sources.append(Path(__file__).with_name("compiler.py"))
-    return hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()[:12]
+def _loaded(name: str) -> bool:
+    from osimlite.simulation.engines.object_code import load
+
+    found = load(name, digest_of(law_function(name)))
+    if found is not None:
+        _addresses[name] = found
+    return found is not None
+
+
+def _keep(law: Made) -> None:
+    from osimlite.simulation.engines.object_code import keep
+
+    _addresses[law.name] = keep(law.name, law.digest, law.code, law.symbol)

@@ -68,7 +68,17 @@ def store(name: str, digest: str, text: str, symbol: str) -> int:
         text: in the intermediate language of LLVM.
         symbol: what it is called there.
     """
+    return keep(name, digest, translated(text), symbol)
+
+
+def translated(text: str) -> bytes:
+    """Code in the object format of the system from the intermediate language of LLVM."""
     code: bytes = _machine().emit_object(llvm.parse_assembly(text))
+    return code
+
+
+def keep(name: str, digest: str, code: bytes, symbol: str) -> int:
+    """Keep code in a file, if there is a folder for that; returns the address of the entry. Arguments as of `store`."""
     told = {"symbol": symbol, "sha256": hashlib.sha256(code).hexdigest()}
     refusals = []
     for folder in _folders():

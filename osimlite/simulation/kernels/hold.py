@@ -34,7 +34,7 @@ from osimlite.simulation.kernels.layout import (
     WORK_ROWS,
     WORK_SYSTEM,
 )
-from osimlite.simulation.kernels.least_squares import cholesky, factorise, shortest, substitute, turn_back
+from osimlite.simulation.kernels.least_squares import apply_q, cholesky, factored, solved, substitute
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 
@@ -75,11 +75,11 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
     for k in range(size):
         if not w[freedoms[FREEDOM_INTS * k + ROW]] > SAFE_MASS * pivots[k]:
             return False
-    rows, drifts, solved = at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_KEPT])
+    rows, drifts, columns = at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_KEPT])
     coupling, multipliers = room, at(room, count * count)
     least = most = 0.0
     for i in range(count):
-        row, column, longest = at(rows, size * i), at(solved, size * i), 0.0
+        row, column, longest = at(rows, size * i), at(columns, size * i), 0.0
         for k in range(size):
             column[k] = row[k]
             longest = max(longest, abs(row[k]))
@@ -104,7 +104,7 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
             multipliers[i] = missing
         substitute(count, coupling, multipliers)
         for i in range(count):
-            column, factor = at(solved, size * i), multipliers[i]
+            column, factor = at(columns, size * i), multipliers[i]
             for k in range(size):
                 right[k] -= factor * column[k]
     return True
@@ -149,9 +149,9 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
         values[i] = scale * drifts[i]
         for k in range(size):
             equations[size * i + k] = scale * rows[size * i + k]
-    rank = factorise(count, size, equations, REDUNDANT)
+    rank = factored(s, w, count, equations, REDUNDANT)
     free = size - rank
-    shortest(count, size, equations, rank, values, spare, right)
+    solved(s, count, equations, values, spare, right)
     pushed, reduced, basis = at(spare, count), at(spare, count + 2 * size), at(spare, count + 2 * size + size * size)
     rest = at(pushed, size)
     times_mass(s, matrix, right, pushed)
@@ -161,7 +161,7 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
         direction = at(basis, size * j)
         for k in range(size):
             direction[k] = 1.0 if k == rank + j else 0.0
-        turn_back(size, equations, rank, direction)
+        apply_q(size, equations, rank, direction)
         times_mass(s, matrix, direction, pushed)
         for i in range(j + 1):
             total = 0.0

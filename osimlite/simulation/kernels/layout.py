@@ -69,7 +69,9 @@ WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = 10, 11, 12, 13
 """Places in w of G (m, n), of the errors, and of what G u and G udot are to be."""
 WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = 14, 15, 16, 17
 """Places in w of room: for (m, n) numbers, for a factor of them, for solving, for states."""
-HELD_INTS = 18
+FACTORISE, MINIMUM_NORM = 18, 19
+"""The laws that factorise equations, and that solve them then."""
+HELD_INTS = 20
 
 FIRST_EQUATION, END_EQUATION, END_POSITION, BOND_OWN = 2, 3, 4, 5
 """Of a bond, after its law and the place of its numbers: its equations, of which those up to the second end bind

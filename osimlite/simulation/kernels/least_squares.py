@@ -9,16 +9,45 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.simulation.kernels.pointers import Floats, at
+from osimlite.simulation.kernels.layout import FACTORISE, FREEDOMS, HELD, LAWS, MINIMUM_NORM, SCRATCH
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 # A factor of count equations for size unknowns: the turned equations with the reflections (count, size), their diagonal
-# and order (2, count), and if there are more equations than count, these turned once more (count, count) with diagonal.
+# and order (2, count), and if there are more equations than count, these turned once more (count, count) with diagonal;
+# at the end how many equations count.
 FACTOR_EXTRA = 3
 
 
 def factor_room(count: int, size: int) -> int:
     """How many numbers a factor has."""
-    return count * size + count * count + FACTOR_EXTRA * count
+    return count * size + count * count + FACTOR_EXTRA * count + 1
+
+
+def factored(s: Ints, w: Floats, count: int, a: Floats, smallest: float) -> int:
+    """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
+    w[SCRATCH] = smallest
+    return call(s[LAWS + s[s[HELD] + FACTORISE]], s, w, w, a, a, count)
+
+
+def solved(s: Ints, count: int, a: Floats, values: Floats, room: Floats, x: Floats) -> None:
+    """The shortest x that comes nearest to fulfilling equations that were `factored`, see `minimum_norm`."""
+    call(s[LAWS + s[s[HELD] + MINIMUM_NORM]], s, values, room, a, x, count)
+
+
+def factorise_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
+    """`factorise` for others to call by its address: the factor f, what counts in SCRATCH."""
+    size = s[FREEDOMS]
+    rank = factorise(count, size, f, w[SCRATCH])
+    f[factor_room(count, size) - 1] = rank
+    return rank
+
+
+def minimum_norm_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
+    """`minimum_norm` for others to call by its address: right sides x, room w, factor y, solution f."""
+    size = s[FREEDOMS]
+    rank = int(y[factor_room(count, size) - 1])
+    minimum_norm(count, size, y, rank, x, w, f)
+    return rank
 
 
 def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
@@ -94,7 +123,7 @@ def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats)
         x[apart * k] -= total * v[stride * k]
 
 
-def shortest(count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats) -> None:
+def minimum_norm(count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats) -> None:
     """The shortest x (size,) that comes nearest to fulfilling factored equations with right sides (count,).
 
     Args:
@@ -126,10 +155,10 @@ def shortest(count: int, size: int, a: Floats, rank: int, values: Floats, room: 
             room[r] = total / diagonal[r]
     for k in range(size):
         x[k] = room[k] if k < rank else 0.0
-    turn_back(size, a, rank, x)
+    apply_q(size, a, rank, x)
 
 
-def turn_back(size: int, a: Floats, rank: int, x: Floats) -> None:
+def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
     """From turned unknowns to the unknowns; those from `rank` on are free."""
     for r in range(rank - 1, -1, -1):
         reflect(r, size, 1, at(a, size * r), 1, x)

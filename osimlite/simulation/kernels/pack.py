@@ -330,6 +330,7 @@ class _Packer:
             self.numbers += bond.numbers
             equations = end
         head[at.HOLD], head[at.PROJECT] = self.law("hold"), self.law("project")
+        head[at.FACTORISE], head[at.MINIMUM_NORM] = self.law("factorise_law"), self.law("minimum_norm_law")
         head[at.BONDS], head[at.BOND_AT] = len(bonds), len(self.ints)
         self.ints += records
         head[at.BALLS], head[at.BALL_AT] = len(self.balls), len(self.ints)

@@ -31,7 +31,7 @@ from osimlite.simulation.kernels.layout import (
     WORK_SYSTEM,
     WORK_TRIAL,
 )
-from osimlite.simulation.kernels.least_squares import factorise, shortest
+from osimlite.simulation.kernels.least_squares import factored, solved
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
@@ -88,13 +88,12 @@ def project_values(
         return FINE
     if not norm <= limit:
         return FAR
-    rank = 0
     for iteration in range(ITERATIONS):
         rows_by_values(s, w, y, kept)
         for k in range(count * size):
             factor[k] = kept[k]
-        rank = factorise(count, size, factor, REDUNDANT * count)
-        shortest(count, size, factor, rank, errors, room, step)
+        factored(s, w, count, factor, REDUNDANT * count)
+        solved(s, count, factor, errors, room, step)
         for k in range(size):
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
@@ -110,7 +109,7 @@ def project_values(
     if not norm <= tolerance:
         return FAR
     if has_errors > 0:
-        across(count, size, kept, factor, rank, off, errors, room, step)
+        across(s, count, kept, factor, off, errors, room, step)
         for k in range(size):
             off[k] -= step[k]
     return bound(s, x, w, y)
@@ -132,10 +131,10 @@ def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, 
     for i in range(count):
         for k in range(size):
             factor[size * i + k] = scales[k] * rows[size * i + k]
-    rank = factorise(count, size, factor, REDUNDANT * count)
+    factored(s, w, count, factor, REDUNDANT * count)
     # The rows do not depend on the speeds: one step does, a second one mends its rounding.
     for _ in range(2):
-        shortest(count, size, factor, rank, errors, room, step)
+        solved(s, count, factor, errors, room, step)
         for k in range(size):
             u[k] -= scales[k] * step[k]
         norm = speed_errors(s, w, u, errors)
@@ -144,29 +143,29 @@ def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, 
     if not norm <= tolerance:
         return FAR
     if has_errors > 0:
-        across(count, size, rows, factor, rank, off, errors, room, step)
+        across(s, count, rows, factor, off, errors, room, step)
         for k in range(size):
             off[k] -= scales[k] * step[k]
     return FINE
 
 
 def across(
+    s: Ints,
     count: int,
-    size: int,
     rows: Floats,
     factor: Floats,
-    rank: int,
     off: Floats,
     values: Floats,
     room: Floats,
     found: Floats,
 ) -> None:
     """What of some errors lies across equations, of which the factor is known."""
+    size = s[FREEDOMS]
     for i in range(count):
         values[i] = 0.0
         for k in range(size):
             values[i] += rows[size * i + k] * off[k]
-    shortest(count, size, factor, rank, values, room, found)
+    solved(s, count, factor, values, room, found)
 
 
 def position_errors(s: Ints, w: Floats, errors: Floats) -> float:

@@ -20,6 +20,8 @@ LAW_MODULES = {
     "move_drift": "drifts",
     "hold": "hold",
     "project": "projection",
+    "factorise_law": "least_squares",
+    "minimum_norm_law": "least_squares",
     "prescribe": "bonds",
     "couple": "bonds",
     "bind_bodies": "bonds",

@@ -1,0 +1,70 @@
+"""When a law is compiled anew: when it, or what it calls, or a number that it uses has changed; not for words."""
+
+from __future__ import annotations
+
+from types import FunctionType
+
+import pytest
+
+from osimlite.simulation.engines import sources
+from osimlite.simulation.kernels import hold, least_squares, pointers
+from osimlite.simulation.kernels.table import LAW_MODULES, law_function
+
+
+def digests():
+    sources.digest_of.cache_clear()
+    return {name: sources.digest_of(law_function(name)) for name in LAW_MODULES}
+
+
+@pytest.fixture
+def changed(monkeypatch):
+    """Names of the laws whose digest an edit changes."""
+    before = digests()
+
+    def edit(module, name, value):
+        monkeypatch.setattr(module, name, value)
+        after = digests()
+        return {law for law in before if before[law] != after[law]}
+
+    yield edit
+    sources.digest_of.cache_clear()
+
+
+def edited(function, **parts):
+    code = function.__code__.replace(**parts)
+    copy = FunctionType(code, function.__globals__, function.__name__, function.__defaults__)
+    copy.__annotations__, copy.__module__ = function.__annotations__, function.__module__
+    return copy
+
+
+def test_an_edited_function_concerns_those_that_call_it(changed):
+    reflect = least_squares.reflect
+    constants = tuple(0.5 if item == 0.0 else item for item in reflect.__code__.co_consts)
+    found = changed(least_squares, "reflect", edited(reflect, co_consts=constants))
+    # `project` solves by the addresses of these laws.
+    assert found == {"factorise_law", "minimum_norm_law", "hold"}
+
+
+def test_a_changed_number_concerns_those_that_use_it(changed):
+    assert changed(hold, "SAFE_MASS", 2.0 * hold.SAFE_MASS) == {"hold"}
+
+
+def test_words_and_places_concern_nobody(changed):
+    reflect = least_squares.reflect
+    words = ("Other words.", *reflect.__code__.co_consts[1:])
+    moved = edited(reflect, co_consts=words, co_firstlineno=7)
+    moved.__doc__ = words[0]
+    assert not changed(least_squares, "reflect", moved)
+
+
+def test_the_settings_of_the_compiler_concern_all(changed, monkeypatch):
+    monkeypatch.setattr(sources, "_settings", lambda: "other")
+    assert changed(hold, "SAFE_MASS", hold.SAFE_MASS) == set(LAW_MODULES)
+
+
+def test_what_a_process_keeps_concerns_nobody(changed):
+    assert not changed(pointers, "laws", {7: len})
+
+
+def test_every_law_differs():
+    assert len(set(digests().values())) == len(LAW_MODULES)
