@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -18,7 +19,7 @@ from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import KEY, Partial, local, partial_of, schema, spare, spare_strangers
+from osimlite.sweep.results import KEY, Partial, damage_told, local, partial_of, schema, spare, spare_strangers
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
@@ -147,16 +148,16 @@ def optimize(
         partial = _open(
             where / HISTORY, schema(plan.columns("evaluation", "batch"), wanted), resume, force, evaluations
         )
-        evaluations.partial = partial
+        evaluations.partial, ended = partial, ""
         try:
-            ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
-        except Enough:
-            ended = f"as many runs as were allowed: {evaluations.count}"
+            with suppress(Enough):
+                ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
+            partial.finish()
         except KeyboardInterrupt:
             raise interrupted(partial, counted(partial.rows, "run")) from None
         finally:
             partial.close()
-        partial.finish()
+    ended = ended or f"as many runs as were allowed: {evaluations.count}"
     return _finish(where, plan, variants, evaluations, wanted, ended)
 
 
@@ -185,7 +186,8 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
         spare(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        before = pq.read_table(local(path))
+        with damage_told(path):
+            before = pq.read_table(local(path), page_checksum_verification=True)
         if resume:
             partial = Partial(path, table)
             for batch in before.to_batches():

@@ -1,17 +1,21 @@
 """Results as a table in a file: Parquet when it is whole, and until then a file to which rows are added.
 
-The partial file is a stream of Arrow's: its schema, with the settings, and one message after another, each with some
-rows in the order of the runs. What a killed program leaves of a message at its end is cut off.
+The partial file is one record after another: Arrow's schema, with the settings, then batches of rows in the order of
+the runs. Each begins with its length and a checksum. Whatever has become of the file, what comes from the first damaged
+record on is cut off, said, and computed again.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
+import struct
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,13 +23,19 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import MissingFileError, OsimliteError, SettingError
-from osimlite.text import listed
+from osimlite.text import counted, listed
 
 KEY = b"osimlite"
 """Where the settings are in the metadata of the schema, as JSON."""
 
 ROWS_PER_GROUP = 65536
 """Of the Parquet file."""
+
+_HEAD = struct.Struct("<4sQ16s")
+_MARK = b"OSB1"
+"""What a record of the partial file begins with; then the length and the checksum of the rest follow."""
+
+_log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -71,10 +81,19 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     if not Path(path).exists():
         raise MissingFileError("cannot read the file: no such file", file=str(path))
     try:
-        found: dict[str, Any] = json.loads((pq.read_schema(local(path)).metadata or {})[KEY])
-    except (KeyError, ValueError):
-        # What is no Parquet is an ArrowInvalid, a ValueError.
+        return _settings_in(pq.read_schema(local(path)))
+    except (ValueError, OSError):
         raise OsimliteError("this file is not the results of a sweep; give them another name", file=str(path)) from None
+
+
+def _settings_in(table: Any) -> dict[str, Any]:
+    """The settings in the schema of a table; ValueError (what is no Arrow is one too) if there are none."""
+    try:
+        found = json.loads((table.metadata or {})[KEY])
+    except (KeyError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError
     return found
 
 
@@ -155,16 +174,15 @@ class Partial:
         if is_there and not resume:
             raise SettingError(f"interrupted work is in '{self.partial}'; go on with --resume, or remove that file")
         try:
-            self._stream = self.partial.open("ab")
+            self._lock = _locked(self.partial)
             try:
-                _lock(self._stream, self.partial)
+                self._stream = self.partial.open("ab")
                 if is_there:
                     self._reopen()
                 else:
-                    self._stream.write(table.serialize().to_pybytes())
-                    self._stream.flush()
+                    self._put(table)
             except BaseException:
-                self._stream.close()
+                self._let_go()
                 raise
         except OSError as error:
             raise OsimliteError(f"cannot write here: {error.strerror}", file=str(self.partial)) from None
@@ -178,8 +196,7 @@ class Partial:
         batch = pa.record_batch(arrays, schema=self.schema)
         with undisturbed():
             try:
-                self._stream.write(batch.serialize().to_pybytes())
-                self._stream.flush()
+                self._put(batch)
             except OSError as error:
                 raise OsimliteError(
                     f"cannot write here: {error.strerror}; make room, then go on with --resume", file=str(self.partial)
@@ -187,9 +204,19 @@ class Partial:
             self.rows += batch.num_rows
 
     def read(self, take: Callable[[Any], object]) -> None:
-        """Give every batch that is there to a function."""
-        with self.partial.open("rb") as stream:
-            _batches(stream, take)
+        """Give every batch that is there to a function.
+
+        Raises:
+            OsimliteError: another program has damaged the file meanwhile.
+        """
+        end = _batches(self.partial, take)
+        if end < self.partial.stat().st_size:
+            raise OsimliteError("the file was damaged meanwhile; go on with --resume", file=str(self.partial))
+
+    def _put(self, item: Any) -> None:
+        body = item.serialize().to_pybytes()
+        self._stream.write(_HEAD.pack(_MARK, len(body), _checksum(body)) + body)
+        self._stream.flush()
 
     def finish(self) -> Path:
         """Make the Parquet file of it, which appears whole; without rows there is none."""
@@ -201,7 +228,7 @@ class Partial:
         beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         waiting: list[Any] = []
         try:
-            with pq.ParquetWriter(local(beside), self.schema) as writer:
+            with pq.ParquetWriter(local(beside), self.schema, write_page_checksum=True) as writer:
 
                 def put(least: int) -> None:
                     table = pa.Table.from_batches(waiting, self.schema)
@@ -228,66 +255,108 @@ class Partial:
 
     def close(self) -> None:
         """Let go of the file, and leave it as it is; one without rows is removed."""
-        with suppress(OSError):
-            # What was lost to a full disk has been told of.
-            self._stream.close()
         if self.rows == 0:
             self.partial.unlink(missing_ok=True)
+        self._let_go()
+
+    def _let_go(self) -> None:
+        with suppress(OSError, AttributeError):
+            # What was lost to a full disk has been told of; and there may be no stream yet.
+            self._stream.close()
+        if self._lock.is_locked:
+            with suppress(OSError):
+                # Windows removes no file that is open, but the lock does so there itself.
+                Path(self._lock.lock_file).unlink()
+            self._lock.release()
 
     def _reopen(self) -> None:
-        """Count what is there, and cut off what is not whole."""
+        """Count what is there, and cut off what is damaged."""
         pa = _arrow()
-        with self.partial.open("rb") as stream:
-            try:
-                found = pa.ipc.open_stream(stream).schema
-                before = json.loads(found.metadata[KEY])
-            except (pa.ArrowInvalid, KeyError, TypeError, EOFError):
-                raise SettingError(
-                    f"'{self.partial}' is no interrupted sweep; remove it, or take another name"
-                ) from None
-            unlike = differences(before, json.loads(self.schema.metadata[KEY]))
-            if unlike or not found.equals(self.schema):
-                raise SettingError(
-                    f"the interrupted work in '{self.partial}' has other settings: {listed(unlike) or 'its columns'}; "
-                    "ask for the same as before, or remove that file"
-                )
-            stream.seek(0)
-            end = _batches(stream, self._count)
-        os.truncate(self.partial, end)
+        first = next(_records(self.partial), None)
+        try:
+            found = pa.ipc.read_schema(pa.py_buffer(b"" if first is None else first[0]))
+            before = _settings_in(found)
+        except (ValueError, OSError):
+            raise SettingError(
+                f"'{self.partial}' is no interrupted sweep, or is damaged at its beginning; remove it, or take another "
+                "name"
+            ) from None
+        unlike = differences(before, json.loads(self.schema.metadata[KEY]))
+        if unlike or not found.equals(self.schema):
+            raise SettingError(
+                f"the interrupted work in '{self.partial}' has other settings: {listed(unlike) or 'its columns'}; "
+                "ask for the same as before, or remove that file"
+            )
+        end = _batches(self.partial, self._count)
+        if end < self.partial.stat().st_size:
+            _log.warning(
+                "'%s' is damaged or cut off after the first %s; the rest is computed again",
+                self.partial,
+                counted(self.rows, "run"),
+            )
+            os.truncate(self.partial, end)
 
     def _count(self, batch: Any) -> None:
         self.rows += batch.num_rows
 
 
-def _lock(stream: Any, path: Path) -> None:
-    """Keep other programs from writing a file until it is closed, where the system can."""
+def _locked(path: Path) -> Any:
+    """A lock that keeps other programs from writing a file until it is released.
+
+    Raises:
+        OsimliteError: another program has it, or there can be none.
+    """
+    filelock = require("filelock", extra="sweep", purpose="a table of results")
+    lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), thread_local=False)
     try:
-        import fcntl
-    except ImportError:
-        return
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        lock.acquire(blocking=False)
+    except filelock.Timeout:
         raise OsimliteError(
             "this file is being written by another program; wait until it has ended", file=str(path)
         ) from None
-    except OSError:
+    except NotImplementedError:
         # Not every file system knows locks.
-        return
+        pass
+    return lock
 
 
-def _batches(stream: Any, take: Callable[[Any], object]) -> int:
-    """Give every whole batch of a stream to a function; the place where the last one ends."""
+def _records(path: Path) -> Iterator[tuple[bytes, int]]:
+    """The records of a partial file as far as they are whole, and where each ends."""
+    with path.open("rb") as stream:
+        while len(head := stream.read(_HEAD.size)) == _HEAD.size:
+            mark, length, checksum = _HEAD.unpack(head)
+            # A damaged length may be that of no memory.
+            if mark != _MARK or length > path.stat().st_size:
+                return
+            body = stream.read(length)
+            if len(body) < length or _checksum(body) != checksum:
+                return
+            yield body, stream.tell()
+
+
+def _checksum(body: bytes) -> bytes:
+    return blake2b(body, digest_size=16).digest()
+
+
+def _batches(path: Path, take: Callable[[Any], object]) -> int:
+    """Give every batch of a partial file to a function, up to the first that is damaged; where the last one ends."""
     pa = _arrow()
-    reader = pa.ipc.open_stream(stream)
-    end: int = stream.tell()
-    while True:
-        try:
-            batch = reader.read_next_batch()
-        except (StopIteration, pa.ArrowInvalid, OSError):
-            return end
-        take(batch)
-        end = stream.tell()
+    records = _records(path)
+    head, end = next(records)
+    schema = pa.ipc.read_schema(pa.py_buffer(head))
+    for body, after in records:
+        take(pa.ipc.read_record_batch(pa.py_buffer(body), schema))
+        end = after
+    return end
+
+
+@contextmanager
+def damage_told(path: str | Path) -> Iterator[None]:
+    """An error that names the file, where Parquet is read that is damaged."""
+    try:
+        yield
+    except (OSError, ValueError):
+        raise OsimliteError("the results are damaged; remove the file, and run anew", file=str(path)) from None
 
 
 class Range(NamedTuple):
@@ -305,7 +374,7 @@ def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     found: dict[str, Range] = {}
     counts = dict.fromkeys(names, 0)
-    with pq.ParquetFile(local(path)) as file:
+    with damage_told(path), pq.ParquetFile(local(path), page_checksum_verification=True) as file:
         for batch in file.iter_batches(columns=["run", *names]):
             runs = batch.column("run").to_numpy()
             for name in names:

@@ -118,11 +118,11 @@ def sweep(
         outcome = Outcome(path, samples.count, partial.rows)
         try:
             _Work(samples, workforce, partial, outcome, progress).do()
+            partial.finish()
         except KeyboardInterrupt:
             raise interrupted(partial, f"{partial.rows} of {samples.count} runs") from None
         finally:
             partial.close()
-        partial.finish()
     outcome.seconds = time.perf_counter() - started
     return outcome
 

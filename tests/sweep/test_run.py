@@ -14,6 +14,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import MissingFileError, OsimliteError, SettingError
+from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.sweep import results
 from osimlite.sweep.plan import plan
 from osimlite.sweep.results import Partial, differences, ranges, schema, settings_of
@@ -160,6 +161,110 @@ def test_a_torn_message_at_the_end_is_cut_off(made, tmp_path):
         path.unlink(missing_ok=True)
         outcome = sweep(made, chosen, path, resume=True)
         assert 0 < outcome.before < 40 and path.read_bytes() == whole
+
+
+def _ends(content: bytes) -> list[int]:
+    """Where the records of a partial file end."""
+    ends = [0]
+    while ends[-1] < len(content):
+        head = results._HEAD.unpack_from(content, ends[-1])
+        ends.append(ends[-1] + results._HEAD.size + head[1])
+    return ends
+
+
+@pytest.fixture(scope="module")
+def interrupted_three_times(tmp_path_factory):
+    """A plan and its samples, the whole results, and the partial file, with three batches."""
+    made = plan(dynamic_walker(), {"RHip_rz": (0.3, 0.5)}, to=0.05)
+    chosen, folder = samples(made.variables, "sobol", 40, 5), tmp_path_factory.mktemp("sweep")
+    whole = sweep(made, chosen, folder / "whole.parquet").path.read_bytes()
+    for count in (8, 16, 30):
+        with pytest.raises(Interrupted):
+            sweep(made, chosen, folder / "r.parquet", resume=True, workers=1, progress=Stopper(count))
+    partial = (folder / "r.parquet.partial").read_bytes()
+    assert len(_ends(partial)) == 5
+    return made, chosen, whole, partial
+
+
+def _flipped(content: bytes, place: int) -> bytes:
+    return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+
+
+def _zeroed(content: bytes, place: int) -> bytes:
+    return content[:place] + bytes(min(64, len(content) - place)) + content[place + 64 :]
+
+
+@pytest.mark.parametrize(
+    ("damage", "part"),
+    [
+        *((_flipped, part) for part in ("mark", "length", "longer", "checksum", "rows", "last")),
+        *((_zeroed, part) for part in ("mark", "rows", "last")),
+    ],
+)
+@pytest.mark.parametrize("batch", [1, 3])
+def test_damaged_batches_are_computed_again_and_said(interrupted_three_times, tmp_path, caplog, damage, part, batch):
+    made, chosen, whole, good = interrupted_three_times
+    start, end = _ends(good)[batch : batch + 2]
+    inside = {"mark": 0, "length": 4, "longer": 11, "checksum": 12, "rows": (end - start) // 2, "last": end - start - 1}
+    path = tmp_path / "r.parquet"
+    damaged = damage(good, start + inside[part])
+    assert damaged != good
+    (tmp_path / "r.parquet.partial").write_bytes(damaged)
+    outcome = sweep(made, chosen, path, resume=True)
+    assert path.read_bytes() == whole
+    (said,) = caplog.messages
+    assert "r.parquet.partial' is damaged or cut off" in said and f"first {outcome.before} run" in said
+    assert (outcome.before == 0) == (batch == 1)
+    assert [found.name for found in tmp_path.iterdir()] == ["r.parquet"]
+
+
+def test_undamaged_work_is_gone_on_with_in_silence(interrupted_three_times, tmp_path, caplog):
+    made, chosen, whole, good = interrupted_three_times
+    (tmp_path / "r.parquet.partial").write_bytes(good)
+    outcome = sweep(made, chosen, tmp_path / "r.parquet", resume=True)
+    assert outcome.before >= 24 and (tmp_path / "r.parquet").read_bytes() == whole and not caplog.messages
+
+
+@pytest.mark.parametrize("place", [0, 5, 14, 40, -1])
+def test_work_damaged_at_its_beginning_is_refused(interrupted_three_times, tmp_path, place):
+    made, chosen, _, good = interrupted_three_times
+    damaged = _flipped(good, place % _ends(good)[1])
+    (tmp_path / "r.parquet.partial").write_bytes(damaged)
+    with pytest.raises(SettingError, match=r"r\.parquet\.partial' is no interrupted sweep, or is damaged"):
+        sweep(made, chosen, tmp_path / "r.parquet", resume=True)
+    assert [found.name for found in tmp_path.iterdir()] == ["r.parquet.partial"]
+    assert (tmp_path / "r.parquet.partial").read_bytes() == damaged
+
+
+def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
+    partial = Partial(tmp_path / "r", schema({"run": "int64"}, {}))
+    for first in (0, 2):
+        partial.add([[first, first + 1]])
+    content = partial.partial.read_bytes()
+    partial.partial.write_bytes(_flipped(content, len(content) - 1))
+    with pytest.raises(OsimliteError, match="was damaged meanwhile; go on with --resume"):
+        partial.finish()
+    partial.close()
+    assert [found.name for found in tmp_path.iterdir()] == ["r.partial"]
+
+
+def test_damaged_results_are_told(tmp_path):
+    partial = Partial(tmp_path / "r", schema({"run": "int64", "x": "float64"}, {"a": 1}))
+    partial.add([np.arange(1000), np.random.default_rng(1).uniform(size=1000)])
+    partial.finish()
+    partial.close()
+    content = (tmp_path / "r").read_bytes()
+    (tmp_path / "r").write_bytes(_flipped(content, len(content) // 2))
+    with pytest.raises(OsimliteError, match="the results are damaged"):
+        ranges(tmp_path / "r", ["x"])
+
+
+@pytest.mark.parametrize("text", [b"[]", b"7", b"null", b'"a"', b"{", b"[" * 100_000])
+def test_settings_of_another_type_are_none(tmp_path, text):
+    table = schema({"run": "int64"}, {}).with_metadata({results.KEY: text})
+    pq.write_table(table.empty_table(), tmp_path / "r")
+    with pytest.raises(OsimliteError, match="not the results of a sweep"):
+        results.settings_of(tmp_path / "r")
 
 
 def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
