@@ -43,7 +43,14 @@ def simulate(
     output: options.Folder = Path("."),
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, forces and energy as PNG.")] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
-    gui: Annotated[bool, typer.Option("--gui", help="Show it live in PyBullet's window; takes fixed steps.")] = False,
+    gui: Annotated[
+        bool,
+        typer.Option(
+            "--gui",
+            help="Show it live in PyBullet's window, until you press Escape there (space stops it meanwhile); takes "
+            "fixed steps.",
+        ),
+    ] = False,
     skip_unsupported: options.SkipUnsupported = False,
     opensim_derivatives: Annotated[
         bool,
@@ -99,8 +106,9 @@ def simulate(
                 initial_speeds=speeds,
                 progress=progress,
             )
-    files = _write(model, trajectory, output, plot=plot, animate=animate)
-    _told(trajectory, files).show()
+        files = _write(model, trajectory, output, plot=plot, animate=animate)
+        _told(trajectory, files).show()
+        simulation.hold()
 
 
 PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}

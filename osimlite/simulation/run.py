@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from math import floor, isfinite
 from numbers import Real
 from pathlib import Path
@@ -85,7 +86,7 @@ def simulate(
         external_loads: a file of ExternalLoads: measured forces over time that act too.
         folder: where the model's file is; files that the model names (of contact meshes) are looked for there. The
             folder that the program runs in if left out.
-        show: show the motion in Bullet's window, in real time; needs `fixed_step`.
+        show: show the motion in Bullet's window, in real time, and return when it is closed; needs `fixed_step`.
         progress: called with the simulated time at every recorded moment.
 
     Raises:
@@ -107,7 +108,7 @@ def simulate(
         folder=folder,
         show=show,
     ) as simulation:
-        return simulation.run(
+        trajectory = simulation.run(
             to,
             accuracy=accuracy,
             fixed_step=fixed_step,
@@ -116,6 +117,8 @@ def simulate(
             initial_speeds=initial_speeds,
             progress=progress,
         )
+        simulation.hold()
+        return trajectory
 
 
 def kept_constraints(mechanism: Mechanism) -> list[str]:
@@ -160,9 +163,12 @@ class Simulation:
         )
         visuals = None
         if show:
+            from osimlite.meshes.folders import MeshFolders
+            from osimlite.robot.mesh_files import MeshFiles
             from osimlite.robot.visuals import collect_visuals
 
-            visuals = collect_visuals(model, self.mechanism)
+            places = MeshFolders(Path.cwd() if folder is None else Path(folder))
+            visuals = collect_visuals(model, self.mechanism, mesh_files=MeshFiles(places))
         self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
         self.state = self.engine.state
         self.constraints = Constrained(self.mechanism, self.engine.order).names
@@ -228,6 +234,12 @@ class Simulation:
             **self._settings,
         }
         return self._trajectory(times, states, stepper, recorder, wanted, wall)
+
+    def hold(self) -> None:
+        """Keep the last pose in the window until somebody closes it; nothing without a window."""
+        if self._show:
+            with suppress(KeyboardInterrupt):
+                self.engine.hold()
 
     def close(self) -> None:
         """Free what the engine holds; trajectories stay good."""

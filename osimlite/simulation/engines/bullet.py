@@ -35,6 +35,7 @@ from osimlite.simulation.system import System
 
 if TYPE_CHECKING:
     from osimlite.robot.visuals import Visuals
+    from osimlite.simulation.engines.bullet_window import Window
 
 MASS_MATRIX, ARTICULATED_BODY, RECURSION = "mass-matrix", "articulated-body", "recursion"
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY, RECURSION)
@@ -109,7 +110,12 @@ class BulletEngine:
         robot = legal_names(merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes)))
         self._check(robot)
         files = {} if visuals is None else visuals.files
-        self._body = World(robot, mechanism.gravity.tolist(), show=show, files=files, exact=self.EXACT_INERTIAS)
+        self._window: Window | None = None
+        if show:
+            from osimlite.simulation.engines.bullet_window import Window
+
+            self._window = Window(robot, mechanism.gravity.tolist(), files)
+        self._body = World(robot, mechanism.gravity.tolist(), files=files, exact=self.EXACT_INERTIAS)
         try:
             self._prepare(mechanism, forces, robot, route)
         except BaseException:
@@ -230,9 +236,26 @@ class BulletEngine:
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on: Runge-Kutta-Merson, or Bullet's own fixed steps."""
+        observe = self._watched(observe)
         if settings.fixed_step is not None:
-            return BulletStepper(self, t, y, settings.fixed_step, observe, paced=settings.show)
+            return BulletStepper(self, t, y, settings.fixed_step, observe)
         return self._merson(t, y, settings, observe, None)
+
+    def _joint_values(self, y: list[float]) -> list[float]:
+        """Values of Bullet's joints at a state."""
+        return y[: self._count]
+
+    def _watched(self, observe: Observer) -> Observer:
+        """The same observer, and a look at the window, if there is one."""
+        window = self._window
+        if window is None:
+            return observe
+
+        def watched(t: float, y: list[float]) -> None:
+            observe(t, y)
+            window.show(t, self._joint_values(y))
+
+        return watched
 
     def _merson(
         self, t: float, y: list[float], settings: Settings, observe: Observer, projection: Projection | None
@@ -256,6 +279,13 @@ class BulletEngine:
     def close(self) -> None:
         """Leave Bullet; any number of times."""
         self._body.close()
+        if self._window is not None:
+            self._window.close()
+
+    def hold(self) -> None:
+        """Keep the window, if there is one, until somebody closes it."""
+        if self._window is not None:
+            self._window.hold()
 
     def __enter__(self) -> BulletEngine:
         return self

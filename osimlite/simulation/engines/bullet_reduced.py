@@ -7,8 +7,6 @@ on the coordinates of the model, and the constraints are kept up by :mod:`osimli
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from osimlite.errors import UnsupportedError
@@ -116,10 +114,9 @@ class ReducedBulletEngine(BulletEngine):
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on: Runge-Kutta-Merson, or fixed steps as Bullet takes them."""
+        observe = self._watched(observe)
         if settings.fixed_step is None:
             return self._merson(t, y, settings, observe, self.constrained)
-        if settings.show:
-            observe = _Shown(self, t, observe)
         return SemiImplicitEuler(
             self.derivative,
             t,
@@ -132,23 +129,11 @@ class ReducedBulletEngine(BulletEngine):
             projection=self.constrained,
         )
 
+    def _joint_values(self, y: list[float]) -> list[float]:
+        x, u = np.array(y[: self._count]), np.array(y[self._count : 2 * self._count])
+        values: list[float] = self.reduction.at(x, u).values.tolist()
+        return values
+
     def _rates(self, x: list[float], u: list[float]) -> list[float]:
         rates: list[float] = self.reduction.coordinate_rates(np.array(x), np.array(u)).tolist()
         return rates
-
-
-class _Shown:
-    """Puts Bullet's robot where the motion is, in real time."""
-
-    def __init__(self, engine: ReducedBulletEngine, t: float, observe: Observer) -> None:
-        self._engine, self._observe = engine, observe
-        self._start = t, time.perf_counter()
-
-    def __call__(self, t: float, y: list[float]) -> None:
-        self._observe(t, y)
-        engine, count = self._engine, self._engine._count
-        joints = engine.reduction.at(np.array(y[:count]), np.array(y[count : 2 * count]))
-        engine._body.set_state(joints.values.tolist(), joints.rates.tolist())
-        ahead = (t - self._start[0]) - (time.perf_counter() - self._start[1])
-        if ahead > 0.0:
-            time.sleep(ahead)

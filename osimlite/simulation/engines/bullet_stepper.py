@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from math import inf
 from typing import TYPE_CHECKING
@@ -25,19 +24,14 @@ class BulletStepper(Stepper):
         y: initial state.
         h: step, s; a last one may be shorter.
         observe: called with (time, state) after each step; the loads are those at that state.
-        paced: wait so that the motion takes its real time.
     """
 
-    def __init__(
-        self, engine: BulletEngine, t: float, y: list[float], h: float, observe: Observer, *, paced: bool = False
-    ) -> None:
+    def __init__(self, engine: BulletEngine, t: float, y: list[float], h: float, observe: Observer) -> None:
         if not 0.0 < h < inf:
             raise SimulationError(f"The fixed step must be positive and finite; {h} s is not.")
         self._engine, self._body = engine, engine._body
         self._h = h
         self._observe = observe
-        self._paced = paced
-        self._start = (t, time.perf_counter())
         self._origin, self._since = t, 0
         self.time, self.state = t, list(y)
         self.evaluations = self.taken = 0
@@ -74,10 +68,6 @@ class BulletStepper(Stepper):
         self._torques = self._evaluate_forces(y)
         if self._observe is not None:
             self._observe(t, y)
-        if self._paced:
-            ahead = (t - self._start[0]) - (time.perf_counter() - self._start[1])
-            if ahead > 0.0:
-                time.sleep(ahead)
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The straight line between the ends of the last step."""

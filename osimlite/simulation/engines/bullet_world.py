@@ -17,29 +17,29 @@ from osimlite.robot.principal_axes import principal_axes
 from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.engines.bullet_file import excess, robot_text, temporary_file
 
-__all__ = ["World", "bullet"]
+__all__ = ["World", "bullet", "muted"]
 
 
 @contextmanager
-def _muted() -> Iterator[None]:
-    """Nothing goes to standard error meanwhile: on its import, PyBullet says there when it was built."""
+def muted(descriptor: int = 2) -> Iterator[None]:
+    """Nothing goes to standard error (2) or output (1) meanwhile, where PyBullet tells of its build, and more."""
     try:
-        kept = os.dup(2)
+        kept = os.dup(descriptor)
     except OSError:
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    sys.stderr.flush()
-    os.dup2(nowhere, 2)
+    (sys.stderr if descriptor == 2 else sys.stdout).flush()
+    os.dup2(nowhere, descriptor)
     try:
         yield
     finally:
-        os.dup2(kept, 2)
+        os.dup2(kept, descriptor)
         os.close(kept)
         os.close(nowhere)
 
 
-with _muted():
+with muted():
     require("pybullet", extra="sim", purpose="the PyBullet engine")
     import pybullet as bullet
 
@@ -71,11 +71,10 @@ class World:
         robot: Robot,
         gravity: Sequence[float],
         *,
-        show: bool = False,
         files: Mapping[str, bytes] | None = None,
         exact: bool = True,
     ) -> None:
-        self.client = _connect(show)
+        self.client = _connect()
         self._step = 0.0
         self._exact = exact
         try:
@@ -194,13 +193,8 @@ class World:
             self.client = -1
 
 
-def _connect(show: bool) -> int:
-    if show and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        raise SimulationError(
-            "there is no screen to show the motion on (DISPLAY is not set); leave out --gui, "
-            "and take --animate for a film"
-        )
-    client = int(bullet.connect(bullet.GUI if show else bullet.DIRECT))
+def _connect() -> int:
+    client = int(bullet.connect(bullet.DIRECT))
     if client < 0:
         raise SimulationError("Bullet opens no more worlds; close the engines that are not needed any more")
     return client

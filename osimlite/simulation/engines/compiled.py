@@ -98,6 +98,9 @@ class CompiledEngine(System):
         # They depend on nothing else.
         return self.derivative(0.0, q + u + [0.0] * len(self.state.variables))[: len(self.order)]
 
+    def hold(self) -> None:
+        """There is no window."""
+
     def close(self) -> None:
         """Nothing is held."""
 

@@ -90,6 +90,9 @@ class Engine(Protocol):
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on."""
 
+    def hold(self) -> None:
+        """Keep the window, if there is one, until somebody closes it."""
+
     def close(self) -> None:
         """Free what the engine holds; any number of times."""
 
