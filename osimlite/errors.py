@@ -50,6 +50,10 @@ class MissingFileError(DocumentError):
     exit_code = 2
 
 
+class SpecialFileError(MissingFileError):
+    """There is something, but no file that is read: a pipe, a device, or more than the settings allow."""
+
+
 class NotWellFormedError(DocumentError):
     """The text is not XML, or declares entities."""
 

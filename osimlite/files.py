@@ -1,15 +1,18 @@
-"""Finding model files, and writing files so that they appear whole or not at all."""
+"""Finding and reading files, and writing them so that they appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import stat
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from osimlite.errors import MissingFileError, OsimliteError
+from osimlite.errors import MissingFileError, OsimliteError, SpecialFileError
+from osimlite.project import LARGEST_FILE, largest_file
 
 GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
 """Environment variable with folders to look for mesh files in, besides OpenSim's own places, separated as in PATH."""
@@ -18,6 +21,9 @@ GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
 def named_mesh_folders() -> tuple[Path, ...]:
     """The folders that the environment names."""
     return tuple(Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name)
+
+
+_SPECIAL = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
 def model_files(paths: Iterable[Path]) -> list[Path]:
@@ -30,7 +36,7 @@ def model_files(paths: Iterable[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            below = sorted(file for file in path.rglob("*.osim") if file.is_file())
+            below = sorted(file for file in path.rglob("*.osim") if not file.is_dir())
             if not below:
                 raise OsimliteError("there is no .osim file in this folder", file=str(path))
             found.extend(below)
@@ -39,6 +45,63 @@ def model_files(paths: Iterable[Path]) -> list[Path]:
         else:
             raise MissingFileError("cannot read the file: no such file or folder", file=str(path))
     return found
+
+
+def open_file(path: str | Path) -> BinaryIO:
+    """Open an ordinary file for reading.
+
+    Raises:
+        SpecialFileError: it is a pipe, a device or the like, which may never end or never begin.
+        MissingFileError: it is not there or may not be read.
+    """
+    try:
+        # Opening a device may already do something; and what was there may be another thing a moment later.
+        _expect_ordinary(os.stat(path).st_mode, path)
+        return open(path, "rb", opener=_without_waiting)
+    except (OSError, ValueError) as error:
+        reason = "no such file" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or error
+        raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
+
+
+def read_file(path: str | Path) -> bytes:
+    """What is in an ordinary file.
+
+    Raises:
+        SpecialFileError: it is none, or larger than the settings of its folder allow.
+        MissingFileError: it is not there or may not be read.
+    """
+    with open_file(path) as stream:
+        try:
+            return _content(stream, os.fstat(stream.fileno()).st_size, path)
+        except OSError as error:
+            raise MissingFileError(f"cannot read the file: {error.strerror}", file=str(path)) from None
+
+
+def read_standard_input() -> bytes:
+    """What comes from standard input; SpecialFileError if that is more than the settings of this folder allow."""
+    return _content(sys.stdin.buffer, 0, "<stdin>")
+
+
+def _content(stream: BinaryIO, size: int, path: str | Path) -> bytes:
+    """What is in a stream, which may be more than its `size` says."""
+    expect_size(size, path)
+    content = stream.read(size + 1) or b""
+    while len(content) > size:
+        size = expect_size(len(content), path)
+        content += stream.read(size + 1 - len(content)) or b""
+    return content
+
+
+def expect_size(size: int, path: str | Path) -> int:
+    """The most bytes that are read of a file; SpecialFileError if it has more."""
+    limit = LARGEST_FILE if size <= LARGEST_FILE else largest_file(Path(path).absolute().parent)
+    if size > limit:
+        raise SpecialFileError(
+            f"cannot read the file: there are more than {limit / 1e6:g} MB in it; allow them by 'largest-file' in "
+            "osimlite.toml or in [tool.osimlite] of pyproject.toml",
+            file=str(path),
+        )
+    return limit
 
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
@@ -138,3 +201,22 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; one that has become a pipe meanwhile is not waited for, and refused."""
+    handle = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+    try:
+        _expect_ordinary(os.fstat(handle).st_mode, path)
+    except BaseException:
+        os.close(handle)
+        raise
+    return handle
+
+
+def _expect_ordinary(mode: int, path: str | Path) -> None:
+    if stat.S_ISDIR(mode):
+        raise MissingFileError("cannot read the file: this is a folder; name a model file in it", file=str(path))
+    if not stat.S_ISREG(mode):
+        kind = _SPECIAL.get(stat.S_IFMT(mode), "something else")
+        raise SpecialFileError(f"cannot read the file: this is {kind}, and only files are read", file=str(path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +25,10 @@ def pytest_configure() -> None:
     """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+ENGINES = {"bullet": "pybullet", "compiled": "numba"}
+"""Package of each engine."""
 
 
 class CorpusModel(NamedTuple):
@@ -55,8 +60,13 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what reads real files, so that `-m "not corpus"` leaves it out."""
+    """Mark what reads real files, so that `-m "not corpus"` leaves it out; skip cases of engines that are missing."""
+    missing = [engine for engine, package in ENGINES.items() if find_spec(package) is None]
     for item in items:
+        cases = item.callspec.params.values() if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ()
+        for engine in missing:
+            if engine in [case for case in cases if isinstance(case, str)]:
+                item.add_marker(pytest.mark.skip(reason=f"needs {ENGINES[engine]}"))
         if {"corpus", "corpus_model"} & set(getattr(item, "fixturenames", ())):
             item.add_marker("corpus")
 

@@ -20,7 +20,7 @@ def blocks(text: str, language: str) -> list[str]:
 
 
 def test_the_library_examples_run(repo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     monkeypatch.chdir(tmp_path)
     osimlite.write(dynamic_walker(), "walker.osim")
     found = blocks((repo / "README.md").read_text(), "python")

@@ -33,7 +33,10 @@ StartSpeed = Annotated[
     typer.Option("--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."),
 ]
 To = Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")]
-Engine = Annotated[str, typer.Option(help="What computes the accelerations: 'bullet' or 'compiled'.")]
+Engine = Annotated[
+    str,
+    typer.Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
+]
 Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
 SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
 ExternalLoads = Annotated[
@@ -50,7 +53,14 @@ Foot = Annotated[
 ]
 Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
 Folder = Annotated[
-    Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="this folder")
+    Path | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="FOLDER",
+        help="Folder to write into.",
+        show_default="one named after the model's file, here",
+    ),
 ]
 Geometry = Annotated[
     list[Path] | None,
@@ -62,6 +72,11 @@ Geometry = Annotated[
         "colons, come last.",
     ),
 ]
+
+
+def results_folder(file: Path, output: Path | None) -> Path:
+    """The folder that is asked for, else one in the current folder, named after the model's file."""
+    return output if output is not None else Path(file.stem)
 
 
 def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALUE") -> dict[str, str]:
@@ -85,10 +100,10 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
     """Numbers (rad, m, per second) by coordinate from the ``COORDINATE=VALUE`` words of an option.
 
     Raises:
-        OsimliteError: a word is not of that form, there is no such coordinate, or the unit does not fit it.
+        OsimliteError: a word is not of that form, there is no such coordinate, the unit does not fit it, or a value
+            of ``--set`` without a unit can hardly be meant in rad.
     """
-    from osimlite.cli._console import complain
-    from osimlite.errors import ModelError, OsimliteError
+    from osimlite.errors import ModelError, OsimliteError, SettingError
     from osimlite.simulation.start import doubt_of, in_units_of
 
     found = {}
@@ -99,7 +114,7 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
             if option == "--set" and (odd := doubt_of(info, name, text)):
-                complain(f"warning: {odd}")
+                raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}") from None

@@ -69,20 +69,19 @@ def make_plan(
     """
     import warnings
 
-    from osimlite.cli._console import complain
     from osimlite.errors import DoubtfulWarning, SettingError
     from osimlite.sweep.variables import parse
 
     ranges = parse(vary or [])
     if not ranges:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always", DoubtfulWarning)
-        levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
-        made = _plan(source, ranges, parameter, **levels, **choices)
-    for each in told:
-        complain(f"warning: {each.message}")
-    return made
+    levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DoubtfulWarning)
+        try:
+            return _plan(source, ranges, parameter, **levels, **choices)
+        except DoubtfulWarning as odd:
+            raise SettingError(f"{odd} (if not, write rad after the number)") from None
 
 
 def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any) -> Plan:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 from osimlite.cli._console import hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import OsimliteError
+from osimlite.files import model_files, read_standard_input
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
@@ -83,21 +85,14 @@ def run(
 def _files(paths: list[str]) -> Iterator[str]:
     """Every file to check, folders opened up."""
     for text in paths:
-        path = Path(text)
-        if text != "-" and path.is_dir():
-            below = sorted(path.rglob("*.osim"))
-            if not below:
-                raise OsimliteError("there is no .osim file in this folder", file=text)
-            yield from map(str, below)
-        else:
-            yield text
+        yield from map(str, model_files([Path(text)])) if text != "-" and os.path.isdir(text) else [text]
 
 
 def _source(path: str) -> Source:
     from osimlite.document.source import Source
 
     if path == "-":
-        return Source(sys.stdin.buffer.read(), "<stdin>")
+        return Source(read_standard_input(), "<stdin>")
     return Source.of_file(path)
 
 

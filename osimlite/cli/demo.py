@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -36,9 +35,9 @@ def demo(
     """
     from osimlite._require import require
     from osimlite.files import make_folder
+    from osimlite.simulation.engines import AUTO, engine_factory
 
-    if find_spec("pybullet") is None:
-        require("pybullet", extra="sim", purpose="the simulation")
+    engine_factory(AUTO)
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
     make_folder(output)
@@ -119,12 +118,13 @@ def _work(tour: _Tour) -> tuple[Model, Trajectory]:
         urdf.write(folder / "urdf")
         tell(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
 
-    with tour.step("Simulate in PyBullet") as tell, progress_bar("   simulating", 2.0) as progress:
+    with tour.step("Simulate two seconds") as tell, progress_bar("   simulating", 2.0) as progress:
         trajectory = simulate(model, to=2.0, report_interval=0.01, progress=progress)
         trajectory.write(folder)
         difference = distance_to_opensim(trajectory)
         tell(
-            f"{trajectory.summary['steps']} steps; at most {difference:.1e} from OpenSim's converged motion",
+            f"{trajectory.summary['engine']}: {trajectory.summary['steps']} steps; at most {difference:.1e} from "
+            "OpenSim's converged motion",
             "states.sto",
         )
     return model, trajectory

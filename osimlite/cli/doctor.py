@@ -18,8 +18,8 @@ from osimlite.cli._progress import progress_bar
 
 PURPOSES = {
     "": "read, write, check: build, validate, format, upgrade, diff, info",
-    "sim": "translate, simulate, kinematics, inverse-dynamics",
-    "fast": "gait, sweep, optimize, simulate --engine compiled",
+    "sim": "translate, simulate, gait, kinematics, inverse-dynamics",
+    "bullet": "simulate --engine bullet, simulate --gui",
     "plot": "simulate --plot, gait --basin",
     "view": "view, simulate --animate",
     "yaml": "models as YAML",
@@ -29,7 +29,8 @@ PURPOSES = {
     "lsp": "lsp: the language server for editors",
     "oracle": "comparisons with OpenSim itself, in tests and benchmarks",
 }
-"""What each extra is for; "" is the plain installation. `all` and `dev` gather the others and the tools of tests."""
+"""What each extra is for; "" is the plain installation. `all` and `dev` gather the others and the tools of tests, and
+`fast` is an older name of `sim`."""
 
 MESHES = (".vtp", ".stl", ".obj")
 """Endings of mesh files."""
@@ -109,7 +110,8 @@ def requirements() -> dict[str, list[str]]:
     for line in metadata.requires("osimlite") or []:
         name = re.split(r"[\s\[<>=!~;(]", line, maxsplit=1)[0]
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", line)
-        if (of := extra[1] if extra else "") in wanted:
+        of = extra[1] if extra else ""
+        if of in wanted and name not in ("osimlite", *wanted[of]):
             wanted[of].append(name)
     return wanted
 

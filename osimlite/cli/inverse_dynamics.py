@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from osimlite.cli import _options as options
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
-    output: options.Folder = Path("."),
+    output: options.Folder = None,
     external_loads: options.ExternalLoads = None,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
@@ -33,4 +32,4 @@ def inverse_dynamics(
         from osimlite.simulation.elements.external_loads import read_external_loads
 
         loads = read_external_loads(recorded.mechanism, external_loads)
-    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, output)
+    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, options.results_folder(file, output))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,7 +12,7 @@ from osimlite.cli import _options as options
 def kinematics(
     file: options.File,
     motion: options.Motion,
-    output: options.Folder = Path("."),
+    output: options.Folder = None,
     assemble: Annotated[
         bool, typer.Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
     ] = False,
@@ -31,4 +30,9 @@ def kinematics(
     recorded = opened(file, motion)
     if assemble:
         recorded = recorded.assembled()
-    written(recorded, {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}, output, trc=trc)
+    written(
+        recorded,
+        {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()},
+        options.results_folder(file, output),
+        trc=trc,
+    )

@@ -23,11 +23,11 @@ LIVE_STEP = 1e-3
 def simulate(
     file: options.File,
     to: options.To = 2.0,
-    engine: options.Engine = "bullet",
+    engine: options.Engine = "auto",
     accuracy: options.Accuracy = None,
     fixed_step: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Take PyBullet's own steps instead of controlling the error."),
+        typer.Option(metavar="SECONDS", help="Take the engine's own steps instead of controlling the error."),
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
@@ -40,7 +40,7 @@ def simulate(
     report_interval: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
-    output: options.Folder = Path("."),
+    output: options.Folder = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, forces and energy as PNG.")] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[
@@ -78,11 +78,9 @@ def simulate(
     if animate:
         require("PIL", extra="view", purpose="an animation")
     model = read(file)
-    from osimlite.simulation.engines import engine_factory
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
 
-    engine_factory(engine)
     with Simulation(
         model,
         engine,
@@ -106,7 +104,7 @@ def simulate(
                 initial_speeds=speeds,
                 progress=progress,
             )
-        files = _write(model, trajectory, output, plot=plot, animate=animate)
+        files = _write(model, trajectory, options.results_folder(file, output), plot=plot, animate=animate)
         _told(trajectory, files).show()
         simulation.hold()
 

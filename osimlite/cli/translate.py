@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 def translate(
     file: options.File,
     to: Annotated[str, typer.Option("--to", help="The format: 'urdf'.")] = "urdf",
-    output: options.Folder = Path("."),
+    output: options.Folder = None,
     limits: Annotated[
         str, typer.Option(help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.")
     ] = "none",
@@ -41,7 +40,7 @@ def translate(
     ] = None,
     geometry: options.Geometry = None,
 ) -> None:
-    """Translate a model: writes <model>.urdf, its meshes, <model>.coordinates.json and fidelity.json.
+    """Translate a model: writes <file>.urdf, its meshes, <file>.coordinates.json and fidelity.json.
 
     Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
     coordinates.json says how coordinates drive joints, where URDF cannot.
@@ -67,9 +66,10 @@ def translate(
         effort=effort,
         velocity=velocity,
         folder=file.parent,
+        name=file.stem,
         geometry=options.mesh_folders(file, geometry),
     )
-    written = urdf.write(output)
+    written = urdf.write(options.results_folder(file, output))
 
     if len(urdf.fidelity):
         plain_console().print(_table(urdf.fidelity))

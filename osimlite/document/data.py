@@ -19,7 +19,7 @@ from osimlite.document.lexical import Unclean, real
 from osimlite.document.objects import layout_of
 from osimlite.document.printer import has_content
 from osimlite.errors import DocumentError, MissingFileError, ModelError
-from osimlite.files import write_atomically
+from osimlite.files import read_file, write_atomically
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
 from osimlite.schema.layout import Remark
@@ -45,10 +45,9 @@ def read_data(path: str | Path) -> Model:
     """
     place = Path(path)
     try:
-        text = place.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else str(error)
-        raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
+        text = read_file(place).decode()
+    except UnicodeDecodeError as error:
+        raise MissingFileError(f"cannot read the file: {error}", file=str(path)) from None
     return from_data(_parsed_json(text, str(path)) if place.suffix == ".json" else _parsed_yaml(text, str(path)))
 
 

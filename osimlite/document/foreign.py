@@ -24,12 +24,14 @@ def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = No
     """The lines of an XML text in OpenSim's layout, `depth` tabs in; `name` replaces its name attribute.
 
     Raises:
-        ModelError: the text is no XML element.
+        ModelError: the text is no XML element, or has a DOCTYPE.
     """
     try:
-        element = etree.fromstring(without_namespaces(xml.encode()))
+        element = etree.fromstring(without_namespaces(xml.encode()), etree.XMLParser(resolve_entities=False))
     except etree.XMLSyntaxError as error:
         raise ModelError(f"the content of an unknown component is no XML element: {error.msg}") from None
+    if element.getroottree().docinfo.internalDTD is not None:
+        raise ModelError("the content of an unknown component has a DOCTYPE; leave it out")
     if name and element.get("name") != name:
         element.set("name", name)
     return lines_of(element, depth, comments=comments)

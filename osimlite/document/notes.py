@@ -40,7 +40,8 @@ class Note(NamedTuple):
     """One fact. `number` is the element concerned, in document order.
 
     `word` is the tag, attribute or part of the text in question; `owner` the object around it and `spec` the property,
-    where there is one; `value` is what was read instead (None where the default stays).
+    where there is one; `value` is what was read instead (None where the default stays). `why` says of a file that is
+    named and not read, as in "which is not there".
     """
 
     kind: NoteKind
@@ -50,3 +51,4 @@ class Note(NamedTuple):
     spec: FieldSpec | None = None
     value: Any = None
     line: int | None = None
+    why: str = ""

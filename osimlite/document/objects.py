@@ -22,7 +22,8 @@ from osimlite.schema.registry import class_for
 from osimlite.schema.specs import FieldSpec, defaults, field_specs
 
 Read = TypeVar("Read", bound=Object)
-Included = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | None]
+Included = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
+"""What reads the object of a class in a file; a text says why it cannot be read, as in "which is not there"."""
 
 DEFAULTS = "defaults"
 
@@ -94,7 +95,7 @@ class _Extra:
 class ObjectReader:
     """Walks one element tree. `count` is the number of the next element in document order.
 
-    `included` reads the object of another file that a ``file`` attribute names, if the text has any. `defaults` is
+    `included` reads the object of another file that a ``file`` attribute names. `defaults` is
     what the document's own ``<defaults>`` block says, by class; it ends with the document.
     """
 
@@ -243,11 +244,17 @@ class ObjectReader:
     def _owned(self, element: etree._Element, cls: Any, name: str | None = None) -> Object:
         """Read the object of a property, from another file if a ``file`` attribute says so."""
         file = element.get("file") if self.included is not None else None
-        found = self.included(str(file), cls) if file and self.included is not None else None
-        if found is None:
+        if not file or self.included is None:
             plain: Object = self.object(element, cls, name)
             return plain
-        number = self.count
+        found, number, known = self.included(str(file), cls), self.count, len(self.notes)
+        if isinstance(found, str):
+            empty: Object = self.object(element, cls, name)
+            self.notes[known:] = [
+                note._replace(why=found) if note.kind == "include" and note.number == number else note
+                for note in self.notes[known:]
+            ]
+            return empty
         self.count += size(element)
         item, include, notes = found
         for part in item.walk():
@@ -256,7 +263,8 @@ class ObjectReader:
         if name:
             object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
         layout_of(item).include = include
-        self.notes.extend(note._replace(number=number) for note in notes)
+        self.notes.append(Note("include", number, "file", item, None, str(file)))
+        self.notes.extend(note._replace(number=number) for note in notes if note.kind != "include" or note.why)
         return item
 
     def _members(self, wrapper: etree._Element, spec: FieldSpec) -> tuple[ObjectList[Any], list[_Late]]:

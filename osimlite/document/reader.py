@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import re
 from codecs import BOM_UTF8
 from collections.abc import Iterator
@@ -19,8 +20,9 @@ from osimlite.document.names import as_written, without_namespaces
 from osimlite.document.notes import Note
 from osimlite.document.objects import Included, ObjectReader, layout_of, remember, size
 from osimlite.document.source import Source
-from osimlite.document.syntax import place_of, plain_words
-from osimlite.errors import DocumentError, NotWellFormedError, VersionError
+from osimlite.document.syntax import expect_plain_doctype, place_of, plain_words
+from osimlite.errors import DocumentError, MissingFileError, NotWellFormedError, SpecialFileError, VersionError
+from osimlite.files import expect_size
 from osimlite.schema.base import Object
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
@@ -41,6 +43,13 @@ _MIXED = etree.XPath("boolean(/descendant::*[*]/text())")
 
 _ATTRIBUTES = etree.XPath("boolean(//@*[name() != 'name' and name() != 'file' and name() != 'Version'])")
 """Whether there is an attribute besides those that mean something."""
+
+_LEAST_COUNTED = 100_000
+"""Bytes that a file counts for at least when those that are included are added up: a small one costs time as well."""
+
+_DEEPEST = 20
+"""How many files that are included may be around each other."""
+_TOO_DEEP = "is not read: files name each other too deeply"
 
 _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
@@ -122,7 +131,7 @@ def document_of(source: Source, root: etree._Element, version: int) -> Document:
 
 
 def _document(source: Source, root: etree._Element, version: int, upgraded: Upgraded | None) -> Document:
-    reader = ObjectReader(_included_by(source) if b"file=" in source.data else None)
+    reader = ObjectReader(_included_by(source))
     model = _model_in(source, root if upgraded is None else upgraded.root, reader)
     if version != CURRENT_VERSION:
         layout_of(model).version = version
@@ -184,13 +193,6 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
-    doctype = data.find(b"<!DOCTYPE", 0, data.find(b"<OpenSimDocument"))
-    if doctype >= 0 and re.match(rb"<!DOCTYPE[^>]*\[", data[doctype : doctype + 4096]):
-        line, column, _ = source.position(source.text.index("<!DOCTYPE"))
-        raise NotWellFormedError(
-            "a DOCTYPE with declarations inside is not read; remove it",
-            file=source.file, line=line, column=column,
-        )  # fmt: skip
     data = without_namespaces(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark before them.
     unmarked = data.removeprefix(BOM_UTF8)
@@ -214,15 +216,25 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         if not body:
             raise NotWellFormedError("the file is empty", file=source.file, line=1, column=1) from None
         message = str(error.msg or "the text is not XML")
-        line, column, _ = place_of(source, error.position[0] + blank, error.position[1], message)
-        words = plain_words(message) if "<" in source.text else "there is no element in it"
-        raise NotWellFormedError(f"not well-formed XML: {words}", file=source.file, line=line, column=column) from None
+        raise _not_well_formed(source, error.position[0] + blank, error.position[1], message) from None
     if root is None:
         raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
+    if root.getroottree().docinfo.internalDTD is not None:
+        expect_plain_doctype(source)
+        for remark in parser.error_log.filter_types(etree.ErrorTypes.WAR_UNDECLARED_ENTITY):
+            # With a DOCTYPE the parser takes it that the entity is declared elsewhere, and leaves it out.
+            raise _not_well_formed(source, remark.line + blank, remark.column, remark.message)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
         source.remarks = not plain
     return root
+
+
+def _not_well_formed(source: Source, line: int, column: int, message: str) -> NotWellFormedError:
+    """The error for what the parser says of a place in the text that it was given."""
+    line, column, _ = place_of(source, line, column, message)
+    words = plain_words(message) if "<" in source.text else "there is no element in it"
+    return NotWellFormedError(f"not well-formed XML: {words}", file=source.file, line=line, column=column)
 
 
 def version_of(source: Source, root: etree._Element) -> int:
@@ -297,33 +309,46 @@ def _model_in(source: Source, root: etree._Element, reader: ObjectReader) -> Mod
     return model
 
 
-def _included_by(source: Source, around: tuple[str, ...] = ()) -> Included:
+def _included_by(source: Source, around: tuple[str, ...] = (), read: list[int] | None = None) -> Included | None:
     """What reads the objects that ``file`` attributes of a text name, from files beside it.
 
     A text without a file has none beside it. Like OpenSim, a file that cannot be read, or holds something else, or
-    is being read already, leaves the object as it is.
+    is being read already, leaves the object as it is. `around` are the files that are being read, `read` is how many
+    bytes have been read of files so far: a few that name each other often enough would never end.
     """
+    if source.file is None:
+        return None
+    folder, total = Path(source.file).parent, [0] if read is None else read
 
-    def included(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | None:
-        if source.file is None:
-            return None
-        path = str((Path(source.file).parent / file).resolve())
+    def included(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | str:
+        place = folder / file
+        path = os.path.realpath(place)
         if path in around:
-            return None
+            return "is being read already"
+        if len(around) == _DEEPEST:
+            return _TOO_DEEP
         try:
-            inner = Source.of_file(path)
+            inner = Source.of_file(place)
+            total[0] += max(_LEAST_COUNTED, len(inner.data))
+            expect_size(total[0], place)
             root = parse(inner)
             version = version_of(inner, root)
             if version < CURRENT_VERSION:
                 root = _upgraded(inner, root, version).root
+            top = next((child for child in root if is_element(child)), None)
+            if top is None or top.tag != cls.tag:
+                return "holds none"
+            reader = ObjectReader(_included_by(inner, (*around, path), total))
+            reader.count = 1
+            item = reader.top(top, cls)
+        except SpecialFileError as fault:
+            return f"is not read: {fault.message.partition(': ')[2]}"
+        except MissingFileError:
+            return "is not there"
         except DocumentError:
-            return None
-        top = next((child for child in root if is_element(child)), None)
-        if top is None or top.tag != cls.tag:
-            return None
-        reader = ObjectReader(_included_by(inner, (*around, path)))
-        reader.count = 1
-        item = reader.top(top, cls)
+            return "holds none"
+        except RecursionError:
+            return _TOO_DEEP
         return item, Include(file, path, item.copy_deep()), reader.notes
 
     return included

@@ -17,6 +17,7 @@ from osimlite.document.names import ATTRIBUTE, as_written
 from osimlite.document.notes import Note, NoteKind
 from osimlite.document.source import Source
 from osimlite.document.spans import markup
+from osimlite.document.syntax import expect_plain_doctype
 from osimlite.errors import NotWellFormedError
 
 _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
@@ -77,6 +78,7 @@ def read_repaired(
         raise NotWellFormedError(
             "not well-formed XML: what begins here with '<!' has no end", file=source.file, line=line, column=column
         )
+    expect_plain_doctype(source)
     text, repairs = repaired(source.text)
     if not repairs or not source.spans:
         raise fault

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from osimlite.document.spans import PlainSpans, Span, spans_of
-from osimlite.errors import MissingFileError
+from osimlite.files import read_file
 
 _BLOCK = 4096
 """Characters between the places whose line is known at once."""
@@ -51,14 +51,9 @@ class Source:
 
         Raises:
             MissingFileError: it is missing or cannot be read.
+            SpecialFileError: it is a pipe, a device or the like, or larger than the settings allow.
         """
-        try:
-            return cls(Path(path).read_bytes(), str(path))
-        except OSError as error:
-            reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-            if isinstance(error, IsADirectoryError):
-                reason = "this is a folder; name a model file in it"
-            raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
+        return cls(read_file(path), str(path))
 
     @classmethod
     def of_characters(cls, text: str, file: str | None = None) -> Source:

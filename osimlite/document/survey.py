@@ -11,7 +11,7 @@ from osimlite.document.names import as_written
 from osimlite.document.reader import Document, document_of, parse, read_document, version_of
 from osimlite.document.repair import repaired
 from osimlite.document.source import Source
-from osimlite.errors import DocumentError, NotWellFormedError, VersionError
+from osimlite.errors import DocumentError, NotWellFormedError, SpecialFileError, VersionError
 from osimlite.schema.model import CURRENT_VERSION
 
 
@@ -27,6 +27,15 @@ class Survey:
     document: Document | None = None
     faults: list[DocumentError] = field(default_factory=list)
     sure_until: int | None = None
+
+
+def survey_file(file: str) -> Survey:
+    """Read as much of a file as can be read; MissingFileError if there is none."""
+    try:
+        source = Source.of_file(file)
+    except SpecialFileError as fault:
+        return Survey(Source(b"", file), None, [fault])
+    return survey(source)
 
 
 def survey(source: Source) -> Survey:

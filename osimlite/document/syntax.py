@@ -6,6 +6,8 @@ import re
 
 from osimlite.document.names import as_written
 from osimlite.document.source import Position, Source
+from osimlite.document.spans import markup
+from osimlite.errors import NotWellFormedError
 
 _PLAIN = (
     (r"Opening and ending tag mismatch: (\S+) line (\d+) and (\S+)", r"<\1> of line \2 is not closed before </\3>"),
@@ -25,6 +27,25 @@ _PLAIN = (
         r"no character of number \1 may stand in XML",
     ),
 )
+
+
+_PLAIN_DOCTYPE = re.compile(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*+>")
+"""A DOCTYPE that ends at its first ``>``, so that it declares nothing."""
+
+
+def expect_plain_doctype(source: Source) -> None:
+    """Refuse a DOCTYPE that declares something, or for another reason does not end at its first ``>``.
+
+    Raises:
+        NotWellFormedError: there is one; with its place.
+    """
+    start = next((piece.start for piece in markup(source.text) if piece.kind == "doctype"), None)
+    if start is not None and _PLAIN_DOCTYPE.match(source.text, start) is None:
+        line, column, _ = source.position(start)
+        raise NotWellFormedError(
+            "OpenSim takes the first '>' in a DOCTYPE for its end and cannot load the file; remove the DOCTYPE",
+            file=source.file, line=line, column=column,
+        )  # fmt: skip
 
 
 def plain_words(message: str) -> str:

@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
+from osimlite.files import read_file, write_atomically
 from osimlite.lint.diagnostic import Finding, Report
 
 _FORMAT = 1
@@ -29,10 +29,8 @@ def without_baseline(path: str | Path, report: Report) -> Report:
         OsimliteError: the file is missing or is no baseline.
     """
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(read_file(path))
         counts = Counter({tuple(key): int(count) for *key, count in data["findings"]})
-    except OSError as error:
-        raise OsimliteError(f"cannot read the baseline: {error.strerror}", file=str(path)) from None
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise OsimliteError("this is no baseline; write one with --write-baseline", file=str(path)) from None
     kept = []

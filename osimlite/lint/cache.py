@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from osimlite import __version__
+from osimlite.errors import OsimliteError
+from osimlite.files import read_file
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Severity
 
 if TYPE_CHECKING:
@@ -37,11 +39,11 @@ class Cache:
     def get(self, file: str, key: str) -> list[Finding] | None:
         """The findings in a file, None unless they were kept for this key and nothing has changed since."""
         try:
-            match json.loads(self._entry(file).read_bytes()):
+            match json.loads(read_file(self._entry(file))):
                 case {"key": str(kept), "outside": [*outside], "findings": [*findings]} if kept == key:
                     if all(self._stamp(path) == stamp for path, stamp in map(_outside, outside)):
                         return [_finding(file, values) for values in findings]
-        except (OSError, ValueError, TypeError, RecursionError):
+        except (OsimliteError, ValueError, TypeError, RecursionError):
             pass
         return None
 

@@ -9,7 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from osimlite.errors import MissingFileError
+from osimlite.errors import MissingFileError, SpecialFileError
+from osimlite.files import read_file, read_standard_input
 from osimlite.lint.cache import Cache, folder_for, key_of
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report
@@ -140,20 +141,19 @@ def _processes(jobs: list[Job]) -> int:
 def check_one(job: Job) -> list[Finding]:
     """Check one file, and keep what was found."""
     from osimlite.document.reader import collector_paused
-    from osimlite.document.source import Source
-    from osimlite.document.survey import survey
+    from osimlite.document.survey import survey_file
     from osimlite.lint.engine import run
     from osimlite.lint.subject import Subject
 
     with collector_paused():
-        source = Source.of_file(job.file)
-        subject = Subject(survey(source), job.config)
+        found = survey_file(job.file)
+        subject = Subject(found, job.config)
         findings = run(subject).findings
-        if job.kept_in is not None:
+        if job.kept_in is not None and not any(isinstance(fault, SpecialFileError) for fault in found.faults):
             outside = looked_at(subject)
             if outside is not None:
                 # A file that changes while it is checked must not be taken for one that was checked after.
-                Cache(job.kept_in).put(job.file, key_of(source.data, job.file, job.config), findings, outside)
+                Cache(job.kept_in).put(job.file, key_of(found.source.data, job.file, job.config), findings, outside)
     return findings
 
 
@@ -162,7 +162,7 @@ def looked_at(subject: Subject) -> list[str] | None:
     from osimlite.schema.fields import Reference
     from osimlite.schema.specs import reference_specs
 
-    if any(note.kind == "include" for note in subject.notes) or b"file=" in getattr(subject.source, "data", b""):
+    if any(note.kind == "include" for note in subject.notes):
         return None
     folder = subject.folder
     if folder is None or subject.model is None:
@@ -190,14 +190,14 @@ def _standard_input(config: Config, texts: dict[str, str]) -> list[Finding]:
     from osimlite.document.source import Source
     from osimlite.lint.engine import check_source
 
-    source = Source(sys.stdin.buffer.read(), "<stdin>")
+    source = Source(read_standard_input(), "<stdin>")
     texts["<stdin>"] = source.text
     return check_source(source, config).findings
 
 
 def _read(file: str) -> bytes:
     try:
-        return Path(file).read_bytes()
-    except OSError:
+        return read_file(file)
+    except MissingFileError:
         # Whoever checks the file says what is wrong.
         return b""

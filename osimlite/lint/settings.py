@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -14,7 +13,12 @@ from osimlite.errors import OsimliteError
 from osimlite.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Severity
+from osimlite.project import largest_file_in, settings_table
 from osimlite.text import did_you_mean, listed
+
+_KNOWN = (
+    "select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds", "largest-file",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,34 +66,16 @@ def settings_for(folder: Path) -> Settings:
     Raises:
         OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.
     """
-    for place in (folder, *folder.parents):
-        for name in ("osimlite.toml", "pyproject.toml"):
-            file = place / name
-            if not file.is_file():
-                continue
-            table = _table(file, whole=name == "osimlite.toml")
-            if table is not None:
-                return _settings(file, table)
-    return Settings()
-
-
-def _table(file: Path, *, whole: bool) -> dict[str, Any] | None:
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise OsimliteError(f"this is no TOML: {error}", file=str(file)) from None
-    except OSError as error:
-        raise OsimliteError(f"cannot read the settings: {error.strerror}", file=str(file)) from None
-    table = data if whole else data.get("tool", {}).get("osimlite")
-    return table if isinstance(table, dict) else None
+    found = settings_table(folder)
+    return Settings() if found is None else _settings(*found)
 
 
 def _settings(file: Path, table: dict[str, Any]) -> Settings:
-    known = ("select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds")
+    largest_file_in(file, table)
     for key in table:
-        if key not in known:
+        if key not in _KNOWN:
             raise OsimliteError(
-                f"there is no setting '{key}'{did_you_mean(key, known)} Settings are {listed(known)}", file=str(file)
+                f"there is no setting '{key}'{did_you_mean(key, _KNOWN)} Settings are {listed(_KNOWN)}", file=str(file)
             )
     try:
         return Settings(

@@ -7,22 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import OsimliteError
+from osimlite.files import read_file
 from osimlite.meshes.obj import read_obj
 from osimlite.meshes.stl import stl_corners
 from osimlite.meshes.surface import Surface
 from osimlite.meshes.vtp import read_vtp
-
-
-def mesh_content(path: Path) -> bytes:
-    """What is in a mesh file.
-
-    Raises:
-        OsimliteError: it cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise OsimliteError(f"cannot read the file: {error.strerror}", file=str(path)) from None
 
 
 def read_surface(path: Path) -> Surface:
@@ -31,7 +20,7 @@ def read_surface(path: Path) -> Surface:
     Raises:
         OsimliteError: it cannot be read, or holds no surface.
     """
-    content = mesh_content(path)
+    content = read_file(path)
     match path.suffix.lower():
         case ".vtp":
             return read_vtp(content, path.name)

@@ -90,6 +90,8 @@ class _File:
             # The parser breaks some of its messages into lines.
             why = " ".join(str(error.msg).split()).replace(" ,", ",")
             raise _Unreadable(f"it is not a VTK file in XML ({why})") from None
+        if self.root.getroottree().docinfo.internalDTD is not None:
+            raise _Unreadable("it has a DOCTYPE, which may declare what is not in the file")
         if self.root.tag != "VTKFile" or self.root.get("type") != "PolyData":
             raise _Unreadable("it is not a VTK file with a surface (type PolyData)")
         section = self.root.find("AppendedData")

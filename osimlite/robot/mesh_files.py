@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
-from osimlite.files import GEOMETRY_VARIABLE
+from osimlite.files import GEOMETRY_VARIABLE, read_file
 from osimlite.meshes.folders import MeshFolders
-from osimlite.meshes.read import mesh_content, read_surface
+from osimlite.meshes.read import read_surface
 from osimlite.meshes.stl import binary_stl, is_binary
 from osimlite.robot.names import legal
 
@@ -99,7 +99,7 @@ class MeshFiles:
 def _written(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
     """What is written of a file, and what was done to it."""
     if kind == ".stl":
-        content = mesh_content(source)
+        content = read_file(source)
         binary = binary_stl(content, source.name, signs)
         return binary, "" if is_binary(content) else "written as a binary STL file"
     surface = read_surface(source)

@@ -49,6 +49,11 @@ class Include(NamedTuple):
     path: str
     held: Object
 
+    def __deepcopy__(self, memo: object) -> Include:
+        # What was read does not change. Were it copied with each object around it, files that name each other deeply
+        # would be copied without end.
+        return self
+
 
 class Remark(NamedTuple):
     """A comment, or an element that no class knows (`element` true; `text` is its XML)."""

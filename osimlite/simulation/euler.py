@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from math import inf
+from math import inf, isfinite
 
 from osimlite.errors import SettingError
 from osimlite.simulation.stepper import Derivative, IntegrationError, Observer, Projection, Stepper, straight_line
 
 FIXED_STEP_TOLERANCE = 1e-9
 """What constraints may be off after a fixed step, before they are mended."""
+
+
+def burst(t: float, h: float) -> IntegrationError:
+    """Why fixed steps of length h (s) cannot go on at time t (s)."""
+    return IntegrationError(
+        f"the motion bursts at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
+        "or control the error (--accuracy)",
+        t,
+    )
 
 
 class SemiImplicitEuler(Stepper):
@@ -80,7 +89,17 @@ class SemiImplicitEuler(Stepper):
                     t,
                 )
             y, _ = found
-        self._advance(t, y)
+        if not isfinite(sum(y)):
+            raise burst(t, self._h)
+        try:
+            self._advance(t, y)
+        except IntegrationError as error:
+            raise IntegrationError(
+                f"{error} If they are right, take a shorter fixed step than {self._h:g} s, or control the error "
+                "(--accuracy).",
+                t,
+                error.index,
+            ) from error
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The straight line between the ends of the last step."""

@@ -21,7 +21,7 @@ from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines import engine_factory
+from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.recorder import Recorder
@@ -41,7 +41,7 @@ QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def simulate(
     model: Model,
     to: float = 2.0,
-    engine: str = "bullet",
+    engine: str = "auto",
     *,
     accuracy: float = DEFAULT_ACCURACY,
     fixed_step: float | None = None,
@@ -66,9 +66,9 @@ def simulate(
     Args:
         model: what moves.
         to: how long, s.
-        engine: what computes the accelerations.
+        engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
         accuracy: of the integrator, with the meaning it has in OpenSim.
-        fixed_step: take PyBullet's own steps of this length (s) instead of controlling the error.
+        fixed_step: take the engine's own steps of this length (s) instead of controlling the error.
         report_interval: time between the recorded moments, s; the last one is `to` in any case.
         initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
             default. The path of a state (``/jointset/knee/flexion/speed``, ``/forceset/stop/dissipatedEnergy``) stands
@@ -94,7 +94,7 @@ def simulate(
         UnsupportedError: the model has a joint, constraint or force that cannot be computed.
         SimulationError: the motion cannot be computed any further, no pose or speeds fulfil the constraints with what
             was set, or a coordinate that was set is locked or prescribed; a setting has no meaning.
-        MissingDependency: PyBullet is not installed.
+        MissingDependency: what the engine works with is not installed.
     """
     with Simulation(
         model,
@@ -139,7 +139,7 @@ class Simulation:
     def __init__(
         self,
         model: Model,
-        engine: str = "bullet",
+        engine: str = "auto",
         *,
         route: str = "auto",
         skip_unsupported: bool = False,
@@ -150,7 +150,8 @@ class Simulation:
         folder: str | Path | None = None,
         show: bool = False,
     ) -> None:
-        make = engine_factory(engine)
+        # Only Bullet has a window.
+        make = engine_factory("bullet" if show and engine == AUTO else engine)
         self.mechanism: Mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives, rolling=rolling)
         _require_finite_start(self.mechanism)
         self.forces = force_elements(

@@ -48,7 +48,7 @@ def doubt_of(info: CoordinateInfo, name: str, given: float | str) -> str:
     Returns:
         A sentence, or "" if there is nothing odd.
     """
-    if info.motion_type != "rotational":
+    if info.motion_type == "translational":
         return ""
     return doubt(name, quantity(given) if isinstance(given, str) else Quantity(float(given), None), info.range)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from io import TextIOWrapper
 from pathlib import Path
-from typing import TextIO
 
-from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
+from osimlite.errors import DocumentError, UnsupportedError
+from osimlite.files import open_file
 
 _SUFFIXES = {
     "double": ("",),
@@ -62,10 +63,7 @@ class TableStream:
 
     def __init__(self, path: str | Path) -> None:
         self.file = str(path)
-        try:
-            self._stream: TextIO = Path(path).open(encoding="utf-8", errors="replace")  # noqa: SIM115
-        except OSError as error:
-            raise MissingFileError(f"cannot read the file: {error.strerror}", file=self.file) from None
+        self._stream = TextIOWrapper(open_file(path), encoding="utf-8", errors="replace")
         try:
             self._read_header()
         except BaseException:
@@ -140,7 +138,7 @@ class TableStream:
             elif text and not self.name:
                 self.name = text.removeprefix("name ").strip()
         else:
-            raise DocumentError("this is no storage file: it has no line 'endheader'", file=self.file)
+            raise DocumentError(_no_storage(self.name), file=self.file)
         self.name = self.header.get("name", self.name)
         kind = self.header.get("DataType", "double")
         ends = suffixes(kind, self.file)
@@ -180,6 +178,18 @@ class TableStream:
             )
         self._time = at
         return (*labels[:at], *labels[at + 1 :])
+
+
+def _no_storage(beginning: str) -> str:
+    """Why a file without a line 'endheader' cannot be taken, by the first line in it."""
+    if beginning.startswith("PathFileType"):
+        return (
+            "these are markers over time (.trc); a storage file is needed here (.sto, .mot): inverse kinematics makes "
+            "coordinates of markers"
+        )
+    if beginning.startswith("<"):
+        return "this is XML, and no storage file (.sto, .mot); are the arguments in the right order?"
+    return "this is no storage file (.sto, .mot): it has no line 'endheader'"
 
 
 def _start(text: str, word: int) -> int:

@@ -17,6 +17,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell
 from osimlite.schema.model import Model
+from osimlite.simulation.engines import engine_name
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.start import doubt_of, in_units_of
 from osimlite.sweep.measures import measure_name
@@ -55,7 +56,7 @@ class Plan:
         variables: what differs.
         measures: names of measures, ``module:function``, or functions.
         to: how long a run lasts, s.
-        engine: that computes it.
+        engine: that computes it, by name.
         accuracy: of the integrator.
         stops: what ends a run before.
         is_planted: whether the walker is put on the ground with the deeper foot, at rest there, before each run.
@@ -186,7 +187,7 @@ def plan(
         raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
     named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))
     given = (_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops)
-    return replace(made, stops=(*given, *named))
+    return replace(made, engine=engine_name(made.engine), stops=(*given, *named))
 
 
 def _stops(mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bool) -> list[Stop]:

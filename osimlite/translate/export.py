@@ -36,7 +36,7 @@ class Urdf:
     """A model as URDF.
 
     Attributes:
-        name: of the model, fit for a file name.
+        name: of the files.
         text: the URDF.
         fidelity: what became of every component, and what URDF cannot say.
         robot: the neutral robot that was written, which maps links and joints to bodies and coordinates.
@@ -88,6 +88,7 @@ def to_urdf(
     velocity: float | None = None,
     folder: str | Path | None = None,
     geometry: Sequence[str | Path] = (),
+    name: str | None = None,
 ) -> Urdf:
     """Translate a model to URDF.
 
@@ -104,6 +105,8 @@ def to_urdf(
         folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
         geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
             separated as in PATH, follow them.
+
+        name: of the files to write, without ending; that of the model if not given.
 
     Raises:
         OsimliteError: a limit is not a positive number.
@@ -126,6 +129,6 @@ def to_urdf(
         robot = range_limits(robot)
     robot = strength(legal_names(robot), model, fidelity, effort=effort, velocity=velocity)
     survey(model, robot, fidelity)
-    name = legal(model.name or "model")
+    name = legal(model.name or "model") if name is None else name
     coordinates = coordinates_json(robot, f"{name}.urdf")
     return Urdf(name, urdf_text(robot), fidelity, robot, coordinates, mesh_files.files)

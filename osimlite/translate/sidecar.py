@@ -107,7 +107,7 @@ def _couplers(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _text(value: Any) -> str:
-    return json.dumps(finite(value), ensure_ascii=False, allow_nan=False)
+    return json.dumps(finite(value), allow_nan=False)
 
 
 def finite(value: Any) -> Any:

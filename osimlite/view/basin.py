@@ -10,6 +10,7 @@ import numpy as np
 from osimlite._require import require
 from osimlite.files import write_atomically
 from osimlite.gait.basin import Basin
+from osimlite.view.lettering import plain_lettering
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
@@ -24,6 +25,11 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
         MissingDependency: matplotlib is not installed.
         OsimliteError: the file cannot be written.
     """
+    with plain_lettering():
+        return _draw(basin, Path(path), title)
+
+
+def _draw(basin: Basin, path: Path, title: str) -> Path:
     figures = require("matplotlib.figure", extra="plot", purpose="a picture of a basin")
     require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture of a basin")
     figure = figures.Figure(figsize=(6.4, 5.2), layout="constrained")
@@ -52,6 +58,5 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
     bar.set_ticks(np.linspace(0, basin.wanted, 5).round().astype(int))
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=110)
-    target = Path(path)
-    write_atomically(target, out.getvalue())
-    return target
+    write_atomically(path, out.getvalue())
+    return path

@@ -15,6 +15,7 @@ from osimlite.errors import OsimliteError
 from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import ContactForce, Motion, contact_forces, in_mechanism_order
 
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -57,11 +58,12 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
     base = Path(folder)
     make_folder(base)
     written = []
-    for name, figure in _figures(trajectory, known):
-        out = io.BytesIO()
-        figure.savefig(out, format="png", dpi=150)
-        write_atomically(base / name, out.getvalue())
-        written.append(base / name)
+    with plain_lettering():
+        for name, figure in _figures(trajectory, known):
+            out = io.BytesIO()
+            figure.savefig(out, format="png", dpi=150)
+            write_atomically(base / name, out.getvalue())
+            written.append(base / name)
     return written
 
 

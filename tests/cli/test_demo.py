@@ -11,7 +11,6 @@ import pytest
 import osimlite
 from tests.cli.command import run
 
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
 
 

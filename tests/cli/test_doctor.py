@@ -27,7 +27,7 @@ def run(*arguments: str) -> tuple[int, str]:
 
 def test_every_extra_has_a_purpose() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    assert {*extras, ""} - {*PURPOSES} == {"all", "dev"}
+    assert {*extras, ""} - {*PURPOSES} == {"all", "dev", "fast"}
 
 
 def test_packages_of_the_plain_installation() -> None:

@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.cli import main
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 
 def run(*words: str) -> int:

@@ -41,7 +41,7 @@ def test_bar(monkeypatch, stream, second, shows):
 
 @pytest.mark.parametrize("is_terminal", [True, False])
 def test_who_waits_for_the_compiler_is_told_once(tmp_path, is_terminal):
-    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     ours, theirs = pty.openpty()
     script = (
         "import sys; from osimlite.cli import main; sys.argv = ['osimlite', 'build', 'dynamic-walker', '-o', '-']\n"

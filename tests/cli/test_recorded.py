@@ -32,6 +32,30 @@ def test_the_walker_in_a_recorded_motion(fixtures: Path, tmp_path: Path) -> None
     assert "nothing.mot: cannot read the file" in done.err
 
 
+def test_files_that_are_no_motion_are_named_for_what_they_are(fixtures: Path, tmp_path: Path) -> None:
+    walker = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    (tmp_path / "m.trc").write_text("PathFileType\t4\t(X/Y/Z)\tm.trc\nDataRate\n60\n")
+    (tmp_path / "m.csv").write_text("time,knee\n0,0\n")
+    for words, said in (
+        ((walker, "m.trc"), "m.trc: these are markers over time (.trc); a storage file is needed here (.sto, .mot)"),
+        ((walker, "m.csv"), "m.csv: this is no storage file (.sto, .mot)"),
+        ((walker, walker), "this is XML, and no storage file"),
+    ):
+        for command in ("kinematics", "inverse-dynamics"):
+            done = run(command, *words, folder=tmp_path)
+            assert done.code in (1, 2) and said in done.err, done.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.csv", "m.trc"]
+
+
+def test_results_without_a_folder_go_into_one_named_after_the_model(fixtures: Path, tmp_path: Path) -> None:
+    walker = fixtures / "walker" / "DynamicWalkerModel.osim"
+    write_sto(tmp_path / "still.mot", "still", [0.1 * k for k in range(8)], ("Pelvis_tx",), [[0.1]] * 8)
+    for command in ("kinematics", "inverse-dynamics"):
+        assert run(command, str(walker), "still.mot", folder=tmp_path).code == 0
+    written = sorted(path.name for path in (tmp_path / "DynamicWalkerModel").iterdir())
+    assert written == ["bodies.sto", "inverse_dynamics.sto", "markers.sto"]
+
+
 LOADS = """<OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects><ExternalForce name="push">
 <applied_to_body>{body}</applied_to_body><force_identifier>f_</force_identifier></ExternalForce></objects>
 <datafile>push.sto</datafile></ExternalLoads></OpenSimDocument>

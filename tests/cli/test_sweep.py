@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.cli import main
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 
@@ -127,12 +127,16 @@ def test_results_of_another_sweep_are_spared(folder: Path, capsys: pytest.Captur
     assert run(*words, "RHip_rz=0:0.2:3") == 2 and Path("r.parquet").read_text() == "mine"
 
 
-def test_degrees_that_are_taken_for_radians_are_doubted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["sweep", "walker.osim", "--to", "0.01", "--vary", "RHip_rz=20:40:2", "--stop-above", "LHip_rz=80"]
-    assert run(*words, "--stop-below", "RHip_rz=-400deg") == 0
-    told = capsys.readouterr().err.splitlines()
-    assert [line.rpartition("; ")[2] for line in told] == ["did you mean 20deg?", "did you mean 80deg?"]
-    assert all(line.startswith("osimlite: warning: ") for line in told)
+def test_degrees_that_are_taken_for_radians_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["sweep", "walker.osim", "--to", "0.01", "--stop-below", "RHip_rz=-400deg"]
+    for asked, degrees in (
+        (["--vary", "RHip_rz=20:40:2"], "20deg"),
+        (["--vary", "RHip_rz=0:1:2", "--stop-above", "LHip_rz=80"], "80deg"),
+    ):
+        assert run(*words, *asked) == 2
+        (told,) = capsys.readouterr().err.splitlines()
+        assert f"did you mean {degrees}?" in told and "rad after the number" in told
+    assert run(*words, "--vary", "RHip_rz=20rad:40rad:2", "--stop-above", "LHip_rz=80rad") == 0
 
 
 def test_what_looks_like_markup_is_shown_as_it_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

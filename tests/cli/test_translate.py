@@ -29,12 +29,13 @@ def walker(tmp_path: Path) -> Path:
 def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
     code, out, _ = run("translate", "walker.osim", "--to", "urdf", "-o", "robot", folder=walker)
     assert code == 0
-    assert (walker / "robot/DynamicWalkerModel.urdf").read_text().startswith("<?xml")
+    assert (walker / "robot/walker.urdf").read_text().startswith("<?xml")
     assert (walker / "robot/meshes/ellipsoid.obj").exists()
     records = json.loads((walker / "robot/fidelity.json").read_text())["records"]
     assert {"force", "gravity", "locked"} <= {record["kind"] for record in records}
     assert "a contact surface" in out and "13 links, 12 joints of which 7 move" in out
-    coordinates = json.loads((walker / "robot/DynamicWalkerModel.coordinates.json").read_text())["coordinates"]
+    coordinates = json.loads((walker / "robot/walker.coordinates.json").read_text())["coordinates"]
+    assert '"file": "walker.urdf"' in (walker / "robot/walker.coordinates.json").read_text()
     assert [item["joint"] for item in coordinates if item["name"] == "RHip_rz"] == ["RHip_rz"]
     table = [line for line in out.splitlines() if line.startswith(("│", "┃", "├"))]
     assert len(table) > 10 and max(map(len, table)) <= 80
@@ -43,13 +44,13 @@ def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
 def test_translate_takes_options(walker: Path) -> None:
     code, out, _ = run("translate", "walker.osim", "--limits", "range", "--merge", folder=walker)
     assert code == 0 and "8 links, 7 joints of which 7 move" in out
-    assert '<joint name="RKnee_rz" type="revolute">' in (walker / "DynamicWalkerModel.urdf").read_text()
+    assert '<joint name="RKnee_rz" type="revolute">' in (walker / "walker" / "walker.urdf").read_text()
 
 
 def test_translate_writes_collision_shapes_and_limits(walker: Path) -> None:
     code, _, _ = run("translate", "walker.osim", "--collision", "--effort", "50", "--velocity", "7", folder=walker)
-    text = (walker / "DynamicWalkerModel.urdf").read_text()
-    assert code == 0 and "collision box of 1 x 200 x 200 m" in urdf_records(walker)
+    text = (walker / "walker" / "walker.urdf").read_text()
+    assert code == 0 and "collision box of 1 x 200 x 200 m" in urdf_records(walker / "walker")
     assert "<collision " in text and 'effort="50" velocity="7"' in text
 
 

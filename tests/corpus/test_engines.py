@@ -13,11 +13,12 @@ from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines.bullet import make
 from osimlite.simulation.engines.protocol import Settings
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
+from osimlite.simulation.engines.bullet import make
 from osimlite.simulation.engines.compiled import CompiledEngine
 
 

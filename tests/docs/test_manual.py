@@ -57,7 +57,7 @@ def shell(tmp_path: Path) -> dict[str, str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    for package in ("pybullet", "matplotlib"):
+    for package in ("numba", "matplotlib"):
         pytest.importorskip(package, reason=f"needs {package} (extra 'all')")
     folder = tmp_path / "work"
     folder.mkdir()

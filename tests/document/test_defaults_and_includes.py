@@ -140,7 +140,8 @@ def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:
     assert marker(document.model).path == "/markerset/mk"
     # What is wrong in the other file is told at the place that names it.
     assert [(note.kind, document.source.spans[note.number].tag) for note in document.notes] == [
-        ("unknown-tag", "MarkerSet")
+        ("include", "MarkerSet"),
+        ("unknown-tag", "MarkerSet"),
     ]
     assert document.source.spans[marker(document.model)._index].tag == "MarkerSet"
 
@@ -179,6 +180,40 @@ def test_files_that_include_each_other_end(folder: Path) -> None:
     ring = MARKERS.replace('<MarkerSet name="mine">', '<MarkerSet name="mine" file="markers.xml">')
     (folder / "markers.xml").write_text(ring)
     assert marker(osimlite.read(folder / "model.osim")).name == "mk"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-32", "latin-1"])
+@pytest.mark.parametrize(
+    "attribute",
+    ['file="markers.xml"', "file='markers.xml'", 'file = "markers.xml"', 'file\n\t=\r\n"markers.xml"',
+     "file=markers.xml", 'file="m&#97;rkers.xml"', 'name="a" file="./markers.xml"'],
+)  # fmt: skip
+def test_an_attribute_in_any_spelling_and_encoding(folder: Path, attribute: str, encoding: str) -> None:
+    text = INCLUDING.replace('file="markers.xml"', attribute)
+    mark = "\ufeff" if encoding.endswith("-le") else ""
+    data = (mark + text.replace("UTF-8", encoding.removesuffix("-sig").removesuffix("-le"))).encode(encoding)
+    document = read_document(Source(data, str(folder / "model.osim")))
+    assert marker(document.model).name == "mk"
+    assert [(note.word, note.value.removeprefix("./")) for note in document.notes if note.kind == "include"] == [
+        ("file", "markers.xml")
+    ]
+
+
+def test_what_only_looks_like_an_attribute(folder: Path) -> None:
+    for odd in ('name="file="', "name='file=\"markers.xml\"'", 'File="markers.xml"', 'x:file="markers.xml"'):
+        text = INCLUDING.replace('file="markers.xml"', odd)
+        assert read_document(Source(text.encode(), str(folder / "model.osim"))).model.marker_set.objects == []
+    hidden = INCLUDING.replace('<MarkerSet file="markers.xml" />', '<!-- <MarkerSet file="markers.xml" /> -->')
+    assert read_document(Source(hidden.encode(), str(folder / "model.osim"))).model.marker_set.objects == []
+
+
+def test_what_another_system_would_include_is_not_included(folder: Path) -> None:
+    """XInclude is none of OpenSim's."""
+    other = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="markers.xml" />'
+    text = INCLUDING.replace('<MarkerSet file="markers.xml" />', other)
+    document = read_document(Source(text.encode(), str(folder / "model.osim")))
+    assert document.model.marker_set.objects == []
+    assert [note.kind for note in document.notes] == ["unknown-tag"]
 
 
 def test_a_text_without_a_file_has_none_beside_it() -> None:

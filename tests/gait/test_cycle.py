@@ -15,7 +15,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.walkers import human_walker, steady_walker
 from osimlite.simulation import Simulation
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.gait.basin import find_basin, perturbed, walks_from
 from osimlite.gait.cycle import find_cycle, step_matrix

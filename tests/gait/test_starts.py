@@ -8,7 +8,7 @@ import pytest
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.gait.footing import find_footing
 from osimlite.gait.starts import carriers, planted, stood, upright

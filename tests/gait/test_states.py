@@ -11,7 +11,7 @@ from osimlite.models.walkers import steady_walker
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.simulation import Simulation
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.gait.cycle import find_cycle
 from osimlite.gait.stepmap import StepMap

@@ -11,7 +11,7 @@ from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.simulation import Simulation
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.gait import steps
 from osimlite.gait.footing import Footing, find_footing

@@ -16,7 +16,7 @@ from osimlite.simulation.elements import force_elements
 from tests.oracle.opensim_runs import put
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 TIME = 0.37
 STATES = 4

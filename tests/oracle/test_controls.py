@@ -16,7 +16,7 @@ from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402

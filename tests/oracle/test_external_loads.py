@@ -17,7 +17,7 @@ from osimlite.simulation.recorded import RecordedMotion
 from osimlite.simulation.storage import write_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402

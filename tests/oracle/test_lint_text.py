@@ -20,6 +20,22 @@ def changed(old: bytes, new: bytes) -> bytes:
     return (HEAD + ROOT).replace(old, new)
 
 
+ENTITY = '[<!ENTITY nm "5">]>'
+DOCTYPES = {
+    "an entity": f"<!DOCTYPE a {ENTITY}",
+    "a comment before it": f"<!-- <OpenSimDocument --><!DOCTYPE a {ENTITY}",
+    "an instruction before it": f"<?a <!DOCTYPE b>?><!DOCTYPE a {ENTITY}",
+    "an end in its name": f"<!DOCTYPE a SYSTEM '&gt;>' {ENTITY}",
+    "an end and a tag in its name": "<!DOCTYPE a SYSTEM '><Model/>'>",
+    "a comment inside": '<!DOCTYPE a [<!-- ] --> <!ENTITY nm "5">]>',
+    "an instruction inside": '<!DOCTYPE a [<?a ]?> <!ENTITY nm "5">]>',
+    "an entity of its own kind": '<!DOCTYPE a [<!ENTITY % nm SYSTEM "file:///dev/zero"> %nm;]>',
+    "an attribute for all": '<!DOCTYPE a [<!ATTLIST BodySet file CDATA "set.xml">]>',
+    "entities of entities": "<!DOCTYPE a [<!ENTITY a0 '0123456789'>"
+    + "".join(f"<!ENTITY a{n + 1} '{f'&a{n};' * 10}'>" for n in range(9))
+    + "]>",
+}
+
 TAKEN = {
     "plain": HEAD + ROOT,
     "no declaration": ROOT,
@@ -42,6 +58,8 @@ TAKEN = {
     "hyphens in a comment": changed(b"<gravity>", b"<!-- a -- b --><gravity>"),
     "character reference": changed(b'"x"', b'"x&#65;y"'),
     "doctype": HEAD + b'<!DOCTYPE OpenSimDocument SYSTEM "a.dtd">\n' + ROOT,
+    "doctype with public name": HEAD + b"<!DOCTYPE OpenSimDocument PUBLIC '-//a' \"it's\">\n" + ROOT,
+    "doctype that declares nothing": HEAD + b"<!-- < -->\n<!DOCTYPE OpenSimDocument [ ]>\n" + ROOT,
     "schema": changed(
         b"<OpenSimDocument ", b'<OpenSimDocument xmlns:xsi="http://a" xsi:noNamespaceSchemaLocation="b" '
     ),
@@ -64,6 +82,9 @@ REFUSED = {
     "cut off": (HEAD + ROOT)[:-30],
     "another case": changed(b"</gravity>", b"</Gravity>"),
     "doctype with declarations": HEAD + b"<!DOCTYPE OpenSimDocument [<!ELEMENT a ANY>]>\n" + ROOT,
+    **{f"doctype with {words}": HEAD + doctype.encode() + ROOT for words, doctype in DOCTYPES.items()},
+    "entity of elsewhere": HEAD + b'<!DOCTYPE a SYSTEM "a.dtd">' + ROOT.replace(b"0 -5", b"&nm;0 -5"),
+    "entity of an unread entity": HEAD + b"<!DOCTYPE a [%a;]>" + ROOT.replace(b"0 -5", b"&nm;0 -5"),
     "white space in a name": changed(b'"x"', b'"x\ty"'),
 }
 OTHERWISE = {
@@ -73,6 +94,18 @@ OTHERWISE = {
     "full-width digit": changed(b"-5", b"-\xef\xbc\x95"),
     "mark in a value": changed(b"0 -5", MARK + b"0 -5"),
 }
+
+
+@pytest.mark.parametrize("case", DOCTYPES)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "latin-1"])
+def test_nothing_that_a_doctype_declares_is_read(case, encoding, tmp_path):
+    """The entity stands in the value of an attribute, where the parser puts its text in without a word."""
+    text = (DOCTYPES[case] + ROOT.decode()).replace('"x"', '"&nm;&a9;"').replace("0 -5", "&nm;0 -5")
+    path = tmp_path / "text.osim"
+    path.write_bytes(text.encode(encoding))
+    report = validate(path)
+    assert [finding.code for finding in report.errors if finding.code != "OSIM002"] == ["OSIM001"]
+    assert "DOCTYPE" in str(report)
 
 
 def taken(path: Path) -> list[float] | None:

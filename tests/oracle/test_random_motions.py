@@ -11,8 +11,8 @@ from tests.oracle.opensim_runs import simulated
 from tests.oracle.random_models import RandomModel
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 

@@ -20,7 +20,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import read_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 

@@ -65,7 +65,7 @@ class Bullet:
 @contextmanager
 def in_bullet(text: str, files: dict[str, bytes] | None = None) -> Iterator[Bullet]:
     """Load URDF text into a PyBullet world of its own."""
-    pybullet = pytest.importorskip("pybullet")
+    pybullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     client = pybullet.connect(pybullet.DIRECT)
     try:
         # Bullet would otherwise remember the text of an earlier file of the same name.

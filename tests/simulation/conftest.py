@@ -14,8 +14,6 @@ import pytest
 import osimlite
 from osimlite.schema.model import Model
 
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
-
 Table = dict[str, "np.ndarray[Any, Any]"]
 
 

@@ -16,6 +16,9 @@ from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, Coordina
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
+
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+
 from osimlite.simulation.engines.bullet import BulletEngine, engine_class
 
 ROUTES = ("mass-matrix", "articulated-body")

@@ -33,6 +33,7 @@ def test_what_is_taken_up_is_lost(engine):
 
 
 def test_both_engines_take_the_same_steps():
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     ours, theirs = (osimlite.simulate(damped(), to=0.5, accuracy=1e-7, engine=engine) for engine in ENGINES)
     assert ours.summary["steps"] == theirs.summary["steps"]
     assert np.abs(ours.values - theirs.values).max() < 1e-11
@@ -55,7 +56,7 @@ def test_files_and_fixed_steps(engine, tmp_path):
 
 
 def test_many_runs_equal_single_ones():
-    pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     from osimlite.simulation.many import run_many
 
     times = [0.0, 0.07, 0.2, 0.3]

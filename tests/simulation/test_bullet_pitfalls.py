@@ -14,13 +14,14 @@ from osimlite import Body, Coordinate, Model
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines import bullet_file, bullet_world
-from osimlite.simulation.engines.bullet import BulletEngine
-from osimlite.simulation.engines.bullet_world import World
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 
-bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+
+from osimlite.simulation.engines import bullet_file, bullet_world  # noqa: E402
+from osimlite.simulation.engines.bullet import BulletEngine  # noqa: E402
+from osimlite.simulation.engines.bullet_world import World  # noqa: E402
 
 ROUTES = ("mass-matrix", "articulated-body")
 Q = [-0.17453292519943295, 0.1, 0.3, 0.9, 0.4, -0.2, -0.6, -0.3]

@@ -17,9 +17,12 @@ from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
 from osimlite.simulation.chain import Chain
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines.bullet import BulletEngine
 from osimlite.simulation.script import Script
 from osimlite.simulation.solver import SingularMassError, tree_solver
+
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+
+from osimlite.simulation.engines.bullet import BulletEngine
 
 NUMBERS = st.floats(-3.0, 3.0)
 SCALARS = st.one_of(st.sampled_from(["a", "b", "c"]), st.sampled_from([0.0, 1.0, -1.0]), NUMBERS)

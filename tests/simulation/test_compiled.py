@@ -36,7 +36,8 @@ from osimlite.schema.functions import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.simulation.engines.bullet import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine

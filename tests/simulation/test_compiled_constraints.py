@@ -23,7 +23,7 @@ from osimlite.simulation.engines.protocol import Settings
 from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON

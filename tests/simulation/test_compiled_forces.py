@@ -53,7 +53,8 @@ from osimlite.schema.springs import (
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.kind import kinds as declared_kinds
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.simulation.elements.external_loads import external_load
 from osimlite.simulation.elements.geometries.load import Load

@@ -11,7 +11,7 @@ from osimlite.simulation.elements.foundation import Springs
 from tests.simulation.meshes import ball, block, write_obj
 from tests.simulation.test_mesh_contact import thrown
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from tests.simulation.test_compiled_forces import assert_same, chain, engines, floor, states
 

@@ -26,9 +26,12 @@ from osimlite.schema.forces import Force
 from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline, Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.engines.bullet import engine_class
 from osimlite.simulation.engines.protocol import Settings
 from tests.multibody.strategies import KINDS, Case, cases, constraint_of
+
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+
+from osimlite.simulation.engines.bullet import engine_class
 
 INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
 

@@ -43,8 +43,6 @@ def hertz() -> float:
 
 @pytest.fixture(params=["bullet", "compiled"])
 def engine(request):
-    if request.param == "compiled":
-        pytest.importorskip("numba", reason="needs numba (extra 'fast')")
     return request.param
 
 

@@ -11,7 +11,7 @@ import osimlite
 from osimlite.errors import ModelError, OsimliteError, SettingError
 from osimlite.simulation import Simulation
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.simulation.many import ENDINGS, Watch, run_many
 

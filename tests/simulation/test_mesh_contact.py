@@ -15,7 +15,7 @@ from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.view.shown import Shown
 from tests.simulation.meshes import ball, block, write_obj
 
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 
 def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:

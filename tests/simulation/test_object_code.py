@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.simulation.engines import object_code
 

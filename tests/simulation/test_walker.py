@@ -37,7 +37,8 @@ def test_steps_are_those_of_opensim(simulation):
 
 
 def test_articulated_body_route_moves_alike(walker, reference):
-    with Simulation(walker, route="articulated-body") as simulation:
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+    with Simulation(walker, "bullet", route="articulated-body") as simulation:
         trajectory = simulation.run(2.0, accuracy=1e-6, report_interval=1e-3)
     assert trajectory.summary["route"] == "articulated-body"
     assert largest_error(trajectory, reference) < 5e-6

@@ -11,8 +11,8 @@ from osimlite.simulation import simulate
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from tests.simulation.test_constrained import four_bars
 

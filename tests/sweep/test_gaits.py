@@ -20,7 +20,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.simulation import Simulation
 from osimlite.sweep.plan import plan
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.gait.cycle import find_cycle
 from osimlite.gait.stepmap import StepMap

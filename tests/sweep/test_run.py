@@ -44,7 +44,7 @@ def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
 
 
 def test_processes_of_bullet_too(walker, tmp_path):
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.2, engine="bullet")
     chosen = samples(made.variables, "random", 12, 1)
     whole = [sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 2)]

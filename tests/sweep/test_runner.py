@@ -208,7 +208,7 @@ def chain(parameters):
 @pytest.mark.parametrize("engine", ["compiled", "bullet"])
 def test_models_of_another_structure_are_measured_as_they_are(engine):
     if engine == "bullet":
-        pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+        pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     vary = {"links": (1.0, 3.0), "q0": (0.1, 0.5), "x/speed": (0.0, 2.0)}
     measures = ("distance", "q0/value", "x/speed", "energy")
     made = plan(chain, vary, parameters={"links": 1.0}, measures=measures, engine=engine, to=0.4)
@@ -274,7 +274,7 @@ def test_what_is_wrong_is_said_before_anything_runs(walker):
 
 
 def test_bullet_gives_the_same_rows(walker):
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     vary = {"RHip_rz": (0.3, 0.7), "/bodyset/Pelvis/mass": (1.0, 2.0)}
     measures = ("distance", "largest_force", "energy", "RKnee_rz/speed")
     rows = np.array([[0.35, 1.0], [0.6, 1.5]])
@@ -290,7 +290,7 @@ def test_bullet_gives_the_same_rows(walker):
 
 
 def test_bullet_needs_no_numba(fixtures):
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     code = """
 import sys
 sys.modules["numba"] = None
@@ -304,7 +304,7 @@ assert Runner(made).run(np.array([[0.4]])).status == ["done"]
 try:
     Runner(plan(model, {"RHip_rz": (0.3, 0.5)}))
 except osimlite.OsimliteError as error:
-    assert "osimlite[fast]" in str(error)
+    assert "osimlite[sim]" in str(error)
 else:
     raise AssertionError
 """
@@ -312,7 +312,7 @@ else:
 
 
 def test_what_only_the_compiled_engine_watches(walker):
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     for choices in ({"measures": ("steps",)}, {"stops": (Stop("Pelvis_ty", 0.5),)}):
         with pytest.raises(SettingError, match="--engine compiled"):
             Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, engine="bullet", **choices))

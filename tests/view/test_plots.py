@@ -51,6 +51,12 @@ def test_the_mechanism_of_the_trajectory_will_do(tmp_path):
     assert len(plot_simulation(motion, tmp_path)) == 4
 
 
+def test_names_are_drawn_as_they_are(tmp_path):
+    motion = stroll()
+    motion.coordinates = [f"{name} $x^{{_$ \u4e16\x9b" for name in motion.coordinates]
+    assert plot_simulation(motion, tmp_path)
+
+
 def test_angles_are_in_degrees_and_lengths_in_metres():
     figure = drawn("coordinates.png")
     angles, lengths = figure.axes
@@ -121,7 +127,7 @@ def test_energy_is_that_of_the_mechanism():
 
 
 def test_energy_of_a_simulation_has_what_contacts_store():
-    pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     trajectory = simulate(dynamic_walker(), 0.1)
     (panel,) = dict(_figures(trajectory, trajectory.mechanism))["energy.png"].axes
     found = lines(panel)

@@ -24,7 +24,7 @@ async function start() {
   } catch (error) {
     const wanted = settings.get('command').join(' ');
     vscode.window.showErrorMessage(
-      `osimlite: '${wanted}' does not start (${error.message}). Run: pip install 'osimlite[lsp]', and name the ` +
+      `osimlite: '${wanted}' does not start (${error.message}). In a clone of osimlite run: pip install -e '.[lsp]', and name the ` +
         'program in the setting osimlite.command',
     );
   }

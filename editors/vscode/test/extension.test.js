@@ -63,7 +63,7 @@ test('the settings say what is started, and a restart starts it again', async ()
 test('a server that is not there is named, with what to do', async () => {
   const {extension, noted} = load(['nowhere'], 'spawn nowhere ENOENT');
   await extension.activate({subscriptions: []});
-  assert.match(noted.errors[0], /'nowhere' does not start .*pip install 'osimlite\[lsp\]'/);
+  assert.match(noted.errors[0], /'nowhere' does not start .*pip install -e '\.\[lsp\]'/);
 });
 
 test('every file that the manifest names is there, and the commands are registered', async () => {

@@ -58,6 +58,8 @@ def missing_mesh(subject: Subject, found: Found) -> None:
             continue
         twin = folders.in_other_case(places, name)
         message = f"the file '{name}' of {called(item)} is not there; looked in {tried}; {remedy}"
+        if any(os.path.lexists(os.path.join(place, name)) for place in places):
+            message = f"'{name}' of {called(item)} is a folder, a device or a link to nothing, and no file"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
         severity = ERROR if isinstance(item, ContactMesh) and twin is None else None
@@ -69,8 +71,9 @@ def included_file(subject: Subject, found: Found) -> None:
     """An object is kept in another file.
 
     ## What it does
-    Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, and as an
-    error if the element itself holds something.
+    Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, is no
+    ordinary file (a pipe, a device) or larger than the settings allow (`largest-file`), and as an error if the element
+    itself holds something.
 
     ## Why is this bad
     OpenSim reads the object from the other file, and writes that file anew when it saves the model; if it is missing,
@@ -93,12 +96,11 @@ def included_file(subject: Subject, found: Found) -> None:
     for note in subject.notes:
         if note.kind != "include" or note.owner is None or not note.value:
             continue
-        there = subject.folder is None or (subject.folder / str(note.value)).is_file()
-        read = there and (subject.folder is None or (note.owner.layout is not None and note.owner.layout.include))
+        read = subject.folder is None or (note.owner.layout is not None and note.owner.layout.include is not None)
         ignored = _has_content(subject.source, note.number)
         state = "is read from" if read else "should be read from"
-        why = "" if read else f", which {'holds none' if there else 'is not there'}"
-        fate = ": OpenSim ignores what stands here" if ignored else "" if read else ": it stays empty"
+        why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
+        fate = ": OpenSim ignores what stands here" if ignored else ": it stays empty" if note.why else ""
         found(
             f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,
@@ -185,8 +187,9 @@ class _Folders:
         """The file in the first of the folders that is called `name` but for upper and lower case."""
         for place in places:
             listing, last = self._listing(place, name)
-            if last.lower() in listing:
-                return listing[last.lower()]
+            twin = listing.get(last.lower(), last)
+            if twin != last and os.path.isfile(os.path.join(place, os.path.dirname(name), twin)):
+                return twin
         return None
 
     def _listing(self, place: str, name: str) -> tuple[dict[str, str], str]:

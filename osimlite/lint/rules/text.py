@@ -144,7 +144,9 @@ def not_a_model(subject: Subject, found: Found) -> None:
     """The document is XML, but no OpenSim model.
 
     ## What it does
-    Reports a root element other than `<OpenSimDocument>`, and a document that holds something else than a `<Model>`.
+    Reports a root element other than `<OpenSimDocument>`, and a document that holds something else than a `<Model>`. So
+    it does of what is no ordinary file (a pipe, a device), and of a file of more than 100 MB, or what the setting
+    `largest-file` allows: neither is read.
 
     ## Why is this bad
     OpenSim fails with a message about a missing node, or makes an empty model without a word.

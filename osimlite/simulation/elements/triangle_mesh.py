@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.errors import ModelError
+from osimlite.files import read_file
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.obj import obj_polygons
-from osimlite.meshes.read import mesh_content
 from osimlite.meshes.stl import stl_corners
 from osimlite.meshes.surface import Indices, Polygons
 from osimlite.meshes.vtp import vtp_polygons
@@ -53,7 +53,7 @@ class TriangleMesh:
         path = folders.find(name)
         if path is None:
             raise ModelError(f"the mesh file '{name}' is not there; put it beside the model's file")
-        content = mesh_content(path)
+        content = read_file(path)
         match path.suffix.lower():
             case ".vtp":
                 return cls.of_polygons(vtp_polygons(content, str(path)), str(path))

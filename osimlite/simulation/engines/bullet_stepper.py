@@ -7,6 +7,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from osimlite.errors import SimulationError
+from osimlite.simulation.euler import burst
 from osimlite.simulation.stepper import Observer, Stepper, straight_line
 
 if TYPE_CHECKING:
@@ -56,10 +57,7 @@ class BulletStepper(Stepper):
         y = q + self._engine._speeds.from_rates(q, rates)
         # Bullet clips what would be faster, so that a motion that has burst may look finite.
         if not max(map(abs, y), default=0.0) < 0.5 * self._body.FASTEST:
-            raise SimulationError(
-                f"the motion bursts at t = {self.time:.9g} s; take a shorter fixed step than {self._h:g} s, "
-                "or control the error (--accuracy)"
-            )
+            raise burst(self.time, self._h)
         auxiliary = self._engine.state.auxiliary(self.state)
         y += [z + h * rate for z, rate in zip(auxiliary, self._auxiliary_rates, strict=True)]
         self._previous = self.time, self.state, []

@@ -18,7 +18,7 @@ from typing import Any
 from osimlite._require import require
 from osimlite.simulation.kernels import pointers
 
-numba = require("numba", extra="fast", purpose="the compiled engine")
+numba = require("numba", extra="sim", purpose="the compiled engine")
 
 from llvmlite import binding as llvm  # type: ignore[import-untyped]  # noqa: E402
 from llvmlite import ir  # noqa: E402

@@ -28,7 +28,7 @@ def _compiler_version() -> str:
             return version("numba")
     except ValueError:
         pass
-    return str(require("numba", extra="fast", purpose="the compiled engine").__version__)
+    return str(require("numba", extra="sim", purpose="the compiled engine").__version__)
 
 
 _log = logging.getLogger(__name__)

@@ -1,0 +1,18 @@
+"""Names in pictures that matplotlib draws."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from osimlite._require import require
+
+
+@contextmanager
+def plain_lettering() -> Iterator[None]:
+    """Draw names as they are: a ``$`` in one begins no formula, and a letter that the font lacks is an empty box."""
+    matplotlib = require("matplotlib", extra="plot", purpose="drawing")
+    with matplotlib.rc_context({"text.parse_math": False}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)
+        yield
