@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import sys
 import tempfile
@@ -125,29 +126,40 @@ def _encoded(content: str, path: str | Path) -> bytes:
 
 @contextmanager
 def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
-    """A stream whose content becomes a file when all is written; errors as those of :func:`write_atomically`."""
+    """A stream whose content becomes a file when all is written; errors as those of :func:`write_atomically`.
+
+    A file that was there keeps its owner, its mode and all of its names.
+    """
     # A link stays a link to the file that is written; a pipe or a device takes the text as it is.
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file():
         with _opened(target) as stream:
             yield stream
         return
+    there = target.stat() if target.exists() else None
+    # To those who may do everything the mode says it all the same.
+    if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
+        raise OsimliteError("cannot write the file: it is read-only; make it writable first", file=str(target))
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".osimlite-")
     except OSError as error:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
-        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
-        Path(name).chmod(mode)
-        Path(name).replace(target)
+        if there is None:
+            Path(name).chmod(0o666 & ~_umask())
+        replaces = there is None or _made_like(name, target, there)
+        if replaces:
+            Path(name).replace(target)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+    if not replaces:
+        _copy_into(name, target)
 
 
 def make_folder(path: str | Path) -> Path:
@@ -195,6 +207,40 @@ def _opened(target: Path) -> Iterator[BinaryIO]:
             yield stream
     except OSError as error:
         raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
+
+
+def _made_like(name: str, target: Path, there: os.stat_result) -> bool:
+    """Give a file what a system notes of another that it is to replace; whether all of it could be given."""
+    if there.st_nlink > 1:
+        return False
+    try:
+        made = os.stat(name)
+        if (made.st_uid, made.st_gid) != (there.st_uid, there.st_gid):
+            os.chown(name, there.st_uid, there.st_gid)
+        os.chmod(name, stat.S_IMODE(there.st_mode))
+        if sys.platform == "linux":
+            for attribute in os.listxattr(target):
+                os.setxattr(name, attribute, os.getxattr(target, attribute))
+    except OSError:
+        return False
+    return True
+
+
+def _copy_into(name: str, target: Path) -> None:
+    """Write what is in one file into another, which stays itself, and remove the first.
+
+    Raises:
+        OsimliteError: it cannot be written whole; the first file is kept then.
+    """
+    try:
+        with open(name, "rb") as source, target.open("r+b") as stream:
+            shutil.copyfileobj(source, stream)
+            stream.truncate()
+    except OSError as error:
+        raise OsimliteError(
+            f"cannot write the file: {error.strerror}; what was to be written is in {name}", file=str(target)
+        ) from None
+    os.unlink(name)
 
 
 def _umask() -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import pytest
 from osimlite import files
 from osimlite.errors import MissingFileError, OsimliteError, SpecialFileError
 from osimlite.files import read_file
-from tests.cli.command import run
+from tests.cli.command import Done, run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes and devices among its files")
 
@@ -195,3 +195,77 @@ def test_files_that_name_each_other_deeply(tmp_path: Path) -> None:
     )
     done = run("validate", "m.osim", "--format", "concise", "--no-cache", folder=tmp_path)
     assert "files name each other too deeply" in done.out
+
+
+MESSY = '<OpenSimDocument Version="40600"><Model name="m"><gravity>0  -5 0</gravity ></Model></OpenSimDocument>'
+WRITING = (["format"], ["validate", "--fix", "--no-cache"])
+
+
+@pytest.fixture(params=WRITING, ids=["format", "fix"])
+def rewrite(request: pytest.FixtureRequest) -> Callable[..., Done]:
+    """Have a file written again; it must be another text then."""
+    return lambda *paths: run(*request.param, *paths)
+
+
+def test_a_read_only_file_is_not_replaced(tmp_path: Path, rewrite: Callable[..., Done]) -> None:
+    """The superuser could, but was not asked to; the other files are written all the same."""
+    fixed, other = tmp_path / "a.osim", tmp_path / "b.osim"
+    for place in (fixed, other):
+        place.write_text(MESSY)
+    fixed.chmod(0o444)
+    done = rewrite(fixed, other)
+    assert done.code == 2
+    assert f"{fixed}: cannot write the file: it is read-only; make it writable first\n" in done.err
+    assert fixed.read_text() == MESSY and fixed.stat().st_mode & 0o777 == 0o444
+    assert other.read_text() != MESSY
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.osim", "b.osim"]
+
+
+def test_every_name_of_a_file_stays_one_of_it(tmp_path: Path, rewrite: Callable[..., Done]) -> None:
+    place, other, link = tmp_path / "a.osim", tmp_path / "b.txt", tmp_path / "c.osim"
+    place.write_text(MESSY + " " * 10_000)
+    place.chmod(0o640)
+    other.hardlink_to(place)
+    link.symlink_to(place)
+    assert rewrite(link).code == 0
+    assert other.samefile(place) and link.is_symlink()
+    assert other.read_text() == place.read_text() != MESSY
+    assert place.stat().st_mode & 0o777 == 0o640
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.osim", "b.txt", "c.osim"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only the superuser gives files away")
+def test_a_file_keeps_its_owner_and_mode(tmp_path: Path, rewrite: Callable[..., Done]) -> None:
+    place = tmp_path / "a.osim"
+    place.write_text(MESSY)
+    os.chown(place, 1234, 4321)
+    place.chmod(0o600)
+    assert rewrite(place).code == 0
+    found = place.stat()
+    assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (1234, 4321, 0o600)
+    assert place.read_text() != MESSY
+
+
+def test_what_cannot_be_given_to_a_new_file_stays_on_the_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = tmp_path / "a.osim"
+    place.write_text("before " * 100)
+    number = place.stat().st_ino
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "chmod", refuse)
+    files.write_atomically(place, "after")
+    assert place.read_text() == "after" and place.stat().st_ino == number
+    monkeypatch.setattr(files.shutil, "copyfileobj", refuse)
+    with pytest.raises(OsimliteError, match=r"not permitted; what was to be written is in (.*)") as caught:
+        files.write_atomically(place, "later")
+    assert Path(str(caught.value).rpartition(" ")[2]).read_text() == "later"
+
+
+@pytest.mark.parametrize("name", ["x" * 250 + ".osim", "ä" * 125 + ".osim"])
+def test_a_name_as_long_as_may_be(tmp_path: Path, rewrite: Callable[..., Done], name: str) -> None:
+    place = tmp_path / name
+    place.write_text(MESSY)
+    assert rewrite(place).code == 0
+    assert place.read_text() != MESSY

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from osimlite.cli._console import hand_over, print_diff, say, show, wants_colour
+from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._progress import progress_bar
-from osimlite.errors import OsimliteError
+from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.files import model_files, read_standard_input
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
@@ -52,12 +52,12 @@ def run(
     files = list(_files(paths))
     if len(files) > 1:
         gc.enable()
+    failed = False
     if diff:
         changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
         return int(any(changed))
     if fix or unsafe_fixes:
-        mended = [_mend(path, given, unsafe=unsafe_fixes) for path in files]
-        count, left = sum(count for count, _ in mended), sum(left for _, left in mended)
+        count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
         more = f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
         say(f"Mended {_places(count)}{more}.", err=True)
     with progress_bar("checking", len(files)) as progress:
@@ -79,7 +79,7 @@ def run(
         text = render(report, format, colour=wants_colour(), width=width, everything=everything)
         (show if format in FOR_PEOPLE else hand_over)(text)
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
-    return int(bool(report.at_least(worst)))
+    return 2 if failed else int(bool(report.at_least(worst)))
 
 
 def _files(paths: list[str]) -> Iterator[str]:
@@ -132,12 +132,30 @@ def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int,
     return source, data, total, left
 
 
+def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, bool]:
+    """Mend files; how many mends that took, how many guesses are left, and whether it could not be done to some."""
+    if "-" in files:
+        raise OsimliteError("standard input cannot be mended in place; use --diff")
+    total = guesses = 0
+    failed = False
+    for path in files:
+        try:
+            count, left = _mend(path, given, unsafe)
+        except MissingFileError:
+            continue  # The check that follows tells of it.
+        except OsimliteError as error:
+            complain(error)
+            failed = True
+            continue
+        total += count
+        guesses += left
+    return total, guesses, failed
+
+
 def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
     """Mend a file; how many mends that took, and how many guesses are left."""
     from osimlite.files import write_atomically
 
-    if path == "-":
-        raise OsimliteError("standard input cannot be mended in place; use --diff")
     _, data, count, left = _mended(path, given, unsafe)
     if count:
         write_atomically(path, data)

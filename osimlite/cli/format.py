@@ -51,7 +51,12 @@ def format(
         elif check:
             say(f"would reformat {path}")
         else:
-            write_atomically(path, after)
+            try:
+                write_atomically(path, after)
+            except OsimliteError as error:
+                complain(error)
+                worst = max(worst, error.exit_code)
+                continue
             say(f"reformatted {path}")
     if same and not (changed and show_diff):
         files = "1 file is" if same == 1 else f"{same} files are"
