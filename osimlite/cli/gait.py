@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from osimlite.gait.cycle import Cycle
     from osimlite.gait.stepmap import StepMap
     from osimlite.gait.steps import Scuff, Step, Walk
-    from osimlite.simulation.engines.compiled import CompiledEngine
+    from osimlite.simulation.many import BatchEngine
 
 
 WALK_ACCURACY = 1e-6
@@ -161,7 +161,7 @@ class Found:
 
 
 def _walk(
-    engine: CompiledEngine, state: Sequence[float], feet: Sequence[str] | None, to: float, settle: int, accuracy: float
+    engine: BatchEngine, state: Sequence[float], feet: Sequence[str] | None, to: float, settle: int, accuracy: float
 ) -> tuple[Found, StepMap | None]:
     """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
     from osimlite.errors import OsimliteError

@@ -13,8 +13,8 @@ from osimlite.gait.cycle import Cycle
 from osimlite.gait.starts import stood
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.steps import Walk, along_slope, walk_many
-from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import BatchEngine
+from osimlite.simulation.runs import Floats, Ints
 
 SWEEP_ACCURACY = 1e-5
 """Of the integrator, where many walkers walk many steps."""
@@ -176,7 +176,7 @@ def _leg_speeds(step_map: StepMap) -> tuple[int, int]:
     return n + first, n + int(step_map.exchange[first])
 
 
-def basin_places(engine: CompiledEngine, x: str = "", y: str = "") -> tuple[int | None, int | None]:
+def basin_places(engine: BatchEngine, x: str = "", y: str = "") -> tuple[int | None, int | None]:
     """Where in a state the numbers are that a basin changes by name; None where the default is to be taken.
 
     Raises:
@@ -188,7 +188,7 @@ def basin_places(engine: CompiledEngine, x: str = "", y: str = "") -> tuple[int 
     return places
 
 
-def _place(engine: CompiledEngine, name: str) -> int:
+def _place(engine: BatchEngine, name: str) -> int:
     coordinate, slash, kind = name.rpartition("/")
     is_speed = bool(slash) and kind == "speed"
     place = engine.mechanism.coordinate_index(coordinate if is_speed else name)
@@ -197,7 +197,7 @@ def _place(engine: CompiledEngine, name: str) -> int:
     return engine.order.index(place) + (len(engine.order) if is_speed else 0)
 
 
-def _axis(engine: CompiledEngine, place: int, value: float, reach: float, grid: int) -> Axis:
+def _axis(engine: BatchEngine, place: int, value: float, reach: float, grid: int) -> Axis:
     n = len(engine.order)
     info = engine.mechanism.coordinates[engine.order[place % n]]
     unit = "rad" if info.motion_type == "rotational" else "m"

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from osimlite.errors import OsimliteError
 from osimlite.gait.stepmap import StepMap
-from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.runs import Floats
 
 CONVERGED = 1e-9
 """A fixed point is found when the map moves it by less than this (rad, m and per second, as a norm)."""

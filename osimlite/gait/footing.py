@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements.contact import HuntCrossley
-from osimlite.simulation.engines.compiled import CompiledEngine
+from osimlite.simulation.many import BatchEngine
 from osimlite.text import counted, listed, or_known
 
 _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
@@ -43,7 +43,7 @@ class _Sole:
     reach: float  # from where the joint holds the body, m
 
 
-def find_footing(engine: CompiledEngine, feet: Sequence[str] | None = None) -> Footing:
+def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Footing:
     """Tell the feet from what must not touch the ground.
 
     The bodies that touch the ground and carry no other body that does are the ends of the legs. On each, the contact
@@ -106,7 +106,7 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
     return tuple(found)
 
 
-def _soles(engine: CompiledEngine) -> list[_Sole]:
+def _soles(engine: BatchEngine) -> list[_Sole]:
     found = []
     for element in engine.forces.elements:
         if not isinstance(element, HuntCrossley):

@@ -8,9 +8,8 @@ import numpy as np
 
 from osimlite.gait.footing import Footing
 from osimlite.gait.steps import along_slope
-from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.many import contact_places
+from osimlite.simulation.many import BatchEngine
+from osimlite.simulation.runs import Floats, Ints
 
 APART = 0.1
 """How far a coordinate is moved to see what it carries, rad or m."""
@@ -32,7 +31,7 @@ class Carriers:
     lift: int | None
 
 
-def carriers(engine: CompiledEngine, footing: Footing) -> Carriers:
+def carriers(engine: BatchEngine, footing: Footing) -> Carriers:
     """Find the coordinates that carry a walker as a whole, by moving each at some poses."""
     n = len(engine.order)
     contacts = _contacts(engine, footing)
@@ -53,7 +52,7 @@ def carriers(engine: CompiledEngine, footing: Footing) -> Carriers:
 
 
 def stood(
-    engine: CompiledEngine,
+    engine: BatchEngine,
     footing: Footing,
     states: Floats,
     depth: float = 0.0,
@@ -86,7 +85,7 @@ def stood(
     return placed
 
 
-def planted(engine: CompiledEngine, footing: Footing, states: Floats, *, numbers: Floats | None = None) -> Floats:
+def planted(engine: BatchEngine, footing: Footing, states: Floats, *, numbers: Floats | None = None) -> Floats:
     """States (W, y) put on the ground with the deeper foot, which is at rest there.
 
     The walker is lifted or lowered until that foot only just touches; then the speeds of the coordinates that carry it
@@ -140,12 +139,12 @@ def upright(states: Floats, neutral: Floats) -> Floats:
     return moved
 
 
-def _centres(engine: CompiledEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None) -> Floats:
+def _centres(engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None) -> Floats:
     """Centres of the contacts' second surfaces (k, P, 3), in ground."""
-    places: Floats = contact_places(engine, states, numbers, rows)[..., 6:]
+    places: Floats = engine.contact_places(states, numbers, rows)[..., 6:]
     return places
 
 
-def _contacts(engine: CompiledEngine, footing: Footing) -> Ints:
+def _contacts(engine: BatchEngine, footing: Footing) -> Ints:
     names = [name for foot in footing.feet for name in foot] + list(footing.falls)
     return np.array([engine.contacts.index(name) for name in names])

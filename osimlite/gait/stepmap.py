@@ -18,10 +18,9 @@ from osimlite.gait.footing import Footing, find_footing
 from osimlite.gait.steps import Step, along_slope, falls, room_for, walks_of
 from osimlite.gait.symmetry import leg_exchange, neutral_directions
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.many import Watch, run_many
+from osimlite.simulation.many import BatchEngine, Watch, run_many
 from osimlite.simulation.run import kept_constraints
+from osimlite.simulation.runs import Floats, Ints
 from osimlite.text import listed
 
 TIGHT = 1e-10
@@ -90,7 +89,7 @@ class StepMap:
 
     def __init__(
         self,
-        engine: CompiledEngine,
+        engine: BatchEngine,
         near: ArrayLike,
         *,
         footing: Footing | None = None,
@@ -114,7 +113,7 @@ class StepMap:
         if step.foot != 0:
             self.start = self._other_leg(self.start)
 
-    def varied(self, engine: CompiledEngine, near: ArrayLike, accuracy: float | None = None) -> StepMap:
+    def varied(self, engine: BatchEngine, near: ArrayLike, accuracy: float | None = None) -> StepMap:
         """The step map of a model with other numbers, whose reduced states are as near to these as they can be.
 
         Args:

@@ -14,11 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.gait.footing import Footing, find_footing
-from osimlite.simulation.engines.batch import NO_LIMIT
-from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
-from osimlite.simulation.kernels.pointers import Floats
-from osimlite.simulation.many import ENDINGS, Runs, Watch, contact_places, contact_radii, run_many
+from osimlite.simulation.many import ENDINGS, NO_LIMIT, BatchEngine, Runs, Watch, run_many
+from osimlite.simulation.runs import Floats
 
 SHORTEST = 0.05
 """How far ahead of the other a foot touches down in a step, at least, m."""
@@ -103,7 +101,7 @@ def room_for(to: float) -> int:
 
 
 def walk_many(
-    engine: CompiledEngine,
+    engine: BatchEngine,
     states: ArrayLike,
     to: float,
     *,
@@ -137,7 +135,7 @@ def walk_many(
 
 
 def walks_of(
-    engine: CompiledEngine,
+    engine: BatchEngine,
     states: ArrayLike,
     runs: Runs,
     footing: Footing,
@@ -240,7 +238,7 @@ def follow(
 
 
 def along_slope(
-    engine: CompiledEngine, states: Floats, vectors: Floats | None = None, rows: ArrayLike | None = None
+    engine: BatchEngine, states: Floats, vectors: Floats | None = None, rows: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
     """How far down the slope the spheres of the contacts are, and how deep in the ground.
 
@@ -258,7 +256,7 @@ def along_slope(
     table = np.array(engine.numbers if vectors is None else vectors, dtype=np.float64, order="C")
     table = table.reshape(-1, table.shape[-1])
     which = np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
-    places = contact_places(engine, states, table, which)
+    places = engine.contact_places(states, table, which)
     origin, normal, center = places[..., :3], places[..., 3:6], places[..., 6:]
     gravity = table[:, :3]
     pull = gravity[which][:, None, :] - np.sum(gravity[which][:, None, :] * normal, axis=2, keepdims=True) * normal
@@ -267,5 +265,5 @@ def along_slope(
     forward = np.array((1.0, 0.0, 0.0)) - normal[..., :1] * normal
     along = np.where(level[..., None], forward, pull)
     along /= np.linalg.norm(along, axis=2, keepdims=True)
-    radii = contact_radii(engine, table)[which]
+    radii = engine.contact_radii(table)[which]
     return np.sum(center * along, axis=2), radii - np.sum((center - origin) * normal, axis=2)

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from osimlite.gait.footing import Footing
 from osimlite.multibody.mechanism import GROUND
 from osimlite.simulation.elements.contact import HuntCrossley
-from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import BatchEngine
+from osimlite.simulation.runs import Floats, Ints
 
 SAME = 1e-6
 """Two derivatives are the same if they differ by less than this part."""
@@ -21,7 +21,7 @@ UNEVEN = 10.0
 """A state at which the derivative is so many times less even than at most others is left out."""
 
 
-def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) -> Ints | None:
+def leg_exchange(engine: BatchEngine, footing: Footing, states: ArrayLike) -> Ints | None:
     """The places (y,) from which the state is taken when the legs change parts, or None if they are not alike.
 
     The coordinates of one leg, from where the legs part to the foot, change places with those of the other, and
@@ -72,7 +72,7 @@ def leg_exchange(engine: CompiledEngine, footing: Footing, states: ArrayLike) ->
     return source
 
 
-def exchange_auxiliary(engine: CompiledEngine, source: Ints, states: Floats) -> None:
+def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> None:
     """Complete the places (y,) that the legs exchange, which are known for values and speeds.
 
     Args:
@@ -95,7 +95,7 @@ def exchange_auxiliary(engine: CompiledEngine, source: Ints, states: Floats) -> 
             source[first + place] = first + alike[0]
 
 
-def _effects(engine: CompiledEngine, state: Floats) -> Floats:
+def _effects(engine: BatchEngine, state: Floats) -> Floats:
     """What each auxiliary state (z) does: by how much it changes the other rates (2n) and its own, and that rate."""
     first, here = 2 * len(engine.order), np.array(engine.derivative(0.0, state.tolist()))
     rows = []
@@ -107,7 +107,7 @@ def _effects(engine: CompiledEngine, state: Floats) -> Floats:
     return np.array(rows)
 
 
-def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
+def neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
     """Directions (y, m) of the state in which the motion goes on unchanged, but for going that way; orthonormal.
 
     A walker may be anywhere along an even slope; a body that hangs in its mass centre turns as fast as it pleases. The
@@ -136,7 +136,7 @@ def neutral_directions(engine: CompiledEngine, states: ArrayLike) -> Floats:
         found = larger
 
 
-def derivative_matrix(engine: CompiledEngine, state: Floats) -> tuple[Floats, float]:
+def derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Floats, float]:
     """Derivative (y, y) of the rate of change of the state by the state, and how even that is.
 
     Evenness: the part by which the differences to either side are unlike; much where a contact only just touches.

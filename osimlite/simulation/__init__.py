@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
+    from osimlite.simulation.options import Options as Options
     from osimlite.simulation.run import Simulation as Simulation
     from osimlite.simulation.run import simulate as simulate
     from osimlite.simulation.storage import StoTable as StoTable
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __getattr__ = imported_when_used(
     __name__,
     {
+        "Options": "osimlite.simulation.options",
         "Simulation": "osimlite.simulation.run",
         "StoTable": "osimlite.simulation.storage",
         "Trajectory": "osimlite.simulation.trajectory",

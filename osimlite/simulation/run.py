@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import floor, isfinite
 from numbers import Real
@@ -23,7 +23,7 @@ from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.options import Options
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import doubt_of, in_units_of, starting, state_in
 from osimlite.simulation.states import in_model_order
@@ -31,33 +31,11 @@ from osimlite.simulation.stepper import Stepper
 from osimlite.simulation.summary import course, outcome, versions
 from osimlite.simulation.trajectory import Report, Trajectory
 
-Progress = Callable[[float], object]
-"""Called with the simulated time (s) reached."""
-
 QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
 """What is not finite is refused by name where it counts; numpy need not warn of it too."""
 
 
-def simulate(
-    model: Model,
-    to: float = 2.0,
-    engine: str = "auto",
-    *,
-    accuracy: float = DEFAULT_ACCURACY,
-    fixed_step: float | None = None,
-    report_interval: float = 0.01,
-    initial: Mapping[str, float | str] | str | Path | None = None,
-    initial_speeds: Mapping[str, float | str] | None = None,
-    route: str = "auto",
-    skip_unsupported: bool = False,
-    simbody_early_return: bool = False,
-    opensim_derivatives: bool = False,
-    rolling: bool = False,
-    external_loads: str | Path | None = None,
-    folder: str | Path | None = None,
-    show: bool = False,
-    progress: Progress | None = None,
-) -> Trajectory:
+def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any) -> Trajectory:
     """Simulate a model forward in time, from its default pose and speeds.
 
     Constraints, prescribed coordinates and loops are kept up to a tenth of the accuracy. Where the start does not
@@ -67,58 +45,25 @@ def simulate(
         model: what moves.
         to: how long, s.
         engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
-        accuracy: of the integrator, with the meaning it has in OpenSim.
-        fixed_step: take the engine's own steps of this length (s) instead of controlling the error.
-        report_interval: time between the recorded moments, s; the last one is `to` in any case.
-        initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
-            default. The path of a state (``/jointset/knee/flexion/speed``, ``/forceset/stop/dissipatedEnergy``) stands
-            for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of
-            states stands for its last row.
-        initial_speeds: generalized speeds that do not start at their default, likewise.
-        route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
-            osimlite's own "recursion", or "auto" for the quickest that is possible.
-        skip_unsupported: leave out forces that cannot be computed; the summary lists them.
-        simbody_early_return: reproduce a defect of Simbody in contact forces of several surfaces: the first contact
-            that separates too fast to push takes the force of those after it.
-        opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
-            :func:`osimlite.multibody.build_mechanism`.
-        rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
-        external_loads: a file of ExternalLoads: measured forces over time that act too.
-        folder: where the model's file is; files that the model names (of contact meshes) are looked for there. The
-            folder that the program runs in if left out.
-        show: show the motion in Bullet's window, in real time, and return when it is closed; needs `fixed_step`.
-        progress: called with the simulated time at every recorded moment.
+        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `fixed_step`, `report_interval`,
+            `initial`, `initial_speeds`, `skip_unsupported` and the others.
 
     Raises:
         ModelError: the model is not a mechanism, or a name does not exist.
         UnsupportedError: the model has a joint, constraint or force that cannot be computed.
         SimulationError: the motion cannot be computed any further, no pose or speeds fulfil the constraints with what
-            was set, or a coordinate that was set is locked or prescribed; a setting has no meaning.
+            was set, or a coordinate that was set is locked or prescribed.
+        SettingError: there is no such option, or a setting has no meaning.
         MissingDependency: what the engine works with is not installed.
     """
-    with Simulation(
-        model,
-        engine,
-        route=route,
-        skip_unsupported=skip_unsupported,
-        simbody_early_return=simbody_early_return,
-        opensim_derivatives=opensim_derivatives,
-        rolling=rolling,
-        external_loads=external_loads,
-        folder=folder,
-        show=show,
-    ) as simulation:
-        trajectory = simulation.run(
-            to,
-            accuracy=accuracy,
-            fixed_step=fixed_step,
-            report_interval=report_interval,
-            initial=initial,
-            initial_speeds=initial_speeds,
-            progress=progress,
-        )
+    with Simulation(model, engine, **choices) as simulation:
+        trajectory = simulation.run(to)
         simulation.hold()
         return trajectory
+
+
+TOLD = "skip_unsupported", "simbody_early_return", "opensim_derivatives", "rolling"
+"""What the summary says besides the settings of the run."""
 
 
 def kept_constraints(mechanism: Mechanism) -> list[str]:
@@ -129,80 +74,70 @@ def kept_constraints(mechanism: Mechanism) -> list[str]:
 class Simulation:
     """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
 
-    Args and errors: as those of :func:`simulate`.
+    Args:
+        model: what moves.
+        engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
+        choices: attributes of :class:`osimlite.simulation.Options`; those of a run hold where a run does not change
+            them.
+
+    Errors are those of :func:`simulate`.
 
     Attributes:
+        options: that were chosen.
         constraints: names of what the coordinates of the state must fulfil.
         paths: of all states, in the order of OpenSim.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        engine: str = "auto",
-        *,
-        route: str = "auto",
-        skip_unsupported: bool = False,
-        simbody_early_return: bool = False,
-        opensim_derivatives: bool = False,
-        rolling: bool = False,
-        external_loads: str | Path | None = None,
-        folder: str | Path | None = None,
-        show: bool = False,
-    ) -> None:
+    def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
+        self.options = chosen = Options.of(choices)
         # Only Bullet has a window.
-        make = engine_factory("bullet" if show and engine == AUTO else engine)
-        self.mechanism: Mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives, rolling=rolling)
+        make = engine_factory("bullet" if chosen.show and engine == AUTO else engine)
+        self.mechanism: Mechanism = build_mechanism(
+            model, opensim_derivatives=chosen.opensim_derivatives, rolling=chosen.rolling
+        )
         _require_finite_start(self.mechanism)
         self.forces = force_elements(
             model,
             self.mechanism,
-            skip_unsupported=skip_unsupported,
-            simbody_early_return=simbody_early_return,
-            external_loads=external_loads,
-            folder=folder,
+            skip_unsupported=chosen.skip_unsupported,
+            simbody_early_return=chosen.simbody_early_return,
+            external_loads=chosen.external_loads,
+            folder=chosen.folder,
         )
         visuals = None
-        if show:
+        if chosen.show:
             from osimlite.meshes.folders import MeshFolders
             from osimlite.robot.mesh_files import MeshFiles
             from osimlite.robot.visuals import collect_visuals
 
-            places = MeshFolders(Path.cwd() if folder is None else Path(folder))
+            places = MeshFolders(Path.cwd() if chosen.folder is None else Path(chosen.folder))
             visuals = collect_visuals(model, self.mechanism, mesh_files=MeshFiles(places))
-        self.engine: Engine = make(self.mechanism, self.forces, Settings(route=route, show=show, visuals=visuals))
+        self.engine: Engine = make(
+            self.mechanism, self.forces, Settings(route=chosen.route, show=chosen.show, visuals=visuals)
+        )
         self.state = self.engine.state
         self.constraints = Constrained(self.mechanism, self.engine.order).names
         paths = [f"{info.path}/{what}" for info in self.mechanism.coordinates for what in ("value", "speed")]
         self.paths = in_model_order(model, paths + self.state.paths)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
-        self._settings = {
-            "skip_unsupported": skip_unsupported,
-            "simbody_early_return": simbody_early_return,
-            "opensim_derivatives": opensim_derivatives,
-            "rolling": rolling,
-            **({} if external_loads is None else {"external_loads": str(external_loads)}),
-        }
-        self._show = show
         self._has_inertia = False
 
-    def run(
-        self,
-        to: float = 2.0,
-        *,
-        accuracy: float = DEFAULT_ACCURACY,
-        fixed_step: float | None = None,
-        report_interval: float = 0.01,
-        initial: Mapping[str, float | str] | str | Path | None = None,
-        initial_speeds: Mapping[str, float | str] | None = None,
-        progress: Progress | None = None,
-    ) -> Trajectory:
-        """Simulate once; arguments and errors as those of :func:`simulate`."""
+    def run(self, to: float = 2.0, **choices: Any) -> Trajectory:
+        """Simulate once.
+
+        Args:
+            to: how long, s.
+            choices: attributes of :class:`osimlite.simulation.Options` that can be chosen for every run.
+
+        Errors are those of :func:`simulate`.
+        """
         started = time.perf_counter()
-        times = report_times(to, report_interval)
+        chosen = self.options.for_run(choices)
+        fixed_step, initial = chosen.fixed_step, chosen.initial
+        times = report_times(to, chosen.report_interval)
         if fixed_step is not None:
             _check_step(fixed_step, to)
-        if self._show and fixed_step is None:
+        if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
             initial = self.state_in(initial)
@@ -214,31 +149,32 @@ class Simulation:
                 name: float(value) if name in self.paths else in_units_of(self.mechanism, name, value)
                 for name, value in (given or {}).items()
             }
-            for given in (initial, initial_speeds)
+            for given in (initial, chosen.initial_speeds)
         )
         y = self.initial_state(initial, initial_speeds)
         self._require_inertia(y)
-        settings = Settings(accuracy=accuracy, fixed_step=fixed_step, route=self.engine.route, show=self._show)
+        settings = Settings(accuracy=chosen.accuracy, fixed_step=fixed_step, route=self.engine.route, show=chosen.show)
         recorder = Recorder(self.engine)
         stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
         recorder.begin(stepper)
-        states = stepper.table(times, progress)
+        states = stepper.table(times, chosen.progress)
         if not isfinite(sum(states[-1])):
             raise SimulationError("the motion is not finite any more; ask for more accuracy")
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
-            **({"accuracy": accuracy} if fixed_step is None else {"fixed_step": fixed_step}),
-            "report_interval": report_interval,
+            **({"accuracy": chosen.accuracy} if fixed_step is None else {"fixed_step": fixed_step}),
+            "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,
-            **self._settings,
+            **{name: getattr(chosen, name) for name in TOLD},
+            **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }
         return self._trajectory(times, states, stepper, recorder, wanted, wall)
 
     def hold(self) -> None:
         """Keep the last pose in the window until somebody closes it; nothing without a window."""
-        if self._show:
+        if self.options.show:
             with suppress(KeyboardInterrupt):
                 self.engine.hold()
 

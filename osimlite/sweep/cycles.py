@@ -27,12 +27,10 @@ from osimlite.gait.stepmap import TIGHT, StepMap
 from osimlite.gait.steps import Walk, walk_many
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
-from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.many import run_many
+from osimlite.simulation.many import BatchEngine, run_many
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.renewal import Variant
 from osimlite.sweep.variables import Floats, Start, refuse_counts
-from osimlite.sweep.variants import Variants
+from osimlite.sweep.variants import Variant, Variants
 
 ROUGH, FINE = 1e-7, 1e-9
 """Accuracy of the integrator where a walker is far from its cycle, and where it is near."""
@@ -197,7 +195,7 @@ class CycleSearch:
                 coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]
         return model
 
-    def engine(self, fractions: Floats) -> CompiledEngine:
+    def engine(self, fractions: Floats) -> BatchEngine:
         """Of the model with these numbers.
 
         Raises:
@@ -206,7 +204,7 @@ class CycleSearch:
         variant = self.variants.variant(self.values(fractions))
         if variant.structure != self.variants.given.structure:
             raise OsimliteError("the numbers change the structure of the model; vary others")
-        found: CompiledEngine = variant.engine
+        found: BatchEngine = variant.engine
         return found
 
     # ---------------------------------------------------------------------------------------- random starts

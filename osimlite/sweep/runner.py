@@ -15,9 +15,8 @@ from osimlite.simulation.run import report_times
 from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep.measures import Batch, Measure, State, measure, measure_name
 from osimlite.sweep.plan import MOST_TRIES, Plan
-from osimlite.sweep.renewal import Variant
 from osimlite.sweep.variables import Floats
-from osimlite.sweep.variants import MOST_KEPT, Variants
+from osimlite.sweep.variants import MOST_KEPT, Variant, Variants
 
 DONE, STOPPED, FAILED = "done", "stopped", "failed"
 

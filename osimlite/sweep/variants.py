@@ -8,7 +8,9 @@ of a model that is built from a file either way, since the same functions make t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +21,10 @@ from osimlite.schema.base import Component
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
+from osimlite.simulation.many import Renewal
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.states import StateLayout
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.renewal import Renewal, Variant
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
 
 if TYPE_CHECKING:
@@ -32,6 +35,30 @@ PRESSED = 8e-4
 
 MOST_KEPT = 64
 """So many models are kept: a grid asks for the same ones again and again."""
+
+
+@dataclass
+class Variant:
+    """A model made ready.
+
+    Attributes:
+        state: what its states consist of.
+        structure: equal for variants that differ in numbers only.
+        numbers: all numbers of an engine that computes batches, empty for others.
+        maker: makes its engine.
+        simulation: that the engine is part of; None if only forces are new.
+    """
+
+    state: StateLayout
+    structure: bytes
+    numbers: Floats
+    maker: Callable[[], Any]
+    simulation: Simulation | None = None
+
+    @cached_property
+    def engine(self) -> Any:
+        """The engine of this very model."""
+        return self.maker()
 
 
 class Variants:
@@ -224,6 +251,12 @@ class Variants:
         self.put(values)
         if self._owners is None:
             return self._whole()
+        given = self.given
         if self._renewal is None:
-            self._renewal = Renewal(self.model, self.given, Path(self._plan.folder or "."))
-        return self._renewal.variant(self._owners) or self._whole()
+            self._renewal = given.engine.renewal(self.model, Path(self._plan.folder or "."))
+        made = self._renewal.renewed(self._owners)
+        if made is None:
+            return self._whole()
+        # The auxiliary states may start otherwise.
+        state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
+        return Variant(state, given.structure, made.numbers, made.engine)

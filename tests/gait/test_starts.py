@@ -13,7 +13,6 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 from osimlite.gait.footing import find_footing
 from osimlite.gait.starts import carriers, planted, stood, upright
 from osimlite.gait.steps import along_slope
-from osimlite.simulation.many import contact_places
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def test_a_planted_foot_touches_and_rests(walker, states, slope):
     n, dt = len(walker.order), 1e-6
     later = placed.copy()
     later[:, :n] += dt * placed[:, n:]
-    before, after = (contact_places(walker, moved, numbers, which) for moved in (placed, later))
+    before, after = (walker.contact_places(moved, numbers, which) for moved in (placed, later))
     moved = (after - before)[:, feet, 6:]
     assert np.linalg.norm(moved[rows, depths.argmax(axis=1)], axis=1).max() < 20 * dt**2
     others = [k for k in range(2 * n) if k not in places_of(walker, "Pelvis_ty") and k - n not in range(1, 3)]

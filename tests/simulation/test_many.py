@@ -167,3 +167,10 @@ def test_settings_without_meaning_are_refused(engine, starts, settings, why):
     """The machine code would go on with some of them forever."""
     with pytest.raises(SettingError, match=why):
         run_many(engine, starts[:1], **{"to": 0.1, **settings})
+
+
+def test_endings_are_those_of_the_machine_code():
+    from osimlite.simulation.kernels import merson
+
+    words = {merson.DONE: "done", merson.FAILED: "failed", merson.STOPPED: "stopped", merson.TOO_MANY: "too many steps"}
+    assert words == ENDINGS

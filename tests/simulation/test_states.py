@@ -67,11 +67,11 @@ def test_nothing_of_the_call_before_is_left(simulations):
 @settings(max_examples=30, deadline=None)
 @given(rows=st.integers(0, 3), columns=st.integers(0, 20))
 def test_a_batch_refuses_states_of_another_length(simulations, rows, columns):
-    from osimlite.simulation.many import contact_places, run_many
+    from osimlite.simulation.many import run_many
 
     engine = simulations["compiled"].engine
     states = np.zeros((rows, columns))
-    for ask in (lambda: run_many(engine, states, 1e-3), lambda: contact_places(engine, states)):
+    for ask in (lambda: run_many(engine, states, 1e-3), lambda: engine.contact_places(states)):
         if columns == engine.state.size:
             ask()
         else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -12,11 +11,10 @@ from numpy.typing import ArrayLike
 from osimlite.simulation.integrators import INITIAL_STEP
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import BatchOptions
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.compiled import CompiledEngine
-
-NO_LIMIT = 2**62
 
 NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
 
@@ -27,17 +25,12 @@ class Batch:
     Args:
         engine: whose mechanism.
         states: where the runs start (W, y).
-        to: when they end, s.
-        accuracy: of the integrator.
+        options: how they go; watches are given as `kinds` and `levels`.
         start: time from which they go on, s.
         next_step: that is tried first, s.
         vectors: numbers, one row for all or one for each run.
-        times: of the reports, s.
         kinds: of the watches (k, 3).
         levels: of the watches (k, 7).
-        most_events: room for the events of a run.
-        event_states: keep the states at the events.
-        most_tries: steps that a run may try.
         most_logged: room for steps in the log, which all runs share.
         start_holds: the constraints hold where the runs start; otherwise they start from the nearest such states.
 
@@ -57,18 +50,13 @@ class Batch:
         self,
         engine: CompiledEngine,
         states: ArrayLike,
-        to: float,
-        accuracy: float,
+        options: BatchOptions,
         *,
         start: float = 0.0,
         next_step: float = INITIAL_STEP,
         vectors: Floats | None = None,
-        times: Sequence[float] = (),
         kinds: Ints = NO_KINDS,
         levels: Floats = NO_LEVELS,
-        most_events: int = 0,
-        event_states: bool = False,
-        most_tries: int = NO_LIMIT,
         most_logged: int = 0,
         start_holds: bool = False,
     ) -> None:
@@ -76,18 +64,21 @@ class Batch:
         (count, size), pairs = self.states.shape, len(engine.contacts)
         self._engine, self._kinds, self._levels = engine, kinds, levels
         self._vectors = engine.numbers[None] if vectors is None else vectors
-        self._times = np.array(times, dtype=np.float64)
+        self._times = np.array(options.report_times, dtype=np.float64)
         # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
         coordinates = len(engine.mechanism.coordinates)
-        event = 3 + size * event_states
+        event = 3 + size * options.event_states
         spare = sum(not body.mobilizer.speeds_are_rates for body in engine.mechanism.bodies)
-        self._sizes, self._settings = np.zeros(merson.SIZES, dtype=np.int64), np.array((to, accuracy, inf, 0.0))
+        self._sizes, self._settings = (
+            np.zeros(merson.SIZES, dtype=np.int64),
+            np.array((options.to, options.accuracy, inf, 0.0)),
+        )
         self._sizes[: merson.START_HOLDS] = (
             coordinates + spare,
             coordinates,
-            most_tries,
-            len(times),
-            most_events,
+            options.most_tries,
+            len(self._times),
+            options.most_events,
             event,
             len(kinds),
             most_logged,
@@ -96,8 +87,8 @@ class Batch:
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
         self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
-        self.reports = np.full((count, len(times), size), np.nan)
-        self.events, self.peaks = np.zeros((count, most_events, event)), np.zeros((count, pairs, 2))
+        self.reports = np.full((count, len(self._times), size), np.nan)
+        self.events, self.peaks = np.zeros((count, options.most_events, event)), np.zeros((count, pairs, 2))
         self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
         self._room = int(engine.structure[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
 

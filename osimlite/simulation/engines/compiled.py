@@ -7,21 +7,28 @@ they call. The code serves every model: models and parameters are arrays.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.schema.model import Model
 from osimlite.simulation.constrained import Constrained
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines import many
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.linking import version
 from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.renewal import NumbersOnly
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.many import BatchEngine, BatchOptions
+from osimlite.simulation.runs import Runs
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
 
@@ -29,7 +36,7 @@ LOGGED_STEPS = 512
 """So many steps are taken in one call of a motion that is watched."""
 
 
-def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> CompiledEngine:
+def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
     """Make the engine."""
     if settings.show:
         raise SimulationError("the compiled engine shows no window; take --engine bullet for --gui")
@@ -93,6 +100,24 @@ class CompiledEngine(System):
                 projection=self.constrained,
             )
         return CompiledMerson(self, t, y, settings.accuracy, observe, self.state.names)
+
+    def run_many(self, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None) -> Runs:
+        """Compute a batch."""
+        return many.run_many(self, states, options, numbers)
+
+    def contact_places(
+        self, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
+    ) -> Floats:
+        """Where the surfaces of all contacts are, in ground."""
+        return many.contact_places(self, states, numbers, rows)
+
+    def contact_radii(self, numbers: ArrayLike | None = None) -> Floats:
+        """Radii of the second surfaces of all contacts, m."""
+        return many.contact_radii(self, numbers)
+
+    def renewal(self, model: Model, folder: Path) -> NumbersOnly:
+        """What makes parts of the model anew."""
+        return NumbersOnly(model, self, folder)
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
         # They depend on nothing else.
@@ -179,11 +204,9 @@ class CompiledMerson(RungeKuttaMerson):
         batch = Batch(
             self._engine,
             [self.state],
-            times[-1],
-            self._accuracy,
+            BatchOptions(to=times[-1], accuracy=self._accuracy, report_times=times),
             start=self.time,
             next_step=self._next_step,
-            times=times,
             most_logged=LOGGED_STEPS,
             start_holds=True,
         )

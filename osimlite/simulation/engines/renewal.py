@@ -1,12 +1,11 @@
-"""The parts of a model that some numbers have a part in, made anew."""
+"""The parts of a model that some numbers have a part in, made anew for the compiled engine."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,50 +18,38 @@ from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.engines import engine_factory
-from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.kernels.pack import pack
-from osimlite.simulation.run import Simulation
-from osimlite.simulation.states import StateLayout
-from osimlite.sweep.variables import Floats
+from osimlite.simulation.kernels.pointers import Floats
+
+if TYPE_CHECKING:
+    from osimlite.simulation.engines.compiled import CompiledEngine
 
 
-@dataclass
-class Variant:
-    """A model made ready.
+@dataclass(frozen=True)
+class Renumbered:
+    """A model of which only numbers have changed; see :class:`osimlite.simulation.many.Renewed`."""
 
-    Attributes:
-        state: what its states consist of.
-        structure: equal for variants that differ in numbers only.
-        numbers: all numbers of the compiled engine, empty for others.
-        maker: makes its engine.
-        simulation: that the engine is part of; None if only forces are new.
-    """
-
-    state: StateLayout
-    structure: bytes
+    mechanism: Mechanism
+    forces: Forces
     numbers: Floats
-    maker: Callable[[], Any]
-    simulation: Simulation | None = None
+    make: Callable[[Mechanism, Forces], CompiledEngine]
 
-    @cached_property
-    def engine(self) -> Any:
+    def engine(self) -> CompiledEngine:
         """The engine of this very model."""
-        return self.maker()
+        return self.make(self.mechanism, self.forces)
 
 
-class Renewal:
-    """Makes those parts of a model anew that its forces, masses and gravity have a part in; for the compiled engine.
+class NumbersOnly:
+    """Makes those parts of a model anew that its forces, masses and gravity have a part in.
 
     Args:
         model: of which nothing else changes.
-        given: the same model before.
+        engine: of the same model before.
         folder: of its file.
     """
 
-    def __init__(self, model: Model, given: Variant, folder: Path) -> None:
-        engine = given.engine
-        self._model, self._given = model, given
+    def __init__(self, model: Model, engine: CompiledEngine, folder: Path) -> None:
+        self._model, self._engine = model, engine
         self._mechanism: Mechanism = engine.mechanism
         self._forces: Forces = engine.forces
         self._components = model.tree().by_path
@@ -71,12 +58,12 @@ class Renewal:
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
         # The numbers of all items are the last ones, in their order.
-        self._first, place = {}, len(given.numbers) - sum(_length(items) for items in self._items.values())
+        self._first, place = {}, len(engine.numbers) - sum(_length(items) for items in self._items.values())
         for path, items in self._items.items():
             self._first[path] = place
             place += _length(items)
 
-    def variant(self, owners: Sequence[Component]) -> Variant | None:
+    def renewed(self, owners: Sequence[Component]) -> Renumbered | None:
         """The model with what its forces and bodies are now; None if more has changed than numbers.
 
         Args:
@@ -97,16 +84,11 @@ class Renewal:
         if mechanism is None:
             return None
         numbers = self._with_forces(made) if only_forces else self._packed(mechanism, forces)
-        if numbers is None:
-            return None
-        # The auxiliary states may start otherwise.
-        state = StateLayout(mechanism, self._given.state.order, forces.elements)
-        make = engine_factory("compiled")
-        return Variant(state, self._given.structure, numbers, lambda: make(mechanism, forces, Settings()))
+        return None if numbers is None else Renumbered(mechanism, forces, numbers, type(self._engine))
 
     def _with_forces(self, made: Mapping[str, Any]) -> Floats | None:
         """The given numbers with those of some elements in their places."""
-        numbers = self._given.numbers.copy()
+        numbers = self._engine.numbers.copy()
         for path, element in made.items():
             items = element.items(self._places)
             if [_kind(item) for item in items] != [_kind(item) for item in self._items[path]]:
@@ -131,8 +113,8 @@ class Renewal:
 
     def _packed(self, mechanism: Mechanism, forces: Forces) -> Floats | None:
         packed = pack(mechanism, forces)
-        is_alike = np.array_equal(packed.structure, self._given.engine.structure)
-        return packed.numbers if is_alike and packed.order == self._given.engine.order else None
+        is_alike = np.array_equal(packed.structure, self._engine.structure)
+        return packed.numbers if is_alike and packed.order == self._engine.order else None
 
 
 def _length(items: Sequence[Item]) -> int:

@@ -1,0 +1,120 @@
+"""The batches of the compiled engine; see :mod:`osimlite.simulation.many` for what they are."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.errors import OsimliteError
+from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels.contacts import RADIUS
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.many import BatchOptions
+from osimlite.simulation.runs import Runs, Watch
+from osimlite.text import did_you_mean
+
+if TYPE_CHECKING:
+    from osimlite.simulation.engines.compiled import CompiledEngine
+
+AT_ONCE = 8
+"""So many runs a thread takes at a time."""
+
+
+def run_many(engine: CompiledEngine, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None) -> Runs:
+    """Compute a batch."""
+    starts = engine.state.table(states)
+    options.check()
+    vectors, count = _rows(engine, numbers), len(starts)
+    if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
+        raise OsimliteError(
+            f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
+        )
+    kinds, levels = _watches(engine, options.watches)
+    batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels)
+
+    def work(first: int) -> None:
+        batch.run(first, min(first + AT_ONCE, count))
+
+    with ThreadPoolExecutor(options.threads or os.cpu_count()) as pool:
+        list(pool.map(work, range(0, count, AT_ONCE)))
+    names = [*engine.contacts, *(watch.name for watch in options.watches)]
+    kept = [rows[:total] for rows, total in zip(batch.events, batch.counts[:, merson.EVENTS], strict=True)]
+    named = [[(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()] for rows in kept]
+    at_events = [rows[:, 3:] for rows in kept] if options.event_states else []
+    return Runs(
+        batch.clocks[:, 0].copy(),
+        batch.states,
+        batch.endings,
+        batch.counts[:, :3].copy(),
+        batch.reports,
+        named,
+        batch.peaks,
+        at_events,
+    )
+
+
+def contact_places(
+    engine: CompiledEngine, states: ArrayLike, numbers: ArrayLike | None, rows: ArrayLike | None
+) -> Floats:
+    """Where the surfaces of all contacts are (k, P, 9)."""
+    vectors, given = _rows(engine, numbers), engine.state.table(states)
+    which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
+    places = np.zeros((len(given), len(engine.contacts), 9))
+    w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(engine.state.size)
+    engine.program.code.entry("contact_places")(
+        engine.program.ints,
+        vectors,
+        w,
+        vectors.shape[1],
+        which,
+        given,
+        derivative,
+        places,
+        len(given),
+    )
+    return places
+
+
+def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+    """Radii of the second surfaces (v, P)."""
+    s = engine.structure
+    records = s[s[layout.CONTACT_AT] : s[layout.CONTACT_AT] + len(engine.contacts)]
+    radii: Floats = _rows(engine, numbers)[:, s[records + layout.NUMBERS] + RADIUS]
+    return radii
+
+
+def _rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+    vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
+    return vectors.reshape(-1, vectors.shape[-1])
+
+
+def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:
+    kinds, levels = np.zeros((len(watches), 3), dtype=np.int64), np.zeros((len(watches), 7))
+    mechanism = engine.mechanism
+    for row, watch in enumerate(watches):
+        if bool(watch.coordinate) + bool(watch.body) + bool(watch.contact) != 1:
+            raise OsimliteError(f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them")
+        if watch.coordinate:
+            place = mechanism.coordinate_index(watch.coordinate)
+            if place not in engine.order:
+                raise OsimliteError(f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked")
+            kinds[row] = merson.COORDINATE, engine.order.index(place), watch.stops
+            levels[row, 6] = watch.level
+        elif watch.contact:
+            if watch.contact not in engine.contacts:
+                near = did_you_mean(watch.contact, engine.contacts)
+                raise OsimliteError(f"the model has no contact '{watch.contact}'{near}")
+            kinds[row] = merson.TOUCH, engine.contacts.index(watch.contact), watch.stops
+        else:
+            body, frame = mechanism.placement(watch.body)
+            link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]
+            station = (placed @ frame @ np.array((*watch.station, 1.0)))[:3]
+            kinds[row] = merson.HEIGHT, link, watch.stops
+            levels[row] = (*station, *watch.direction, watch.level)
+    return kinds, levels

@@ -1,0 +1,96 @@
+"""What can be chosen about a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from osimlite.errors import SettingError
+from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.text import or_known
+
+Progress = Callable[[float], object]
+"""Called with the simulated time (s) reached."""
+
+
+PER_RUN = "accuracy", "fixed_step", "report_interval", "initial", "initial_speeds", "progress"
+"""The options of a run; the others are chosen when a model is made ready."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What can be chosen about a simulation, by keyword arguments of :func:`osimlite.simulate` and `Simulation`.
+
+    Those in `PER_RUN` can be chosen for every run of a `Simulation`.
+
+    Attributes:
+        accuracy: of the integrator, with the meaning it has in OpenSim.
+        fixed_step: take the engine's own steps of this length (s) instead of controlling the error.
+        report_interval: time between the recorded moments, s; the last one is the end in any case.
+        initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
+            default. The path of a state (``/jointset/knee/flexion/speed``, ``/forceset/stop/dissipatedEnergy``) stands
+            for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of
+            states stands for its last row.
+        initial_speeds: generalized speeds that do not start at their default, likewise.
+        progress: called with the simulated time at every recorded moment.
+        route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
+            osimlite's own "recursion", or "auto" for the quickest that is possible.
+        skip_unsupported: leave out forces that cannot be computed; the summary lists them.
+        simbody_early_return: reproduce a defect of Simbody in contact forces of several surfaces: the first contact
+            that separates too fast to push takes the force of those after it.
+        opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
+            :func:`osimlite.multibody.build_mechanism`.
+        rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
+        external_loads: a file of ExternalLoads: measured forces over time that act too.
+        folder: where the model's file is; files that the model names (of contact meshes) are looked for there. The
+            folder that the program runs in if left out.
+        show: show the motion in Bullet's window, in real time, and return when it is closed; needs `fixed_step`.
+    """
+
+    accuracy: float = DEFAULT_ACCURACY
+    fixed_step: float | None = None
+    report_interval: float = 0.01
+    initial: Mapping[str, float | str] | str | Path | None = None
+    initial_speeds: Mapping[str, float | str] | None = None
+    progress: Progress | None = None
+    route: str = "auto"
+    skip_unsupported: bool = False
+    simbody_early_return: bool = False
+    opensim_derivatives: bool = False
+    rolling: bool = False
+    external_loads: str | Path | None = None
+    folder: str | Path | None = None
+    show: bool = False
+
+    @classmethod
+    def of(cls, choices: Mapping[str, Any]) -> Options:
+        """Of the keyword arguments that somebody gave.
+
+        Raises:
+            SettingError: there is no such option.
+        """
+        return cls().changed(choices)
+
+    def changed(self, choices: Mapping[str, Any]) -> Options:
+        """With other choices; errors as those of `of`."""
+        known = [item.name for item in fields(self)]
+        for name in choices:
+            if name not in known:
+                raise SettingError(f"there is no option '{name}' of a simulation{or_known(name, known)}")
+        return replace(self, **choices)
+
+    def for_run(self, choices: Mapping[str, Any]) -> Options:
+        """With other choices for one run.
+
+        Raises:
+            SettingError: there is no such option, or it is chosen when the model is made ready.
+        """
+        made = self.changed(choices)
+        for name in choices:
+            if name not in PER_RUN:
+                raise SettingError(
+                    f"'{name}' is chosen when a model is made ready: Simulation(model, engine, {name}=...)"
+                )
+        return made

@@ -1,0 +1,42 @@
+"""The options of a simulation: one list of them, for one call and for a model that is made ready."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, fields
+
+import pytest
+
+import osimlite
+from osimlite.errors import SettingError
+from osimlite.simulation import Options, Simulation
+from osimlite.simulation.options import PER_RUN
+from tests.simulation.damped import damped
+
+pytest.importorskip("numba", reason="needs numba (extra 'fast')")
+
+
+def test_what_does_not_exist_is_named():
+    for ask in (osimlite.simulate, Simulation):
+        with pytest.raises(SettingError, match=r"no option 'acuracy' .*did you mean 'accuracy'"):
+            ask(damped(), engine="compiled", acuracy=1e-3)
+    with Simulation(damped(), "compiled") as simulation:
+        with pytest.raises(SettingError, match="there is no option 'to_time'"):
+            simulation.run(0.1, to_time=3)
+        with pytest.raises(SettingError, match=r"'rolling' is chosen when a model is made ready: .*rolling="):
+            simulation.run(0.1, rolling=True)
+
+
+def test_what_was_chosen_first_holds_for_every_run():
+    with Simulation(damped(), "compiled", accuracy=1e-5, initial={"q1": 0.2}) as simulation:
+        one, two = simulation.run(0.05), simulation.run(0.05, accuracy=1e-7, initial=None)
+    assert one.summary["settings"]["accuracy"] == 1e-5 and one.values[0, 1] == 0.2
+    assert two.summary["settings"]["accuracy"] == 1e-7 and two.values[0, 1] == 0.3
+    assert simulation.options.accuracy == 1e-5
+
+
+def test_every_option_is_described():
+    names = [item.name for item in fields(Options)]
+    assert set(PER_RUN) < set(names)
+    assert all(f"        {name}: " in (Options.__doc__ or "") for name in names)
+    with pytest.raises(FrozenInstanceError):
+        Options().accuracy = 1.0
