@@ -56,7 +56,8 @@ def real(word: str) -> float:
     if special is not None:
         return special
     prefix = _PREFIX.match(word)
-    if prefix is None or math.isinf(float(prefix[0])):
+    # Of an exponent without digits OpenSim makes nothing.
+    if prefix is None or math.isinf(float(prefix[0])) or ("e" not in prefix[0].lower() and word[prefix.end()] in "eE"):
         raise Unclean("unreadable", word)
     raise Unclean("cut", word, float(prefix[0]))
 
@@ -158,11 +159,17 @@ def _exactly(size: int) -> Callable[[str], Any]:
         if len(words) % size:
             raise Unclean("too-many", raw.strip())
         cleanly = []
+        cut: str | None = None
         for word in words:
             try:
                 cleanly.append(real(word))
-            except Unclean:
-                raise Unclean("unreadable", word) from None
+            except Unclean as unclean:
+                if unclean.value is ABSENT:
+                    raise
+                cleanly.append(unclean.value)
+                cut = cut or word
+        if cut is not None:
+            raise Unclean("unreadable", cut, tuple(cleanly[:size]))
         if len(words) > size:
             raise Unclean("too-many", raw.strip(), tuple(cleanly[:size]))
         return tuple(cleanly)

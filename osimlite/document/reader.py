@@ -28,7 +28,7 @@ from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
 
 if TYPE_CHECKING:
-    from osimlite.document.upgrade import Change, Upgraded
+    from osimlite.document.upgrade import Change, Refusal, Upgraded
 
 OLDEST = 10500
 """The version of documents from before documents said their version."""
@@ -67,6 +67,16 @@ class Document:
     notes: list[Note] = field(default_factory=list)
     upgraded: Upgraded | None = None
     fault: NotWellFormedError | None = None
+
+    @property
+    def refusals(self) -> list[Refusal]:
+        """Over what OpenSim fails when it brings a document of an older version up to date."""
+        found = [] if self.upgraded is None else self.upgraded.refusals
+        if not found:
+            return []
+        tops = (self.model, *(self.model.layout.defaults if self.model.layout is not None else ()))
+        read = {item._index for top in tops for item in top.walk()}
+        return [refusal for refusal in found if refusal.owner in read]
 
     @property
     def changes(self) -> list[Change]:

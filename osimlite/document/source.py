@@ -178,12 +178,20 @@ class Source:
 
     def of_attribute(self, number: int, name: str) -> Position:
         """Where the value of an attribute is; the tag if the element has no such attribute."""
-        span = self.spans[number]
-        head = self.text[span.start : span.tag_end]
-        match = re.search(rf"\s{re.escape(name)}\s*=\s*([\"'])(.*?)\1", head, re.DOTALL)
+        match = self._attribute(number, name)
         if match is None:
             return self.of_tag(number)
-        return self.position(span.start + match.start(2), max(1, len(match[2])))
+        return self.position(self.spans[number].start + match.start(2), max(1, len(match[2])))
+
+    def attribute(self, number: int, name: str) -> str | None:
+        """The value of an attribute as it is written, None if the element has no such attribute."""
+        match = self._attribute(number, name)
+        return None if match is None else match[2]
+
+    def _attribute(self, number: int, name: str) -> re.Match[str] | None:
+        span = self.spans[number]
+        head = self.text[span.start : span.tag_end]
+        return re.search(rf"\s{re.escape(name)}\s*=\s*([\"'])(.*?)\1", head, re.DOTALL)
 
 
 _MARKS = {

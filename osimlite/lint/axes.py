@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
 
 if TYPE_CHECKING:
     from osimlite.lint.subject import Subject
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
+    from osimlite.schema.joints import Joint
 
 
 def axes_of(joint: CustomJoint) -> list[TransformAxis]:
@@ -22,6 +24,11 @@ def axes_of(joint: CustomJoint) -> list[TransformAxis]:
         transform.translation2,
         transform.translation3,
     ]
+
+
+def coordinates_of(joint: Joint) -> list[Coordinate]:
+    """The coordinates a joint declares. OpenSim leaves out what stands among them and is none."""
+    return [item for item in joint.coordinates if isinstance(item, Coordinate)]
 
 
 def names_on_axes(joint: CustomJoint) -> list[str]:
@@ -39,7 +46,7 @@ def axes_refused(joint: CustomJoint) -> bool:
     Measured on 1,200 random joints. A name that no component may have is refused as well, and one that a frame of the
     joint has: OpenSim calls the frame otherwise then and does not find it.
     """
-    declared = [coordinate.name for coordinate in joint.coordinates]
+    declared = [coordinate.name for coordinate in coordinates_of(joint)]
     names = names_on_axes(joint)
     if any(frame.name in names and frame.name not in declared for frame in joint.frames):
         # The coordinate that is made up takes the name of the frame.
@@ -65,7 +72,7 @@ def made_up_paths(subject: Subject) -> set[str]:
         f"{subject.path(joint)}/{name}"
         for joint in subject.named("CustomJoint")
         if not axes_refused(joint)
-        for name in set(names_on_axes(joint)) - {coordinate.name for coordinate in joint.coordinates}
+        for name in set(names_on_axes(joint)) - {coordinate.name for coordinate in coordinates_of(joint)}
     }
     subject.kept["made-up coordinates"] = found
     return found

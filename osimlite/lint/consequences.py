@@ -31,7 +31,9 @@ _REFUSED_OUTSIDE: Final = {
     "eccentric_slope_near_vmax max_eccentric_velocity_force_multiplier concentric_curviness eccentric_curviness",
     "Millard2012EquilibriumMuscle": "optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
     "deactivation_time_constant minimum_activation maximum_pennation_angle",
+    "MeyerFregly2016Muscle": "pennation_angle_at_optimal",
     "MultivariatePolynomialFunction": "dimension order",
+    "MuscleFixedWidthPennationModel": "optimal_fiber_length pennation_angle_at_optimal maximum_pennation_angle",
     "PathSpring": "resting_length stiffness dissipation",
     "TendonForceLengthCurve": "strain_at_one_norm_force stiffness_at_one_norm_force norm_force_at_toe_end curviness",
     "Thelen2003Muscle": "optimal_fiber_length pennation_angle_at_optimal FmaxTendonStrain FmaxMuscleStrain "
@@ -96,7 +98,24 @@ _DOUBTS: Final = {
     **{(name, "optimal_force"): "the actuator does nothing, whatever its control" for name in _PUSHING.split()},
 }
 
+_STEEPEST: Final = "0 to 1.5707963267948866"
+"""In radians: a little less than a quarter turn, as OpenSim asks."""
+
 STRICTER: Final = {
+    **{
+        (muscle, "pennation_angle_at_optimal"): _STEEPEST
+        for muscle in (
+            "DeGrooteFregly2016Muscle",
+            "MeyerFregly2016Muscle",
+            "Millard2012EquilibriumMuscle",
+            "MuscleFixedWidthPennationModel",
+            "Thelen2003Muscle",
+        )
+    },
+    **{
+        (muscle, "maximum_pennation_angle"): "0 to 1.5707963267948966"
+        for muscle in ("Millard2012EquilibriumMuscle", "MuscleFixedWidthPennationModel", "Thelen2003Muscle")
+    },
     **{
         ("BushingForce", f"{kind}_{what}"): ">= 0"
         for kind in ("rotational", "translational")

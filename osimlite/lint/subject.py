@@ -21,7 +21,7 @@ from osimlite.schema.specs import FieldSpec, lineage
 from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:
-    from osimlite.document.upgrade.draft import Change
+    from osimlite.document.upgrade.draft import Change, Refusal
 
 T = TypeVar("T", bound=Object)
 
@@ -39,6 +39,7 @@ class Subject:
         self.version: int | None = None
         self.upgraded = False
         self.changes: list[Change] = []
+        self.refusals: list[Refusal] = []
         self.kept: dict[str, object] = {}
         if isinstance(found, Model):
             self.model = found
@@ -51,6 +52,7 @@ class Subject:
             self.version = found.document.version if found.document else None
             self.changes = found.document.changes if found.document else []
             self.upgraded = bool(self.changes)
+            self.refusals = found.document.refusals if found.document else []
             if self.sure_until is not None:
                 self.notes = [note for note in self.notes if self._is_sure(note)]
 

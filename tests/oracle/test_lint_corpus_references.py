@@ -6,15 +6,12 @@ A few hundred cases by default; ``OSIMLITE_BREAKAGES=2000`` asks for that many.
 from __future__ import annotations
 
 import gzip
-import json
 import os
 import random
 import re
 import shutil
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,6 +22,7 @@ from osimlite.document.survey import survey
 from osimlite.lint import validate
 from osimlite.lint.subject import Subject
 from tests.conftest import CorpusModel
+from tests.oracle.structural_edits import CHANGES
 
 pytestmark = pytest.mark.oracle
 
@@ -139,53 +137,6 @@ def victim(model: CorpusModel, folder: Path) -> Victim | None:
     return Victim(model.id, folder, text, places, names, targets) if names else None
 
 
-CHANGES: tuple[Callable[[random.Random, str, list[str]], str], ...] = (
-    lambda draw, word, names: word[: (at := draw.randrange(len(word)))] + word[at + 1 :],
-    lambda draw, word, names: word[: (at := draw.randrange(len(word)))] + word[at] + word[at:],
-    lambda draw, word, names: word[: (at := draw.randrange(len(word)))] + word[at:].swapcase(),
-    lambda draw, word, names: word.lower(),
-    lambda draw, word, names: draw.choice(names),
-    lambda draw, word, names: draw.choice(names),
-    lambda draw, word, names: draw.choice(names).rpartition("/")[2],
-    lambda draw, word, names: word.rpartition("/")[2],
-    lambda draw, word, names: word.rpartition("/")[0],
-    lambda draw, word, names: word.lstrip("/"),
-    lambda draw, word, names: f"/{word}",
-    lambda draw, word, names: f"{word}/",
-    lambda draw, word, names: f"{word},",
-    lambda draw, word, names: word.replace("/", "//"),
-    lambda draw, word, names: f"./{word}",
-    lambda draw, word, names: f"../{word}",
-    lambda draw, word, names: f"../../{word.lstrip('/')}",
-    lambda draw, word, names: f"/bodyset/{word}",
-    lambda draw, word, names: f"/forceset/{word}",
-    lambda draw, word, names: f"/contactgeometryset/{word}",
-    lambda draw, word, names: f" {word} ",
-    lambda draw, word, names: f"{word[: len(word) // 2]} {word[len(word) // 2 :]}",
-    lambda draw, word, names: f"{word}*",
-    lambda draw, word, names: "/ground",
-    lambda draw, word, names: "all",
-    lambda draw, word, names: "UNASSIGNED",
-    lambda draw, word, names: "",
-    lambda draw, word, names: " \n\t ",
-    lambda draw, word, names: word.upper(),
-    lambda draw, word, names: f"{word}/.",
-    lambda draw, word, names: f"{word}/..",
-    lambda draw, word, names: f"{word}/../{word.rpartition('/')[2]}",
-    lambda draw, word, names: f"../../{word.rpartition('/')[2]}",
-    lambda draw, word, names: f"../../../..{word}",
-    lambda draw, word, names: f"{word} {word}",
-    lambda draw, word, names: f"{word} {draw.choice(names)}",
-    lambda draw, word, names: f"{word}, {draw.choice(names)}",
-    lambda draw, word, names: f"{word}\\",
-    lambda draw, word, names: f"<!-- was {word} -->",
-    lambda draw, word, names: f"<![CDATA[{word}]]>",
-    lambda draw, word, names: f"{word}\u00a0",
-    lambda draw, word, names: f"/jointset/{word.rpartition('/')[2]}",
-    lambda draw, word, names: f"/markerset/{word.rpartition('/')[2]}",
-)
-
-
 def broken(model: Victim, draw: random.Random) -> Breakage:
     """One reference of a model changed, or what one leads to; rare kinds as often as common ones."""
     if model.targets and draw.random() < 0.25:
@@ -236,26 +187,6 @@ def _without_target(model: Victim, draw: random.Random) -> Breakage:
     if new is None:
         return Breakage(f"{what} taken out", model.text[: target.start] + model.text[target.end :])
     return Breakage(f"{what} called '{new}'", model.text[: target.name_start] + new + model.text[name_end:])
-
-
-@pytest.fixture(scope="module")
-def opensim_says() -> Iterator[Callable[[Path], str | None]]:
-    """Asks OpenSim about a file: None if it takes it, else what it says."""
-    pytest.importorskip("opensim")
-    command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_verdicts.py"))]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdin is not None and process.stdout is not None
-
-        def ask(path: Path) -> str | None:
-            assert process.stdin is not None and process.stdout is not None
-            process.stdin.write(f"{path}\n")
-            process.stdin.flush()
-            answer = json.loads(process.stdout.readline())
-            assert answer is None or isinstance(answer, str)
-            return answer
-
-        yield ask
-        process.stdin.close()
 
 
 @pytest.mark.timeout(SECONDS + 300)

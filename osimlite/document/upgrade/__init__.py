@@ -13,11 +13,11 @@ from lxml import etree
 
 from osimlite.document.names import as_written
 from osimlite.document.upgrade import v40500_path_names, v40600_controllers  # noqa: F401
-from osimlite.document.upgrade.draft import REGISTERED, Change, Draft, Element, Refused, Step
+from osimlite.document.upgrade.draft import REGISTERED, Change, Draft, Element, Refusal, Refused, Step
 from osimlite.document.upgrade.v40600_class_names import class_names
 from osimlite.schema.model import CURRENT_VERSION
 
-__all__ = ["Change", "Refused", "Step", "Upgraded", "steps", "upgrade", "with_present_names"]
+__all__ = ["Change", "Refusal", "Refused", "Step", "Upgraded", "steps", "upgrade", "with_present_names"]
 
 _BEFORE_4 = (
     "v10601_engine",
@@ -70,6 +70,11 @@ class Upgraded:
         return self._draft.changes
 
     @property
+    def refusals(self) -> list[Refusal]:
+        """What OpenSim's own upgrade would fail over, if it reads the objects concerned."""
+        return self._draft.refusals
+
+    @property
     def numbers(self) -> list[int] | None:
         """For every element of the tree the number of the one it came from; None if all are where they were."""
         draft = self._draft
@@ -96,6 +101,10 @@ def upgrade(root: Element, version: int) -> Upgraded:
     draft = Draft(root, version)
     if root.tag == "Model":
         draft.wrap("OpenSimDocument")
+    if draft.moves:
+        from osimlite.document.upgrade.strict import check
+
+        check(draft)
     for step in steps(version):
         draft.step = step
         step.apply(draft)

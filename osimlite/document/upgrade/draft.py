@@ -47,6 +47,20 @@ class Change(NamedTuple):
     lost: str | None = None
 
 
+class Refusal(NamedTuple):
+    """Something over which OpenSim's own upgrade of a document fails, where osimlite's does not.
+
+    Attributes:
+        owner: the object that OpenSim is bringing up to date then; of one that it never reads nothing is asked.
+        number: the element concerned, in document order.
+        message: what is wrong, in one clause.
+    """
+
+    owner: int
+    number: int
+    message: str
+
+
 class Refused(Exception):
     """A document says something that no step can carry over.
 
@@ -105,6 +119,7 @@ class Draft:
         self.version = version
         self.touched: dict[Element, None] = {}
         self.step: Step | None = None
+        self.refusals: list[Refusal] = []
         self._changes: list[tuple[Step, Element, Element, str | None]] = []
         if self.moves:
             # Now or never: the steps to come move elements about.
@@ -220,6 +235,10 @@ class Draft:
         objects = element.getparent()
         owner = None if objects is None or objects.tag != "objects" else objects.getparent()
         return owner is not None and _FAMILY_OF_MEMBERS.get(owner.tag) == family
+
+    def refuse(self, owner: Element, element: Element, message: str) -> None:
+        """Record that OpenSim fails over an element when it brings its owner up to date."""
+        self.refusals.append(Refusal(self.numbers[owner], self.numbers[element], message))
 
     def changed(self, element: Element, *, at: Element | None = None, lost: str | None = None) -> None:
         """Record that the current step changed an element, at which place inside, and what was lost."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import cast
+
+from lxml import etree
+
 from osimlite.document.upgrade.draft import Draft, Element, body_path, members, plain, step
 
 _CONSTRAINTS = {
@@ -53,6 +57,7 @@ def point_coordinates(draft: Draft) -> None:
     OpenSim takes the first object of that name for the coordinate, whatever it is; here only coordinates count.
     """
     paths: dict[str, str] | None = None
+    taken: dict[str, str] = {}
     for point in draft.tagged("ConditionalPathPoint", "MovingPathPoint"):
         axes = ("",) if point.tag == "ConditionalPathPoint" else ("x_", "y_", "z_")
         found = [child for axis in axes if (child := point.find(f"{axis}coordinate")) is not None]
@@ -61,6 +66,15 @@ def point_coordinates(draft: Draft) -> None:
                 paths = _coordinate_paths(draft)
             name = plain(child)
             child.text = paths.get(name, name)
+            if name in paths and name not in taken:
+                taken[name] = _path_by_opensim(draft, name)
+            if name in paths and taken[name] != paths[name]:
+                draft.refuse(
+                    point,
+                    child,
+                    f"coordinate '{name}' is '{taken[name]}' for OpenSim, by the first element of that name, and not "
+                    f"'{paths[name]}'",
+                )
             draft.rename(child, f"socket_{child.tag}")
         if found:
             draft.changed(point)
@@ -73,6 +87,30 @@ def _to_body(draft: Draft, owner: Element, tag: str, socket: str) -> bool:
     child.text = body_path(plain(child))
     draft.rename(child, socket)
     return True
+
+
+def _path_by_opensim(draft: Draft, name: str) -> str:
+    """What OpenSim takes for the path of a coordinate: it looks for any element with that name, and two levels up.
+
+    It has put the joints behind the bodies then, and what held the axes of a joint before the element in front of it.
+    """
+
+    def order(element: Element) -> tuple[int, bool, float, int]:
+        number, top = float(draft.numbers[element]), element
+        while (above := top.getparent()) is not None and above is not draft.model:
+            if top.tag == "SpatialTransform":
+                before = [child for child in top.itersiblings(etree.Element, preceding=True) if child.tag != "reverse"]
+                if before and before[0].tag == "CoordinateSet":
+                    number = draft.numbers[before[0]] - 0.5
+            top = above
+        return draft.numbers[top], top.tag == "JointSet", number, draft.numbers[element]
+
+    found = cast("list[Element]", draft.root.xpath("//*[@name=$name]", name=name))
+    wrapper = min(found, key=order).getparent() if found else None
+    above = None if wrapper is None else wrapper.getparent()
+    if above is not None and above.tag == "CoordinateSet":
+        above = above.getparent()
+    return name if above is None else f"/jointset/{above.get('name') or above.tag.lower()}/{name}"
 
 
 def _coordinate_paths(draft: Draft) -> dict[str, str]:

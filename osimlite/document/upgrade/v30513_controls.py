@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.document.lexical import split
 from osimlite.document.upgrade.draft import Draft, plain, reals, step
 
 _USUAL = {"min_control": 0.0, "max_control": 1.0}
@@ -14,7 +15,8 @@ def control_bounds(draft: Draft) -> None:
         touched = False
         for tag, usual in _USUAL.items():
             bound = muscle.find(tag)
-            values = None if bound is None else reals(plain(bound), 1)
+            # OpenSim takes the first of several numbers.
+            values = None if bound is None else reals(" ".join(split(plain(bound))[:1]), 1)
             if bound is not None and values is not None and abs(values[0] - usual) < 1e-14:
                 draft.remove(bound)
                 touched = True

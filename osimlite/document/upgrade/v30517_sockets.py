@@ -21,7 +21,8 @@ def connectors(draft: Draft) -> None:
             continue
         if not all(re.fullmatch(r"\w+", connector.get("name", "")) for connector in elements(old)):
             continue
-        for connector in elements(old):
+        # OpenSim puts each before those it has made already: of two for one socket the last counts.
+        for connector in reversed(elements(old)):
             connectee = connector.find("connectee_name")
             text = "" if connectee is None else plain(connectee)
             draft.add(component, f"socket_{connector.get('name', '')}", text, source=connector)
@@ -63,7 +64,7 @@ def set_levels(draft: Draft) -> None:
         paths.update((name, f"/bodyset/{name}") for body in members(bodies) if (name := body.get("name")))
     for component in draft.every("Component"):
         for child in elements(component):
-            if not child.tag.startswith("socket_"):
+            if not child.tag.startswith("socket_") or component.find(child.tag) is not child:
                 continue
             text = plain(child)
             last = text.rpartition("/")[2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.document.lexical import split
 from osimlite.document.upgrade.draft import Draft, members, path_of, plain, step
 
 
@@ -28,7 +29,7 @@ def controller_actuators(draft: Draft) -> None:
     for controller in listed:
         names = controller.find("actuator_list")
         assert names is not None
-        words = plain(names).split()
+        words = split(plain(names))
         if any(word.lower() == "all" for word in words):
             paths = [path for path, _ in actuators]
         else:

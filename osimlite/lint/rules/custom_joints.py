@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.lint.axes import axes_of, axes_refused
+from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -85,7 +85,7 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
     ```
     """
     for joint in subject.named("CustomJoint"):
-        declared = [coordinate.name for coordinate in joint.coordinates]
+        declared = [coordinate.name for coordinate in coordinates_of(joint)]
         if axes_refused(joint):
             continue
         for axis in axes_of(joint):
@@ -218,6 +218,8 @@ def collinear_axes(subject: Subject, found: Found) -> None:
     for joint in subject.named("CustomJoint"):
         axes = axes_of(joint)
         for kind in (axes[:3], axes[3:]):
+            # Of an axis with NaN in it OpenSim's comparison says nothing.
+            kind = [axis for axis in kind if not any(map(math.isnan, axis.axis))]
             for place, axis in enumerate(kind):
                 twin = next((other for other in kind[:place] if _parallel(axis.axis, other.axis)), None)
                 # An axis without a length is parallel to every other one; the finding belongs to it.
@@ -278,11 +280,11 @@ def idle_coordinate(subject: Subject, found: Found) -> None:
     ```
     """
     for joint in subject.named("CustomJoint"):
-        known = all(isinstance(coordinate, Coordinate) for coordinate in joint.coordinates)
-        if not joint.coordinates or not known or axes_refused(joint):
+        coordinates = coordinates_of(joint)
+        if not coordinates or axes_refused(joint):
             continue
-        columns = {coordinate.name: _motion_by(joint, coordinate) for coordinate in joint.coordinates}
-        idle = [coordinate for coordinate in joint.coordinates if not any(columns[coordinate.name])]
+        columns = {coordinate.name: _motion_by(joint, coordinate) for coordinate in coordinates}
+        idle = [coordinate for coordinate in coordinates if not any(columns[coordinate.name])]
         for coordinate in idle:
             axes = [axis.name for axis in axes_of(joint) if coordinate.name in _names(axis)]
             state = f"does not change {listed(axes)} of it" if axes else "is on no axis of it"
@@ -316,7 +318,7 @@ def _names(axis: TransformAxis) -> list[str]:
 
 def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
     """How fast each axis moves with a coordinate in the default pose; where nobody can tell, some number but 0."""
-    values = {item.name: item.default_value for item in joint.coordinates}
+    values = {item.name: item.default_value for item in coordinates_of(joint)}
     found = []
     for number, axis in enumerate(axes_of(joint)):
         names = _names(axis)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple, cast
 
-from osimlite.lint.consequences import STRICTER, consequence
+from osimlite.lint.consequences import REFUSED, STRICTER, consequence
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import quantity, shown
@@ -181,6 +181,11 @@ def _outside(subject: Subject) -> list[_Outside]:
 
 
 def _find_outside(subject: Subject) -> Iterator[_Outside]:
+    # A path is laid around them at once, which needs a surface.
+    obstacles = {
+        id(subject.target_of(obstacle, "socket_contact_geometry"))
+        for obstacle in subject.named("Scholz2015GeometryPathObstacle")
+    }
     for cls, items in subject.by_class.items():
         for spec, inside in _domains(cls):
             assert isinstance(spec.kind, Value)
@@ -196,7 +201,10 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                     continue
                 if not wrong or (subject.noted(item, spec) and wrong == list(_numbers(spec.default))):
                     continue
-                fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=_is_rigid(item))
+                if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
+                    fate, fails = REFUSED, True
+                else:
+                    fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=_is_rigid(item))
                 domain = STRICTER.get((cls.__name__, spec.name), spec.kind.domain)
                 yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
 

@@ -51,8 +51,10 @@ def missing_mesh(subject: Subject, found: Found) -> None:
     remedy = f"name its folder with --geometry or in {GEOMETRY_VARIABLE}"
     folders = _Folders()
     for item, tag, name in items:
+        severity = ERROR if isinstance(item, ContactMesh) else None
         if not name:
-            found(f"{called(item)} names no file", item, tag=tag)
+            fate = "" if severity is None else ": OpenSim refuses the model"
+            found(f"{called(item)} names no file{fate}", item, tag=tag, severity=severity)
             continue
         if any(folders.has(place, name) for place in places):
             continue
@@ -62,7 +64,6 @@ def missing_mesh(subject: Subject, found: Found) -> None:
             message = f"'{name}' of {called(item)} is a folder, a device or a link to nothing, and no file"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
-        severity = ERROR if isinstance(item, ContactMesh) and twin is None else None
         found(message, item, tag=tag, suggestion=twin, severity=severity)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import comb
 from typing import Final, cast
 
 from osimlite.lint.axes import axes_of
@@ -12,9 +13,11 @@ from osimlite.lint.words import called, quantity, times
 from osimlite.schema.base import Object
 from osimlite.schema.functions import (
     Function,
+    FunctionSet,
     GCVSpline,
     LinearFunction,
     MultiplierFunction,
+    MultivariatePolynomialFunction,
     PiecewiseConstantFunction,
     PiecewiseLinearFunction,
     SimmSpline,
@@ -190,15 +193,16 @@ def too_few_points(subject: Subject, found: Found) -> None:
 
 @rule("OSIM604", "coefficient-count", severity=WARNING)
 def coefficient_count(subject: Subject, found: Found) -> None:
-    """A linear function has not one coefficient for each variable and one more.
+    """A linear function or a polynomial has too many or too few coefficients.
 
     ## What it does
-    Reports linear functions without coefficients (an error), and those on the axis of a joint or of a coordinate
+    Reports linear functions without coefficients (an error), polynomials of several variables with another number than
+    their dimension and order ask for (an error), and linear functions on the axis of a joint or of a coordinate
     coupler that have more or fewer than the coordinates there and a constant.
 
     ## Why is this bad
-    OpenSim crashes on an empty list. Otherwise it takes the first for the weights, the last for the constant, and drops
-    what is between: the joint moves by another law than was written.
+    OpenSim crashes on an empty list, and refuses a polynomial. Otherwise it takes the first for the weights, the last
+    for the constant, and drops what is between: the joint moves by another law than was written.
 
     ## Example
     ```xml
@@ -238,6 +242,17 @@ def coefficient_count(subject: Subject, found: Found) -> None:
                 tag="coefficients",
                 severity=ERROR,
             )
+    for polynomial in subject.each(MultivariatePolynomialFunction):
+        dimension, order, given = polynomial.dimension, polynomial.order, len(polynomial.coefficients)
+        wanted = comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
+        if given != wanted:
+            found(
+                f"{subject.called_with(polynomial)} has {times(given, 'coefficient')}; "
+                f"{times(dimension, 'variable')} to order {order} need {wanted}: OpenSim fails when it needs a value",
+                polynomial,
+                tag="coefficients",
+                severity=ERROR,
+            )
     for holder, names, function in _linear(subject):
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
@@ -250,6 +265,7 @@ def coefficient_count(subject: Subject, found: Found) -> None:
 
 
 _NEEDED: Final = {
+    "Bhargava2004SmoothedMuscleMetabolics_MuscleParameters": ("use_provided_muscle_mass",),
     "CoordinateCouplerConstraint": ("coupled_coordinates_function",),
     "FunctionBasedBushingForce": tuple(
         f"{letter}_{axis}_{kind}_{axis}_function" for letter, kind in (("m", "theta"), ("f", "delta")) for axis in "xyz"
@@ -266,7 +282,8 @@ def missing_function(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and
-    empty functions of MovingPathPoints and FunctionBasedBushingForces.
+    empty functions of MovingPathPoints and FunctionBasedBushingForces; and PrescribedForces with other than three
+    functions, or none, for the force, its point or the torque.
 
     ## Why is this bad
     OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in multipliers; one
@@ -304,6 +321,15 @@ def missing_function(subject: Subject, found: Found) -> None:
     </PinJoint>
     ```
     """
+    for force in subject.named("PrescribedForce"):
+        for name in ("forceFunctions", "pointFunctions", "torqueFunctions"):
+            functions = getattr(force, name)
+            if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
+                given = times(len(functions.objects), "function")
+                found(
+                    f"{name} of {called(force)} has {given}, not three or none: OpenSim refuses to load the file",
+                    functions,
+                )
     if subject.has_unknown:
         return
     for kind, properties in _NEEDED.items():

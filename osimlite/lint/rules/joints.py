@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.axes import axes_refused, names_on_axes
+from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
@@ -80,7 +80,7 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     ```
     """
     for custom in subject.named("CustomJoint"):
-        names, declared_names = names_on_axes(custom), [coordinate.name for coordinate in custom.coordinates]
+        names, declared_names = names_on_axes(custom), [coordinate.name for coordinate in coordinates_of(custom)]
         if axes_refused(custom) and all(name in declared_names for name in names):
             unused = [f"'{name}'" for name in declared_names if name not in names]
             found(
@@ -97,7 +97,7 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
         if joint.motion_types is None:
             continue
         wanted = len(joint.motion_types)
-        given = sum(isinstance(coordinate, Coordinate) for coordinate in joint.coordinates)
+        given = len(coordinates_of(joint))
         declared = "coordinates" in joint.model_fields_set and (given > 0 or _says_none(subject, joint))
         if not declared and wanted and subject.source is not None:
             found(

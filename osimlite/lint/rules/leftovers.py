@@ -220,6 +220,73 @@ def force_outside_set(subject: Subject, found: Found) -> None:
         )
 
 
+@rule("OSIM112", "not-upgradable", severity=ERROR)
+def not_upgradable(subject: Subject, found: Found) -> None:
+    """OpenSim cannot bring an old document up to date.
+
+    ## What it does
+    Reports what OpenSim needs while it changes a document of an older version into the current format, and finds
+    missing or unreadable: a body without `<Joint>`, a transform that is not six finite numbers, a display preference
+    that is no whole number, a connector without a name.
+
+    ## Why is this bad
+    OpenSim refuses to load the file. `osimlite upgrade` is more lenient, and writes the current format.
+
+    ## Example
+    ```document
+    <OpenSimDocument Version="30000">
+        <Model name="post">
+            <BodySet>
+                <objects>
+                    <Body name="ground"> <mass>0</mass> <Joint /> </Body>
+                    <Body name="post">
+                        <mass>1</mass> <mass_center>0 0 0</mass_center>
+                        <inertia_xx>0.1</inertia_xx> <inertia_yy>0.1</inertia_yy> <inertia_zz>0.1</inertia_zz>
+                        <Joint>
+                            <WeldJoint name="weld">
+                                <parent_body>ground</parent_body> <location_in_parent>0 one 0</location_in_parent>
+                            </WeldJoint>
+                        </Joint>
+                    </Body>
+                </objects>
+            </BodySet>
+        </Model>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```document
+    <OpenSimDocument Version="30000">
+        <Model name="post">
+            <BodySet>
+                <objects>
+                    <Body name="ground"> <mass>0</mass> <Joint /> </Body>
+                    <Body name="post">
+                        <mass>1</mass> <mass_center>0 0 0</mass_center>
+                        <inertia_xx>0.1</inertia_xx> <inertia_yy>0.1</inertia_yy> <inertia_zz>0.1</inertia_zz>
+                        <Joint>
+                            <WeldJoint name="weld">
+                                <parent_body>ground</parent_body> <location_in_parent>0 1 0</location_in_parent>
+                            </WeldJoint>
+                        </Joint>
+                    </Body>
+                </objects>
+            </BodySet>
+        </Model>
+    </OpenSimDocument>
+    ```
+    """
+    told = {note.number for note in subject.notes if note.kind == "child-in-value"}
+    for refusal in subject.refusals:
+        if refusal.number in told:
+            continue
+        found(
+            f"{refusal.message}: OpenSim, which has to bring a document of version {subject.version} up to date, "
+            "refuses to load it",
+            number=refusal.number,
+        )
+
+
 _KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag"))
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")

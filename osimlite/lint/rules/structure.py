@@ -107,7 +107,7 @@ def unknown_class(subject: Subject, found: Found) -> None:
     ```
     """
     for note, owner in _of_kind(subject, "unknown-class"):
-        fate = _fate(owner, note.spec)
+        fate = _fate(subject, note)
         accepted = _acceptable(note.spec)
         suggestion = nearest(note.word, accepted) or nearest(note.word, tags(), cutoff=80)
         message = f"OpenSim has no class '{note.word}' and {fate}"
@@ -149,7 +149,7 @@ def wrong_class(subject: Subject, found: Found) -> None:
         where = f"; it belongs in the {home}" if home else ""
         holder = f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
         found(
-            f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(owner, note.spec)}{where}",
+            f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(subject, note)}{where}",
             owner,
             number=note.number,
         )
@@ -378,12 +378,18 @@ def _homes(tag: str) -> list[str]:
     return sorted(homes)
 
 
-def _fate(owner: Object, spec: FieldSpec | None) -> str:
+def _fate(subject: Subject, note: Note) -> str:
     """What OpenSim does with an object it cannot take."""
-    refused = spec is not None and (
-        spec.tag == "objects" or (isinstance(spec.kind, Held) and spec.kind.form == "single")
-    )
-    return "refuses to load the file" if refused else "leaves the object out"
+    spec = note.spec
+    if spec is None or not isinstance(spec.kind, Held):
+        return "leaves the object out"
+    if spec.tag == "objects":
+        return "refuses to load the file"
+    if spec.kind.form != "single":
+        return "leaves the object out"
+    if subject.source is None or subject.source.attribute(note.number, "name") == spec.tag:
+        return "refuses to load the file"
+    return "leaves the object out, and fails where it needs one"
 
 
 def _acceptable(spec: FieldSpec | None) -> list[str]:

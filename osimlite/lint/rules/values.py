@@ -162,8 +162,9 @@ def empty_value(subject: Subject, found: Found) -> None:
 
 
 def _value_notes(subject: Subject, *kinds: str) -> Iterator[tuple[Note, Object, FieldSpec, Value]]:
-    # What is left of a value with elements inside means nothing.
+    # What is left of a value with elements inside means nothing, and what OpenSim refuses has no default.
     broken = {note.number for note in subject.notes if note.kind == "child-in-value"}
+    broken.update(refusal.number for refusal in subject.refusals)
     for note in subject.notes:
         spec = note.spec
         if note.kind not in kinds or note.number in broken or note.owner is None or spec is None:

@@ -1,0 +1,31 @@
+"""A live OpenSim to ask about files."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def opensim_says() -> Iterator[Callable[[Path], str | None]]:
+    """Asks OpenSim about a file: None if it takes it, else what it says."""
+    pytest.importorskip("opensim")
+    command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_verdicts.py"))]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None and process.stdout is not None
+
+        def ask(path: Path) -> str | None:
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(f"{path}\n")
+            process.stdin.flush()
+            answer = json.loads(process.stdout.readline())
+            assert answer is None or isinstance(answer, str)
+            return answer
+
+        yield ask
+        process.stdin.close()

@@ -1,0 +1,138 @@
+"""What OpenSim's own upgrade of an old document throws over has an error; what it takes is not said to be refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from osimlite.lint import validate
+from tests.oracle.test_lint_structural_edits import claims_refusal
+
+pytestmark = pytest.mark.oracle
+
+POINTS = "".join(
+    f'<{kind} name="p{n}"><location>0 {n} 0</location><body>ball</body>{more}</{kind}>'
+    for n, (kind, more) in enumerate(
+        [
+            ("PathPoint", ""),
+            ("ConditionalPathPoint", "<coordinate>turn</coordinate><range>-1 1</range>"),
+            ("PathPoint", ""),
+        ]
+    )
+)
+OLD = f"""<?xml version="1.0" encoding="UTF-8"?>
+<OpenSimDocument Version="30000"><Model name="old"><BodySet><objects>
+<Body name="ground"><mass>0</mass><Joint/></Body>
+<Body name="ball"><mass>1</mass><mass_center>0 0 0</mass_center>
+<inertia_xx>1</inertia_xx><inertia_yy>1</inertia_yy><inertia_zz>1</inertia_zz>
+<Joint><CustomJoint name="hinge"><parent_body>ground</parent_body>
+<location_in_parent>0 0 0</location_in_parent><orientation_in_parent>0 0 0</orientation_in_parent>
+<CoordinateSet><objects><Coordinate name="turn"><motion_type>rotational</motion_type></Coordinate></objects>
+</CoordinateSet><SpatialTransform><TransformAxis name="rotation1"><coordinates>turn</coordinates><axis>0 0 1</axis>
+<function><LinearFunction><coefficients>1 0</coefficients></LinearFunction></function></TransformAxis>
+<TransformAxis name="rotation2"><axis>0 1 0</axis><function><Constant><value>0</value></Constant></function>
+</TransformAxis>
+<TransformAxis name="rotation3"><axis>1 0 0</axis><function><Constant><value>0</value></Constant></function>
+</TransformAxis>
+</SpatialTransform></CustomJoint></Joint>
+<VisibleObject><scale_factors>1 1 1</scale_factors><transform>0 0 0 0 0 0</transform><GeometrySet><objects>
+<DisplayGeometry><geometry_file>a.vtp</geometry_file><transform>0 0 0 1 0 0</transform>
+<display_preference>4</display_preference>
+</DisplayGeometry></objects></GeometrySet></VisibleObject>
+<WrapObjectSet><objects><WrapSphere name="skin"><radius>0.1</radius><display_preference>3</display_preference>
+</WrapSphere></objects></WrapObjectSet></Body>
+</objects></BodySet><ForceSet><objects>
+<Thelen2003Muscle name="pull"><min_control>0</min_control><GeometryPath>
+<PathPointSet><objects>{POINTS}</objects></PathPointSet>
+<VisibleObject><display_preference>1</display_preference></VisibleObject></GeometryPath>
+<optimal_fiber_length>0.1</optimal_fiber_length><pennation_angle_at_optimal>0.2</pennation_angle_at_optimal>
+</Thelen2003Muscle>
+</objects></ForceSet></Model></OpenSimDocument>
+"""
+YEARS_BETWEEN = """<?xml version="1.0" encoding="UTF-8"?>
+<OpenSimDocument Version="30502"><Model name="m"><Ground name="ground"/><BodySet><objects>
+<Body name="ball"><mass>1</mass><mass_center>0 0 0</mass_center><inertia>1 1 1 0 0 0</inertia></Body>
+</objects></BodySet><JointSet><objects><WeldJoint name="weld"><connectors>
+<Connector_PhysicalFrame_ name="parent_frame"><connectee_name>ground</connectee_name></Connector_PhysicalFrame_>
+<Connector_PhysicalFrame_ name="child_frame"><connectee_name>ball</connectee_name></Connector_PhysicalFrame_>
+</connectors></WeldJoint></objects></JointSet></Model></OpenSimDocument>
+"""
+PARENT = (
+    '<Connector_PhysicalFrame_ name="parent_frame"><connectee_name>ground</connectee_name></Connector_PhysicalFrame_>'
+)
+
+VECTORS = (
+    *("1 1 1", "1, 1, 1", "1,1 1", "[1 1 1]", "~(1,1,1)", "1 1 1 1", "1 1", "NaN 1 1", "1 Inf 1", "1e400 1 1"),
+    *("1e-320 1 1", "1. .5 +1e0", "1.5x 1 1", "a 1 1", "", "1,,1 1", "{1 1 1}", "[1 1 1", "1 1e 1", "<!-- a -->1 1 1"),
+    *("1 <!-- a --> 1 1", "<x/>", "1 1 1<x/>"),
+)
+WHOLE = ("4", "0", "-7", "+3", " 2 ", "3.0", "1e1", "abc", "", "4 4", "NaN", "99999999999", "0x3")
+NUMBERS = ("abc", "", "NaN", "-inf", "1e400", "1e-400", "1,5", "1 2", "5kg", "5e", "nan nan", "<x/>")
+
+CASES: dict[str, tuple[str, str, str]] = {
+    **{f"scale {text}": (OLD, "<scale_factors>1 1 1<", f"<scale_factors>{text}<") for text in VECTORS},
+    **{f"place {text}": (OLD, "<location_in_parent>0 0 0<", f"<location_in_parent>{text}<") for text in VECTORS},
+    **{f"frame {text}": (OLD, "<transform>0 0 0 1 0 0<", f"<transform>{text} 1 0 0<") for text in VECTORS},
+    **{f"shown {text}": (OLD, ">4</display_preference", f">{text}</display_preference") for text in WHOLE},
+    **{f"skin {text}": (OLD, ">3</display_preference", f">{text}</display_preference") for text in WHOLE},
+    **{f"path {text}": (OLD, ">1</display_preference", f">{text}</display_preference") for text in WHOLE},
+    **{f"inertia {text}": (OLD, "<inertia_yy>1<", f"<inertia_yy>{text}<") for text in NUMBERS},
+    **{
+        f"control {text}": (OLD, "<min_control>0<", f"<min_control>{text}<")
+        for text in ("0 0", "0 1 2 3 4 5 6 7", "abc", "")
+    },
+    **{
+        f"pennation {text}": (OLD, "optimal>0.2<", f"optimal>{text}<")
+        for text in ("1e30", "1.6", "1.5707963267948961", "1.57", "0", "-0.1")
+    },
+    "joint missing": (OLD, "<Joint/>", ""),
+    "joint of a body missing": (OLD, "</Body>\n</objects>", "</Body><Body name='b'><mass>1</mass></Body></objects>"),
+    "joint renamed": (OLD, '<Body name="ball"><mass>1', '<Body name="ball"><joint/><mass>1'),
+    "no parent": (OLD, "<parent_body>ground</parent_body>", ""),
+    "no bodies": (OLD, "BodySet>", "Bodyset>"),
+    "no objects": (OLD, "<BodySet><objects>", "<BodySet><Objects/></BodySet><BodySet><objects>"),
+    "element in a motion type": (OLD, "rotational<", "rotational<a/><"),
+    "model takes the name": (OLD, '<Model name="old">', '<Model name="turn">'),
+    "function takes the name": (OLD, "<Constant>", '<Constant name="turn">'),
+    "body takes the name": (OLD, '<Body name="ground">', '<Body name="turn"><Joint/></Body><Body name="ground">'),
+    "axis takes the name": (OLD, '<TransformAxis name="rotation1">', '<TransformAxis name="turn">'),
+    "no class as function": (OLD, "<Constant><value>0</value></Constant>", "<orientation/>"),
+    "foreign class as function": (OLD, "<Constant><value>0</value></Constant>", "<Body name='c'/>"),
+    "constraint among coordinates": (
+        OLD,
+        "<CoordinateSet><objects>",
+        "<CoordinateSet><objects><WeldConstraint name='w'/>",
+    ),
+    "set for a coordinate": (OLD, '<Coordinate name="turn">', '<BodySet><Coordinate name="turn">'),
+    "connector renamed": (YEARS_BETWEEN, PARENT, PARENT.replace("Connector_PhysicalFrame_", "Connector_Frame_")),
+    "connector missing": (YEARS_BETWEEN, PARENT, ""),
+    "connector without a name": (YEARS_BETWEEN, PARENT, PARENT.replace(' name="parent_frame"', "")),
+    "connector without a connectee": (YEARS_BETWEEN, PARENT, PARENT.replace("connectee_name", "connectee")),
+    "connector twice": (YEARS_BETWEEN, PARENT, PARENT + PARENT),
+    "connector twice, first wrong": (YEARS_BETWEEN, PARENT, PARENT.replace(">ground<", ">nobody<") + PARENT),
+    "connector twice, last wrong": (YEARS_BETWEEN, PARENT, PARENT + PARENT.replace(">ground<", ">nobody<")),
+    "no connectors": (YEARS_BETWEEN, "connectors>", "Connectors>"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_verdict_on_an_old_document_is_that_of_opensim(case, opensim_says, tmp_path):
+    text, old, new = CASES[case]
+    assert old in text
+    text = text.replace(old, new)
+    if case == "set for a coordinate":
+        text = text.replace("</motion_type></Coordinate>", "</motion_type></Coordinate></BodySet>")
+    path = tmp_path / "old.osim"
+    path.write_text(text, encoding="utf-8")
+    said, report = opensim_says(path), validate(path)
+    if said is not None:
+        assert report.errors, said
+    else:
+        assert not [finding for finding in report.errors if claims_refusal(finding)]
+
+
+@pytest.mark.parametrize("text", [OLD, YEARS_BETWEEN])
+def test_the_documents_that_are_changed_are_taken(text, opensim_says, tmp_path):
+    path = tmp_path / "old.osim"
+    path.write_text(text, encoding="utf-8")
+    assert opensim_says(path) is None
+    assert not validate(path).errors
