@@ -43,6 +43,12 @@ ExternalLoads = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
 ]
+Lowpass = Annotated[
+    float | None,
+    typer.Option(
+        metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False
+    ),
+]
 Foot = Annotated[
     list[str] | None,
     typer.Option(

@@ -15,12 +15,12 @@ from osimlite.simulation.storage import StoTable, write_sto
 from osimlite.text import listed
 
 
-def opened(file: Path, motion: Path) -> RecordedMotion:
-    """The motion of the model."""
+def opened(file: Path, motion: Path, lowpass: float | None) -> RecordedMotion:
+    """The motion of the model, through a filter of `lowpass` Hz if that is given."""
     recorded = RecordedMotion.read(build_mechanism(read(file)), motion)
     if not len(recorded.times):
         raise OsimliteError("the motion has no rows", file=str(motion))
-    return recorded
+    return recorded if lowpass is None else recorded.lowpassed(lowpass)
 
 
 def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False) -> None:

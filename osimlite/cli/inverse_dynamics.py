@@ -15,18 +15,19 @@ def inverse_dynamics(
     motion: options.Motion,
     output: options.Folder = None,
     external_loads: options.ExternalLoads = None,
+    lowpass: options.Lowpass = None,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
 
     One generalized force (N or N·m) for each coordinate: what it takes beyond gravity to make the bodies move so. The
     coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. Forces of the model are not taken
-    into account.
+    into account. What a camera records takes a filter first: --lowpass 6.
 
-    Example: osimlite inverse-dynamics gait2392.osim walk.mot --external-loads grf.xml -o results
+    Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml -o results
     """
     from osimlite.cli._recorded import opened, written
 
-    recorded = opened(file, motion)
+    recorded = opened(file, motion, lowpass)
     loads: tuple[DeclaredForce, ...] = ()
     if external_loads is not None:
         from osimlite.simulation.elements.external_loads import read_external_loads

@@ -16,6 +16,7 @@ def kinematics(
     assemble: Annotated[
         bool, typer.Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
     ] = False,
+    lowpass: options.Lowpass = None,
     trc: Annotated[bool, typer.Option("--trc", help="Write the markers as markers.trc too.")] = False,
 ) -> None:
     """Follow a recorded motion: writes bodies.sto and markers.sto.
@@ -27,7 +28,7 @@ def kinematics(
     """
     from osimlite.cli._recorded import opened, written
 
-    recorded = opened(file, motion)
+    recorded = opened(file, motion, lowpass)
     if assemble:
         recorded = recorded.assembled()
     written(

@@ -9,7 +9,7 @@ smoothly.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,11 +64,23 @@ def smoothing_spline(x: ArrayLike, y: ArrayLike, half_order: int, error_variance
     return PiecewisePolynomial(np.append(points[0], points), np.concatenate([before, pieces]))
 
 
-def rates_of_samples(x: ArrayLike, y: ArrayLike, half_order: int = 3) -> tuple[Array, Array]:
-    """First and second derivatives, at n points (n,) that increase, of the natural splines through k columns (n, k)."""
-    places, scale = _unit_spacing(np.asarray(x, dtype=float))
+def derivatives_of_samples(
+    x: ArrayLike, y: ArrayLike, at: ArrayLike, orders: Sequence[int], half_order: int = 3
+) -> tuple[Array, ...]:
+    """Derivatives of some orders (k, m), at k places, of the natural splines through n points.
+
+    Args:
+        x: abscissae (n,), increasing.
+        y: ordinates, in m columns (n, m).
+        at: places (k,).
+        orders: of the derivatives; 0 is the value.
+        half_order: the splines are of degree 2 `half_order` - 1.
+    """
+    points = np.asarray(x, dtype=float)
+    places, scale = _unit_spacing(points)
     spline = _through(places, np.asarray(y, dtype=float), half_order)
-    return spline(places, 1) / scale, spline(places, 2) / scale**2
+    own = (np.asarray(at, dtype=float) - points[0]) / scale
+    return tuple(spline(own, order) / scale**order for order in orders)
 
 
 def _unit_spacing(points: Array) -> tuple[Array, float]:

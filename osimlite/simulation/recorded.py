@@ -6,7 +6,7 @@ The quantities, their names and their order are those of OpenSim's BodyKinematic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,8 +16,9 @@ import numpy as np
 from osimlite.errors import DocumentError, ModelError
 from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.smoothing_spline import rates_of_samples
+from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array, angles_xyz
+from osimlite.simulation.lowpass import lowpassed
 from osimlite.simulation.storage import StoTable, read_sto
 from osimlite.text import listed
 
@@ -38,6 +39,7 @@ class RecordedMotion:
         values: (t, n) in the order of the mechanism's coordinates, rad and m.
         missing: coordinates that the record does not have; they keep their default values.
         ignored: columns of the record that name no coordinate.
+        around: times (s,) and values (s, n) that are differentiated, where these go on beyond `times`.
     """
 
     mechanism: Mechanism
@@ -45,6 +47,7 @@ class RecordedMotion:
     values: Array
     missing: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
+    around: tuple[Array, Array] | None = None
 
     @classmethod
     def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
@@ -98,9 +101,29 @@ class RecordedMotion:
         Raises:
             ModelError: there are fewer than six times.
         """
+        self._require_times("accelerations need")
+        first, second = derivatives_of_samples(
+            *(self.around or (self.times, self.values)), self.times, (1, 2), _HALF_ORDER
+        )
+        return first, second
+
+    def lowpassed(self, cutoff: float) -> RecordedMotion:
+        """The motion through OpenSim's low-pass filter of `cutoff` Hz, at even times.
+
+        Raises:
+            SettingError: the frequency is not positive, or too high for the times.
+            ModelError: there are fewer than six times.
+        """
+        self._require_times("a filter needs")
+        times, values = lowpassed(self.times, self.values, cutoff)
+        # What the filter adds at the ends nobody has recorded.
+        slack = 1e-6 * (times[1] - times[0])
+        own = (times >= self.times[0] - slack) & (times <= self.times[-1] + slack)
+        return replace(self, times=times[own], values=values[own], around=(times, values))
+
+    def _require_times(self, what: str) -> None:
         if len(self.times) < 2 * _HALF_ORDER:
-            raise ModelError(f"the motion has {len(self.times)} times; accelerations need at least {2 * _HALF_ORDER}")
-        return rates_of_samples(self.times, self.values, _HALF_ORDER)
+            raise ModelError(f"the motion has {len(self.times)} times; {what} at least {2 * _HALF_ORDER}")
 
     def assembled(self) -> RecordedMotion:
         """The motion with every pose changed as little as the constraints demand.

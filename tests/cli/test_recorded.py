@@ -56,6 +56,31 @@ def test_results_without_a_folder_go_into_one_named_after_the_model(fixtures: Pa
     assert written == ["bodies.sto", "inverse_dynamics.sto", "markers.sto"]
 
 
+def test_a_filter_takes_the_noise_away(fixtures: Path, tmp_path: Path) -> None:
+    walker = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    rows = [[0.1 + 0.001 * (-1) ** k] for k in range(60)]
+    write_sto(tmp_path / "walk.mot", "walk", [k / 64 for k in range(60)], ("Pelvis_tx",), rows)
+    for folder, more in (("plain", ()), ("smooth", ("--lowpass", "6"))):
+        for command in ("kinematics", "inverse-dynamics"):
+            done = run(command, walker, "walk.mot", *more, "-o", folder, folder=tmp_path)
+            assert (done.code, done.err) == (0, "")
+    plain, smooth = (read_sto(tmp_path / folder / "bodies.sto")["Pelvis_X"] for folder in ("plain", "smooth"))
+    assert abs(smooth[11:-10] - smooth[10:-11]).max() < 0.01 * abs(plain[11:-10] - plain[10:-11]).max()
+    plain, smooth = (
+        read_sto(tmp_path / folder / "inverse_dynamics.sto")["Pelvis_tx_force"] for folder in ("plain", "smooth")
+    )
+    assert abs(smooth[10:-10]).max() < 0.01 * abs(plain[10:-10]).max()
+    for given, said in (
+        ("0", "a low-pass frequency is a positive number of Hz, not 0"),
+        ("nan", "a low-pass frequency is a positive number of Hz, not nan"),
+        ("1e-300", None),
+        ("32", "32 Hz is too high for samples every 0.015625 s; take less than 32 Hz"),
+        ("1e308", "is too high for samples every 0.015625 s"),
+    ):
+        done = run("inverse-dynamics", walker, "walk.mot", "--lowpass", given, "-o", "odd", folder=tmp_path)
+        assert (done.code, said is None) == (0, True) or (done.code == 2 and said in done.err), done.err
+
+
 LOADS = """<OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects><ExternalForce name="push">
 <applied_to_body>{body}</applied_to_body><force_identifier>f_</force_identifier></ExternalForce></objects>
 <datafile>push.sto</datafile></ExternalLoads></OpenSimDocument>

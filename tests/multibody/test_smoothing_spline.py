@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.multibody.smoothing_spline import rates_of_samples, smoothing_spline
+from osimlite.multibody.smoothing_spline import derivatives_of_samples, smoothing_spline
 
 X = (0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.5, 3.1, 3.3)
 Y = (0.1, 0.5, 0.4, 1.2, 1.0, 0.3, -0.4, -0.5, -0.2, 0.3)
@@ -117,7 +117,7 @@ def test_rates_taken_in_blocks_are_those_of_the_whole_spline(count):
     rng = np.random.default_rng(6)
     x = np.cumsum(rng.uniform(0.01, 0.02, count))
     y = np.cumsum(rng.normal(size=(count, 2)), axis=0)
-    first, second = rates_of_samples(x, y)
+    first, second = derivatives_of_samples(x, y, x, (1, 2))
     for column in range(2):
         whole = smoothing_spline(x, y[:, column], 3, 0.0)
         for row in {0, 1, count // 2, min(191, count - 1), min(192, count - 1), count - 1}:

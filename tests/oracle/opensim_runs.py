@@ -33,7 +33,9 @@ def simulated(path: Path, to: float, accuracy: float) -> StoTable:
     return read_sto(table)
 
 
-def inverse_dynamics(model: str, motion: str, loads: str | None = None, *, to: float = 1.0) -> StoTable:
+def inverse_dynamics(
+    model: str, motion: str, loads: str | None = None, *, to: float = 1.0, lowpass: float = -1.0
+) -> StoTable:
     """The forces that a motion takes, the forces of the model left aside; files are in the current folder."""
     import opensim
 
@@ -45,6 +47,7 @@ def inverse_dynamics(model: str, motion: str, loads: str | None = None, *, to: f
         tool.setExternalLoadsFileName(loads)
     tool.setStartTime(0.0)
     tool.setEndTime(to)
+    tool.setLowpassCutoffFrequency(lowpass)
     tool.setOutputGenForceFileName("forces.sto")
     tool.setResultsDir(".")
     excluded = opensim.ArrayStr()

@@ -19,22 +19,63 @@ opensim = pytest.importorskip("opensim", reason="needs the opensim package (extr
 pytestmark = pytest.mark.oracle
 
 
-@pytest.mark.parametrize("name", ["m0005", "m0013", "m0954"])
-def test_inverse_dynamics_of_real_models(corpus: Any, name: str, tmp_path: Path, monkeypatch: Any, capfd: Any) -> None:
+def recorded(corpus: Any, name: str, times: Any, noise: float = 0.0) -> Any:
+    """The mechanism of a real model, and a motion of it that is written with the model into the current folder."""
     converted = next(model.converted for model in corpus if model.id == name)
     text = gzip.decompress(converted.read_bytes()).decode()
-    monkeypatch.chdir(tmp_path)
     Path("model.osim").write_text(text)
     mechanism = build_mechanism(read_text(text), opensim_derivatives=True)
-    times = np.linspace(0.0, 1.0, 250)
     values = np.array([0.2 * np.sin(3.0 * times + place) for place in range(len(mechanism.coordinates))]).T
-    values += mechanism.values({})
+    values += mechanism.values({}) + noise * np.random.default_rng(3).normal(size=values.shape)
     turned = [info.motion_type == "rotational" for info in mechanism.coordinates]
     degrees = np.where(turned, np.degrees(values), values)
     write_sto("motion.mot", "motion", times, mechanism.coordinate_names, degrees.tolist(), in_degrees=True)
+    return mechanism
+
+
+@pytest.mark.parametrize("name", ["m0005", "m0013", "m0954"])
+def test_inverse_dynamics_of_real_models(corpus: Any, name: str, tmp_path: Path, monkeypatch: Any, capfd: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    mechanism = recorded(corpus, name, np.linspace(0.0, 1.0, 250))
     theirs = inverse_dynamics("model.osim", "motion.mot")
     capfd.readouterr()
     ours = RecordedMotion.read(mechanism, "motion.mot").inverse_dynamics()
     assert ours.columns == theirs.columns
     assert ours.times == pytest.approx(theirs.times, abs=1e-8)
     assert np.abs(ours.rows - theirs.rows).max() < 1e-8 * np.abs(theirs.rows).max()
+
+
+UNEVEN = np.sort(np.r_[np.linspace(0.0, 1.0, 41), 0.013, 0.4801, 0.777])
+DECIMAL = np.round(np.arange(151) / 150.0, 6)
+
+
+@pytest.mark.parametrize(
+    ("times", "cutoff"),
+    [
+        (np.arange(65) / 64.0, 6.0),
+        (np.arange(101) * 0.01, 6.0),
+        (DECIMAL, 15.0),
+        (UNEVEN, 6.0),
+        (np.arange(601) / 600.0, 2.5),
+        (np.array([0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0]), 2.0),
+    ],
+    ids=["even", "hundredths", "rounded", "uneven", "many", "few"],
+)
+@pytest.mark.parametrize("name", ["m0005", "m0013"])
+def test_inverse_dynamics_through_the_filter(
+    corpus: Any, name: str, times: Any, cutoff: float, tmp_path: Path, monkeypatch: Any, capfd: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    mechanism = recorded(corpus, name, times, noise=1e-3)
+    theirs = inverse_dynamics("model.osim", "motion.mot", to=2.0, lowpass=cutoff)
+    capfd.readouterr()
+    ours = RecordedMotion.read(mechanism, "motion.mot").lowpassed(cutoff).inverse_dynamics()
+    assert ours.columns == theirs.columns
+    # Theirs go on into what the filter adds.
+    same = np.abs(theirs.times[:, None] - ours.times).argmin(axis=0)
+    assert theirs.times[same] == pytest.approx(ours.times, abs=1e-8)
+    # OpenSim prints eight decimals.
+    allowed = 1e-8 * np.abs(theirs.rows).max(axis=0) + 0.51e-8
+    assert (np.abs(ours.rows - theirs.rows[same]).max(axis=0) / allowed).max() <= 1.0
+    step = ours.times[1] - ours.times[0]
+    assert abs(ours.times[0] - times[0]) < step and abs(ours.times[-1] - times[-1]) < step

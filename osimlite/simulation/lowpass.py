@@ -1,0 +1,78 @@
+"""OpenSim's low-pass filter of recorded motions: Butterworth's of third order, run forward and backward.
+
+A record is first continued at both ends by half its length, turned about its first and last point, and sampled evenly
+where it is not.
+"""
+
+from __future__ import annotations
+
+from math import isfinite, pi, tan
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.multibody.spatial import Array
+
+MOST_SAMPLES = 100_000
+"""A record is not sampled more finely than this many times."""
+
+
+def lowpassed(times: Array, values: Array, cutoff: float) -> tuple[Array, Array]:
+    """A filtered record, with the continuation at both ends.
+
+    Args:
+        times: (t,), s, increasing.
+        values: (t, n).
+        cutoff: frequency (Hz) of which half the power passes each time the filter is run.
+
+    Returns:
+        Times (s,), evenly spaced, and values (s, n).
+
+    Raises:
+        SettingError: the frequency is not positive, or too high for the times.
+    """
+    if not (isfinite(cutoff) and cutoff > 0.0):
+        raise SettingError(f"a low-pass frequency is a positive number of Hz, not {cutoff:g}")
+    count = len(times) // 2
+    times, values = _continued(times, count), _continued(values, count)
+    step = float(np.diff(times).min())
+    span = float(times[-1] - times[0])
+    if span / (len(times) - 1) - step > np.finfo(float).eps:
+        step = max(step, span / MOST_SAMPLES)
+        # Summed one by one, as OpenSim does it: it decides whether there is a last sample.
+        even = np.add.accumulate(np.r_[times[0], np.full(int(span / step) + 1, step)])
+        even = even[even <= times[-1]]
+        (values,) = derivatives_of_samples(times, values, even, (0,))
+        times = even
+    if cutoff * step >= 0.5:
+        raise SettingError(
+            f"a low-pass frequency of {cutoff:g} Hz is too high for samples every {step:g} s; "
+            f"take less than {0.5 / step:g} Hz"
+        )
+    return times, _filtered(_filtered(values, cutoff * step)[::-1], cutoff * step)[::-1]
+
+
+def _continued(values: Array, count: int) -> Array:
+    """Values with `count` more at both ends, turned about the first and the last."""
+    before, after = values[count:0:-1], values[-2 : -2 - count : -1]
+    return np.concatenate([2.0 * values[0] - before, values, 2.0 * values[-1] - after])
+
+
+def _filtered(values: Array, cutoff: float) -> Array:
+    """Values (t, n) after one run; `cutoff` in parts of the sampling frequency. The first three stay as they are."""
+    w = tan(pi * cutoff)
+    scale = (w + 1.0) * (w * w + w + 1.0)
+    gain = w**3 / scale
+    back = np.array(
+        (
+            (w - 1.0) * (w * w - w + 1.0) / scale,
+            (3.0 * w**3 - 2.0 * w**2 - 2.0 * w + 3.0) / scale,
+            (3.0 * w**3 + 2.0 * w**2 - 2.0 * w - 3.0) / scale,
+        )
+    )
+    result = values.copy()
+    result[3:] = gain * (values[3:] + 3.0 * values[2:-1] + 3.0 * values[1:-2] + values[:-3])
+    for place in range(3, len(values)):
+        result[place] -= back @ result[place - 3 : place]
+    return result
