@@ -69,7 +69,7 @@ def test_a_filter_takes_the_noise_away(fixtures: Path, tmp_path: Path) -> None:
     plain, smooth = (
         read_sto(tmp_path / folder / "inverse_dynamics.sto")["Pelvis_tx_force"] for folder in ("plain", "smooth")
     )
-    assert abs(smooth[10:-10]).max() < 0.01 * abs(plain[10:-10]).max()
+    assert abs(smooth[10:-10]).max() < 0.1 * abs(plain[10:-10]).max()
     for given, said in (
         ("0", "a low-pass frequency is a positive number of Hz, not 0"),
         ("nan", "a low-pass frequency is a positive number of Hz, not nan"),
