@@ -6,7 +6,6 @@ import os
 import shutil
 import stat
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -141,7 +140,9 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
     if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
         raise OsimliteError("cannot write the file: it is read-only; make it writable first", file=str(target))
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".osimlite-")
+        from tempfile import mkstemp
+
+        handle, name = mkstemp(dir=target.parent, prefix=".osimlite-")
     except OSError as error:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
     try:

@@ -58,13 +58,17 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
     @application.callback(invoke_without_command=True)
     def osimlite(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
         if version:
-            from osimlite import __version__
-            from osimlite.cli._console import say
-
-            say(f"osimlite {__version__}")
+            _tell_version()
             raise typer.Exit
 
     return application
+
+
+def _tell_version() -> None:
+    from osimlite import __version__
+    from osimlite.cli._console import say
+
+    say(f"osimlite {__version__}")
 
 
 def _flowing(text: str) -> str:
@@ -130,15 +134,18 @@ def _run(words: list[str]) -> None:
     from osimlite.cli._console import complain
     from osimlite.errors import DoubtfulWarning, OsimliteError
 
+    # What is imported makes many objects and drops none: the collector would look through them again and again.
+    gc.set_threshold(100_000)
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:
+        if words == ["--version"]:
+            _tell_version()
+            return
         asked = _plainly(words)
         if asked is not None:
-            # Importing makes many objects and drops none; several files are checked with the collector on.
-            gc.disable()
             from osimlite.cli._validating import run
 
             raise SystemExit(run(**asked))

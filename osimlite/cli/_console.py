@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from osimlite.text import harmless, visible
@@ -111,12 +110,12 @@ def add_row(table: Table, *cells: str) -> None:
     table.add_row(*map(visible, cells))
 
 
-@dataclass
 class Facts:
     """What came out: names, and what is said of each."""
 
-    title: str
-    rows: list[tuple[str, str]] = field(default_factory=list)
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.rows: list[tuple[str, str]] = []
 
     def add(self, name: str, words: str) -> None:
         """Say one thing more."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 from pathlib import Path
@@ -50,8 +49,6 @@ def run(
         checked_words(select), checked_words(ignore), mesh_paths=tuple(str(path.resolve()) for path in geometry)
     )
     files = list(_files(paths))
-    if len(files) > 1:
-        gc.enable()
     failed = False
     if diff:
         changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]

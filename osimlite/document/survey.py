@@ -9,7 +9,6 @@ from lxml import etree
 
 from osimlite.document.names import as_written
 from osimlite.document.reader import Document, document_of, parse, read_document, version_of
-from osimlite.document.repair import repaired
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, SpecialFileError, VersionError
 from osimlite.schema.model import CURRENT_VERSION
@@ -60,6 +59,8 @@ def _recovered(source: Source, fault: NotWellFormedError) -> Survey:
         found.sure_until = int(unclosed[1])
     try:
         # What the parser takes for a character in spite of all may be none that lxml can give back.
+        from osimlite.document.repair import repaired
+
         mended, _ = repaired(source.text)
         root = parse(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-import tempfile
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
@@ -58,7 +57,9 @@ class Cache:
                 "outside": [(path, self._stamp(path)) for path in outside],
                 "findings": [_values(finding) for finding in findings],
             }
-            handle, name = tempfile.mkstemp(dir=place.parent)
+            from tempfile import mkstemp
+
+            handle, name = mkstemp(dir=place.parent)
             with os.fdopen(handle, "w", encoding="utf-8") as stream:
                 json.dump(entry, stream, separators=(",", ":"))
             os.replace(name, place)

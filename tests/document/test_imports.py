@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -42,3 +43,26 @@ def test_importing_the_package_alone_imports_nothing_of_weight() -> None:
     code = "import sys, osimlite; print(*sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {"pydantic", "lxml", "numpy"}
+
+
+@pytest.mark.parametrize(
+    ("words", "absent"),
+    [
+        (("--version",), {"typer", "rich", "pydantic", "lxml", "dataclasses"}),
+        (("validate", "walker.osim"), {"typer", "rich", "pydantic", "lxml", "tempfile"}),
+        (("validate", "walker.osim", "--no-cache"), {"typer", "rich", "html", "osimlite.document.repair"}),
+    ],
+)
+def test_what_a_short_command_leaves_out(
+    words: tuple[str, ...], absent: set[str], fixtures: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "walker.osim").write_bytes((fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes())
+    code = "import sys, osimlite.cli as c\ntry: c.main(sys.argv[1:])\nfinally: print(*sys.modules, file=sys.stderr)"
+    for _ in range(2):
+        # The second time, the file is found unchanged.
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words], cwd=tmp_path, capture_output=True, text=True, check=False,
+            env={**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")},
+        )  # fmt: skip
+        assert done.returncode == 0 and done.stdout
+    assert not set(done.stderr.split()) & absent
