@@ -45,10 +45,16 @@ class Cluster:
         self.environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SECONDS_A_RUN": "0.03"}
         self.file = folder / "scheduler.json"
         self.start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
-        wait_for(self.file.exists, "the scheduler's file")
-        self.address = json.loads(self.file.read_text())["address"]
+        self.address = wait_for(self.told_address, "the scheduler's file")
         for _ in range(3):
             self.start(*WORKER)
+
+    def told_address(self):
+        """What the scheduler's file says, None while it is not there or not yet written."""
+        try:
+            return json.loads(self.file.read_text())["address"]
+        except (FileNotFoundError, ValueError):
+            return None
 
     def start(self, *words):
         log = (self.folder / f"{len(self.processes)}.log").open("w")
@@ -68,9 +74,10 @@ class Cluster:
 
 def wait_for(what, words, seconds=120):
     deadline = time.monotonic() + seconds
-    while not what():
+    while not (found := what()):
         assert time.monotonic() < deadline, f"waited for {words}"
         time.sleep(0.02)
+    return found
 
 
 @pytest.fixture(scope="module")

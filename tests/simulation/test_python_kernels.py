@@ -1,0 +1,84 @@
+"""Every kernel as Python, where a place outside a vector is an error: machine code would read or write there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.multibody import build_mechanism
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.engines import linking
+from osimlite.simulation.engines.compiled import CompiledEngine
+from tests.simulation.test_compiled_forces import FORCES, states, with_force
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+FILES = ("walker/DynamicWalkerModel.osim", "walkers/steady-walker.osim", "kinematics/mixed_joint_tree.osim")
+
+
+class Bounded(np.ndarray[Any, Any]):
+    """A vector that refuses the negative places that numpy counts from the end."""
+
+    def __getitem__(self, place: Any) -> Any:
+        return super().__getitem__(_inside(place))
+
+    def __setitem__(self, place: Any, value: Any) -> None:
+        super().__setitem__(_inside(place), value)
+
+
+def _inside(place: Any) -> Any:
+    ends = (place.start, place.stop) if isinstance(place, slice) else (place,)
+    if any(isinstance(end, int | np.integer) and end < 0 for end in ends):
+        raise IndexError(f"the place {place} is before the vector")
+    return place
+
+
+class Checked(linking._Python):
+    """Kernels as Python on such vectors."""
+
+    def entry(self, function: str) -> Any:
+        kernel = super().entry(function)
+        return lambda *parts: kernel(*map(bounded, parts))
+
+    def bound(self, function: str, *arrays: Any) -> Any:
+        return super().bound(function, *map(bounded, arrays))
+
+
+def bounded(part: Any) -> Any:
+    return part.view(Bounded) if isinstance(part, np.ndarray) else part
+
+
+def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int = 2) -> None:
+    mechanism = build_mechanism(model)
+    forces = force_elements(model, mechanism, skip_unsupported=True)
+    compiled = CompiledEngine(mechanism, forces)
+    monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+    plain = CompiledEngine(mechanism, forces)
+    assert plain.program.code is not compiled.program.code
+    for t, q, u in states(mechanism, count):
+        if compiled.constrained.names:
+            q = mechanism.assemble(q).tolist()
+        y = compiled.state.pack(q, u)
+        ours, theirs = plain.derivative(t, y), compiled.derivative(t, y)
+        assert np.allclose(ours, theirs, rtol=1e-12, atol=1e-12 * max(1.0, np.abs(theirs).max()))
+        assert np.allclose(plain.force_records(t, y), compiled.force_records(t, y), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_force(name, monkeypatch):
+    compare(with_force(FORCES[name]), monkeypatch)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_file(fixtures, name, monkeypatch):
+    compare(osimlite.read(fixtures / name), monkeypatch)
+
+
+def test_a_place_outside_is_an_error():
+    vector = bounded(np.zeros(3))
+    for place in (3, -1, slice(-1, None)):
+        with pytest.raises(IndexError):
+            vector[place] = vector[place] + 1.0
