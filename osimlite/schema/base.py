@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.complaints import explained, misspelt, unnamed
 from osimlite.schema.equality import same
-from osimlite.schema.fields import Many, ObjectList, Reference, Tag, epoch
+from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
 from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, reference_specs
 
@@ -170,6 +170,7 @@ class Object(BaseModel, metaclass=ObjectType):
             factory = defaults(type(self))[1].get(name)
             if factory is not None:
                 made = self.__dict__[name] = factory()
+                _adopt(made, self._model)
                 return made
             spec = field_specs(type(self)).get(name)
             if spec is not None:
@@ -183,7 +184,7 @@ class Object(BaseModel, metaclass=ObjectType):
             if spec is None:
                 raise MissingNameError(misspelt(type(self), name))
             name = spec.name
-        epoch.count += 1
+        note_change(self._model)
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
@@ -302,6 +303,19 @@ _set = object.__setattr__
 
 _COPYING = -1
 """Key in the memo of a deep copy that tells the outermost object has been entered; no object has this identity."""
+
+
+def _adopt(value: Any, owner: Any) -> None:
+    """Let an object or a list that was just made, and all in it, belong where its holder does."""
+    if isinstance(value, list):
+        if isinstance(value, ObjectList):
+            value.owner = owner
+        for item in value:
+            _adopt(item, owner)
+    elif isinstance(value, Object):
+        put_model(value, owner)
+        for _, name, _, _ in holding(type(value)):
+            _adopt(value.__dict__.get(name), owner)
 
 
 def _named_components(item: Object) -> Iterator[Component]:

@@ -167,25 +167,28 @@ class Legacy:
 LEGACY: Final = Legacy()
 
 
-class Epoch:
-    """Counts changes of any model, so that an index of a model knows when it is out of date."""
+def note_change(owner: Any) -> None:
+    """Tell the model that a changed object or list was last seen in that its index is out of date.
 
-    __slots__ = ("count",)
-
-    def __init__(self) -> None:
-        self.count = 0
-
-
-epoch = Epoch()
+    What was in no index yet changes none: it came, or comes, into a model by a change of what is there.
+    """
+    model = None if owner is None else owner.model
+    if model is not None:
+        model.outdate()
 
 
 class ObjectList(list[T]):
     """A list of objects that notes every change, so that paths and look-ups stay right.
 
-    Two objects with the same properties are equal but not the same: `index` and `remove` go by identity.
+    Two objects with the same properties are equal but not the same: `index` and `remove` go by identity. `owner` is
+    the model that the list was last seen in.
     """
 
-    __slots__ = ()
+    __slots__ = ("owner",)
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        # A copy is in no model.
+        return type(self), (list(self),)
 
     def index(self, value: T, *limits: Any) -> int:
         """Position of this very object; ValueError if it is not here."""
@@ -200,7 +203,7 @@ def _noting(name: str) -> Callable[..., Any]:
     plain = getattr(list, name)
 
     def method(self: Any, *args: Any, **kwargs: Any) -> Any:
-        epoch.count += 1
+        note_change(getattr(self, "owner", None))
         return plain(self, *args, **kwargs)
 
     method.__name__ = name

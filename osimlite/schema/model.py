@@ -7,11 +7,11 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, overload
 
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.schema.base import Component, ModelComponent, made, put_model
+from osimlite.schema.base import Component, ModelComponent, made
 from osimlite.schema.constraints import ConstraintSet
 from osimlite.schema.contact import ContactGeometrySet
 from osimlite.schema.controllers import ControllerSet
-from osimlite.schema.fields import Single, Text, Unnamed, Vec3, epoch, real, vec3
+from osimlite.schema.fields import Single, Text, Unnamed, Vec3, real, vec3
 from osimlite.schema.forces import ForceSet
 from osimlite.schema.frames import BodySet, Ground
 from osimlite.schema.geometry import ModelVisualPreferences
@@ -81,16 +81,20 @@ class Model(ModelComponent):
         return CURRENT_VERSION if version is None else version
 
     def tree(self) -> Tree:
-        """The index of all components by path, made anew whenever any model has changed."""
+        """The index of all components by path, made anew whenever the model has changed."""
         from osimlite.schema.tree import Tree
 
         known = getattr(self, "_tree", None)
-        if known is None or known.epoch != epoch.count:
+        if known is None or not known.is_current:
             known = Tree(self, known)
             object.__setattr__(self, "_tree", known)
-            for component in known.components:
-                put_model(component, self)
         return cast("Tree", known)
+
+    def outdate(self) -> None:
+        """Something of the model has changed: its index is to be made anew before it is used again."""
+        known = getattr(self, "_tree", None)
+        if known is not None:
+            known.outdate()
 
     @overload
     def components(self) -> Iterator[Component]: ...

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from weakref import WeakSet
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import Component, Object
-from osimlite.schema.fields import Held, Reference, epoch
+from osimlite.schema.base import Component, Object, put_model
+from osimlite.schema.fields import Held, ObjectList, Reference
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS as ILLEGAL_CHARACTERS
 from osimlite.schema.resolution import PATH_RULES, RULES, last_name
 from osimlite.schema.resolution import Failure as Failure
@@ -57,7 +58,10 @@ class Tree:
     """Index of one model: component by path, path by component, children, and the names each rule looks up."""
 
     def __init__(self, model: Model, previous: Tree | None = None) -> None:
-        self.epoch = epoch.count
+        self.is_current = True
+        self._others: WeakSet[Tree] = WeakSet()
+        if previous is not None:
+            self._others.update(other for other in previous._others if other.is_current)
         self.model = model
         self.components: list[Component] = []
         self.by_path: dict[str, Component] = {}
@@ -82,6 +86,20 @@ class Tree:
         self._below: dict[int, list[Component]] = {}
         self._place(model, "")
         self._known_parts = {}
+
+    def outdate(self) -> None:
+        """Something that is in the tree has changed."""
+        for tree in (self, *self._others):
+            tree.is_current = False
+
+    def _claim(self, owner: Any) -> Model:
+        """The model, as the one that an object or a list was last seen in; another may have it too."""
+        known = None if owner is None else owner.model
+        if known is not None and known is not self.model:
+            other = getattr(known, "_tree", None)
+            if other is not None and other.is_current:
+                self._others.add(other)
+        return self.model
 
     def path_of(self, component: Object) -> str | None:
         """The absolute path of a component, None if it is not in this tree."""
@@ -229,6 +247,7 @@ class Tree:
             self._place(child, f"{path}/{unique}")
 
     def _put(self, component: Component, path: str) -> None:
+        put_model(component, self._claim(component._model))
         self.components.append(component)
         self.by_path[path] = component
         self._paths[id(component)] = path
@@ -245,6 +264,8 @@ class Tree:
             shelf = self._shelves[cls] = items, _names_others(cls), holding(cls)
         items, names_others, holds = shelf
         items.append(holder)
+        if holder is not owner:
+            put_model(holder, self._claim(holder._model))
         if names_others:
             self._naming.append((holder, owner))
         state = holder.__dict__
@@ -255,6 +276,8 @@ class Tree:
                 if is_list or is_plain or name in state:
                     continue
                 value = getattr(holder, name)
+            if isinstance(value, ObjectList):
+                value.owner = self._claim(getattr(value, "owner", None))
             for item in value if isinstance(value, list) else (value,):
                 if item.is_component:
                     children.append((_name_in_tree(spec, item), item))
