@@ -186,6 +186,8 @@ class ObjectList(list[T]):
 
     __slots__ = ("owner",)
 
+    owner: Any
+
     def __reduce_ex__(self, protocol: Any) -> Any:
         # A copy is in no model.
         return type(self), (list(self),)
