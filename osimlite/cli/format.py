@@ -15,33 +15,27 @@ def format(
 ) -> None:
     """Write model files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
 
-    Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format is
-    left alone: upgrade it first.
+    Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format
+    stays one, and its numbers stay as they are: upgrade brings it up.
 
     Example: osimlite format models --check
     """
     from osimlite.cli._console import complain, print_diff, say
-    from osimlite.document.printer import to_text
-    from osimlite.document.reader import read_document
+    from osimlite.document.formatting import formatted
     from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
     from osimlite.files import model_files, write_atomically
-    from osimlite.schema.model import CURRENT_VERSION
 
     changed, same, worst = 0, 0, 0
     for path in model_files(paths):
         try:
-            document = read_document(Source.of_file(path))
-            if document.version != CURRENT_VERSION:
-                raise OsimliteError(
-                    f"document version {document.version}: run 'osimlite upgrade' first", file=str(path)
-                )
+            source = Source.of_file(path)
+            after = formatted(source)
         except OsimliteError as error:
             complain(error)
             worst = max(worst, error.exit_code)
             continue
-        before = document.source.text
-        after = to_text(document.model)
+        before = source.text
         if before == after:
             same += 1
             continue

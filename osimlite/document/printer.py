@@ -17,6 +17,8 @@ from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
 from osimlite.schema.specs import FieldSpec, field_specs
 
 Numbers = Literal["shortest", "opensim"]
+DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
+"""What every document begins with."""
 
 
 def to_text(model: Model, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
@@ -48,7 +50,7 @@ def _document(printer: _Printer) -> str:
     model = printer.model
     layout = model.layout or Layout()
     lines = printer.lines
-    lines.append('<?xml version="1.0" encoding="UTF-8" ?>')
+    lines.append(DECLARATION)
     printer.comment(layout.prolog, 0)
     lines.append(f'<OpenSimDocument Version="{CURRENT_VERSION}">')
     printer.object(model, model.name, 1)

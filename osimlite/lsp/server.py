@@ -12,7 +12,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import to_fs_path
 
 from osimlite import __version__
-from osimlite.document.printer import to_text
+from osimlite.document.formatting import formatted as formatted_text
 from osimlite.errors import OsimliteError
 from osimlite.lint.settings import settings_for
 from osimlite.lsp.analysis import Analysis
@@ -23,7 +23,6 @@ from osimlite.lsp.navigation import folds, outline, renaming
 from osimlite.lsp.protocol import NO_JSON, Protocol, keep_log_plain, strict_converter
 from osimlite.lsp.text import Text
 from osimlite.schema.base import Component
-from osimlite.schema.model import CURRENT_VERSION
 
 PAUSE = 0.02
 """A check begins when nothing has been typed for so long, s."""
@@ -232,10 +231,9 @@ def _add_writing(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def formatted(_: Server, params: types.DocumentFormattingParams) -> list[types.TextEdit]:
         analysis = server.of(params.text_document)
-        model = analysis.subject.model
-        if model is None or not analysis.is_certain or analysis.subject.version != CURRENT_VERSION:
+        if not analysis.is_certain:
             return []
         content = analysis.text.content
-        after = to_text(model)
+        after = formatted_text(analysis.source)
         whole = analysis.text.range(0, len(content))
         return [] if after == content else [types.TextEdit(whole, after)]

@@ -85,6 +85,17 @@ def test_format_is_stable_and_keeps_comments(fixtures: Path, tmp_path: Path) -> 
     assert osimlite.read_text(text) == osimlite.read(file)
 
 
+def test_a_file_of_an_older_format_stays_one(tmp_path: Path) -> None:
+    file = tmp_path / "old.osim"
+    file.write_text(
+        '<OpenSimDocument Version="20302"><Model name="m"><gravity> 0 -9.810 0\n</gravity></Model></OpenSimDocument>'
+    )
+    assert run("format", "--check", "old.osim", folder=tmp_path)[:2] == (1, "would reformat old.osim\n")
+    assert run("format", "old.osim", folder=tmp_path)[:2] == (0, "reformatted old.osim\n")
+    assert 'Version="20302"' in file.read_text() and "\t\t<gravity>0 -9.810 0</gravity>\n" in file.read_text()
+    assert run("format", "--check", "old.osim", folder=tmp_path)[:2] == (0, "")
+
+
 def test_diff(fixtures: Path, tmp_path: Path) -> None:
     old = str(fixtures / "walker" / "DynamicWalkerModel.osim")
     new = str(tmp_path / "new.osim")

@@ -191,3 +191,13 @@ async def test_outline_folds_and_layout(client, walker: File) -> None:
     await walker.type("\t\t\t<objects>", "<objects>")
     edits = await client.text_document_formatting_async(types.DocumentFormattingParams(walker.document, options))
     assert "\t\t\t<objects>" in walker.after(edits)
+
+
+@pytest.mark.asyncio
+async def test_layout_of_an_older_format(client, tmp_path: Path) -> None:
+    text = '<OpenSimDocument Version="20302"><Model name="m"><gravity> 0 -9.810 0\n</gravity></Model></OpenSimDocument>'
+    old = File(client, tmp_path / "old.osim", text)
+    await old.open()
+    options = types.FormattingOptions(tab_size=4, insert_spaces=False)
+    edits = await client.text_document_formatting_async(types.DocumentFormattingParams(old.document, options))
+    assert "\t\t<gravity>0 -9.810 0</gravity>\n" in old.after(edits) and 'Version="20302"' in old.after(edits)

@@ -1,0 +1,62 @@
+"""Real files of all versions in one layout: they say what they said before, to us and to OpenSim."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from osimlite.document.formatting import formatted
+from osimlite.document.printer import to_text
+from osimlite.document.reader import read_document
+from osimlite.document.source import Source
+from osimlite.errors import DocumentError
+from tests.conftest import CorpusModel
+
+
+def layout(corpus_model: CorpusModel) -> str:
+    """The text of a real file in our layout; the test is skipped if it holds no model."""
+    try:
+        return formatted(Source.of_file(corpus_model.path))
+    except DocumentError as fault:
+        assert "file is empty" in fault.message or "not a <Model>" in fault.message
+        pytest.skip("the file holds no model")
+
+
+def words(source: Source) -> tuple[int, str]:
+    """The version of a document and what it says, white space aside, which classes of plug-ins keep."""
+    document = read_document(source)
+    return document.version, re.sub(r"\s+", " ", re.sub(r"\s*([<>])\s*", r"\1", to_text(document.model)))
+
+
+def test_the_same_is_said_and_nothing_changes_twice(corpus_model: CorpusModel) -> None:
+    text = layout(corpus_model)
+    # What is included lies beside the file.
+    again = Source(text.encode(), str(corpus_model.path))
+    assert words(again) == words(Source.of_file(corpus_model.path))
+    assert formatted(again) == text
+
+
+@pytest.mark.oracle
+def test_opensim_reads_the_same(corpus_model: CorpusModel, tmp_path: Path) -> None:
+    opensim = pytest.importorskip("opensim")
+    opensim.Logger.setLevelString("Off")
+    text = layout(corpus_model)
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    place = tmp_path / corpus_model.path.name
+    for beside in corpus_model.path.parent.iterdir():
+        shutil.copyfile(beside, tmp_path / beside.name)
+    prints = []
+    for content in (corpus_model.path.read_bytes(), text.encode()):
+        place.write_bytes(content)
+        model = opensim.Model(str(place))
+        try:
+            model.printToXML(str(tmp_path / "printed"))
+            prints.append((tmp_path / "printed").read_bytes())
+        except RuntimeError as error:
+            # One model it loads and cannot print.
+            prints.append(str(error).encode())
+    assert prints[0] == prints[1]
