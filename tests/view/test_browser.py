@@ -233,3 +233,29 @@ def test_a_large_model_opens_quickly(file_of, open_page, tmp_path):
     assert page.run("v.data.tree.length") > 600
     # 3 s on two cores that have nothing else to do; a runner that shares its cores gets more.
     assert took < 12.0
+
+
+def test_wrap_surfaces_that_the_model_hides_are_shown_when_ticked(shared, open_page, tmp_path):
+    (path,) = (shared / "corpus" / "models").glob("*/RajagopalLaiUhlrich2023.osim")
+    page = open_page(shown(path).write_page(tmp_path / "page.html"))
+    drawn = "v.stage.layered.wrap.filter((mesh) => mesh.visible).length"
+    page.run("document.querySelector('#layers').open = true")
+    box = page.page.locator("#layers label", has_text="wrap surfaces").locator("input")
+    assert not box.is_checked() and page.run(drawn) == 0
+    box.check()
+    assert page.run(drawn) == page.run("v.stage.layered.wrap.length") > 40
+    box.uncheck()
+    assert page.run(drawn) == 0
+
+
+def test_words_at_the_edge_are_whole(file_of, open_page, tmp_path):
+    page = open_page(shown(file_of(WALKER)).write_page(tmp_path / "page.html"))
+    page.run("document.querySelector('#layers').open = true")
+    page.page.locator("#layers label", has_text="names of bodies").locator("input").check()
+    inside = """[...document.querySelectorAll(x)].filter((part) => part.offsetWidth).map((part) => {
+        const own = part.getBoundingClientRect(), around = document.querySelector("#overlay").getBoundingClientRect();
+        return own.left >= around.left && own.right <= around.right;
+    })"""
+    page.until(f"{inside.replace('x)', repr('#overlay span') + ')', 1)}.length > 3")
+    assert all(page.run(inside, "#overlay span"))
+    assert page.run(inside, "#layers div") == [True]

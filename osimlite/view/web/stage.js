@@ -31,6 +31,8 @@
         this.layers[name] = new T.Group();
         this.layers[name].name = name;
         this.layers[name].visible = name === "forces" || name === "ground" || data.shown.includes(name);
+        const items = data.items.filter((item) => item.layer === name);
+        if (name === "wrap" && items.length && !items.some((item) => item.visible)) this.layers[name].visible = false;
       }
       this.marks = {};
       for (const finding of data.findings) {
@@ -291,9 +293,11 @@
 
     showMarks(on) { this.hideMarks = !on; this.paint(); }
 
+    // Models that hide each of their wrap surfaces would have nothing to show: whoever asks for the layer gets all of it.
     show(layer, on) {
       this.layers[layer].visible = on;
-      for (const object of this.layered[layer] || []) object.visible = on && object.userData.visible;
+      const all = layer === "wrap";
+      for (const object of this.layered[layer] || []) object.visible = on && (all || object.userData.visible);
       this.wanted();
     }
 

@@ -216,8 +216,13 @@
 
     placeLabels() {
       const put = (span, on, place) => {
-        span.style.display = on && place ? "" : "none";
-        if (on && place) Object.assign(span.style, { left: `${place[0]}px`, top: `${place[1]}px` });
+        const inside = on && place && place[0] > 0 && place[0] < $("#overlay").clientWidth;
+        span.style.display = inside ? "" : "none";
+        if (!inside) return;
+        // Words at the edge stay whole; how long they are does not change.
+        const half = (span.halfWidth ||= span.offsetWidth / 2) + 2;
+        const left = Math.max(half, Math.min(place[0], $("#overlay").clientWidth - half));
+        Object.assign(span.style, { left: `${left}px`, top: `${place[1]}px` });
       };
       for (const [span, body, at] of this.named) put(span, this.data.labelled, this.stage.onPage(body, at));
       for (const [span, body, at] of this.pins) put(span, !this.unpinned, this.stage.onPage(body, at));
