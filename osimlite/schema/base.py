@@ -76,6 +76,8 @@ class Object(BaseModel, metaclass=ObjectType):
     abstract: ClassVar[bool] = True
     is_component: ClassVar[bool] = False
     """Whether objects of the class have a place, and so a path, in the component tree."""
+    since: ClassVar[str] = ""
+    """The version of OpenSim that has the class first, where 4.6 has it not."""
     name_reference: ClassVar[Reference | None] = None
     """The rule by which the object's own name names a component, for the few classes where it does."""
 

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 Scalar = Literal["double", "int", "bool", "string"]
-Shape = Literal["single", "optional", "list", "vector", "Vec3", "Vec6", "Transform"]
+Shape = Literal["single", "optional", "list", "vector", "Vec2", "Vec3", "Vec6", "Transform"]
 Form = Literal["single", "unnamed", "optional", "list"]
 
 UNBOUNDED: Final = None
-_FIXED_SIZE: Final = {"Vec3": 3, "Vec6": 6, "Transform": 6}
+_FIXED_SIZE: Final = {"Vec2": 2, "Vec3": 3, "Vec6": 6, "Transform": 6}
 
 
 class Kind:
@@ -280,6 +280,7 @@ def word(*choices: str) -> Value:
     return Value("string", choices=choices)
 
 
+Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec6 = tuple[float, float, float, float, float, float]
 Reals = tuple[float, ...]

@@ -35,6 +35,7 @@ _AREAS = {
         "SynergyController SynergyVector TrackingController"
     ),
     "controllers": "Controller ControllerSet",
+    "coordinate_stops": "CoordinateLinearStopForce ExponentialCoordinateLimitForce",
     "coordinates": "Coordinate",
     "custom_joint": "CustomJoint SpatialTransform TransformAxis",
     "examples": "HopperDevice ToyPropMyoController ToyReflexController",

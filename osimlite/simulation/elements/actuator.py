@@ -21,5 +21,5 @@ def actuator(component: type, geometry: Geometry, output: str) -> Kind:
         outputs=(output,),
         parameters=("optimal_force",),
         controlled=True,
-        columns={"": output},
+        labels={"{name}": output},
     )

@@ -134,11 +134,12 @@ class ElementBuilder:
         return element
 
     # ---------------------------------------------------------------------------------- what kinds ask for
-    def coordinate(self, force: Any) -> int:
+    def coordinate(self, force: Any, field: str = "coordinate") -> int:
         """Place of the coordinate that a force names."""
-        if not force.coordinate:
+        named = getattr(force, field)
+        if not named:
             raise ModelError(f"the force '{self.path(force)}' names no coordinate; give it one")
-        return self.mechanism.coordinate_index(self.path(self.target(force, "coordinate", force.coordinate)))
+        return self.mechanism.coordinate_index(self.path(self.target(force, field, named)))
 
     def target(self, holder: Any, field: str, value: Any) -> Any:
         """The component that a property refers to.

@@ -69,7 +69,8 @@ class Kind:
         inputs: which of the geometry's inputs the law is given; all if None.
         controlled: whether the law is given the control.
         states: of each force.
-        columns: ends of the labels of the record, each with its output; the geometry's own if None.
+        labels: of the record, in which {name} stands for that of the force, each with its output; the geometry's own if
+            None.
         stored: energy (J) of a force from its record, where it is no output of the law.
         check: raises a ModelError if the parameters have no meaning together.
     """
@@ -82,7 +83,7 @@ class Kind:
     inputs: tuple[str, ...] | None = None
     controlled: bool = False
     states: tuple[State, ...] = ()
-    columns: Mapping[str, str] | None = None
+    labels: Mapping[str, str] | None = None
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
     check: Callable[[ElementBuilder, Any], None] | None = None
     terms: tuple[Parameter, ...] = field(init=False)
@@ -232,14 +233,16 @@ class DeclaredForce:
     def columns(self) -> tuple[str, ...]:
         """Labels of the record, as OpenSim's ForceReporter has them."""
         kind = self.kind
-        return kind.geometry.columns(self) if kind.columns is None else tuple(self.name + end for end in kind.columns)
+        if kind.labels is None:
+            return kind.geometry.columns(self)
+        return tuple(label.format(name=self.name) for label in kind.labels)
 
     def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
         """One row of the columns; see :class:`osimlite.simulation.elements.items.ForceElement`."""
         kind = self.kind
-        if kind.columns is None:
+        if kind.labels is None:
             return kind.geometry.report(self, records[0][len(kind.recorded) :] if records else (), origins)
-        return [float(records[0][kind.recorded[output]]) for output in kind.columns.values()]
+        return [float(records[0][kind.recorded[output]]) for output in kind.labels.values()]
 
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """Potential energy, J."""

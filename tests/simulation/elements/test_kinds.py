@@ -29,7 +29,7 @@ def test_the_kernel_follows_from_the_declaration(kind):
     for state in kind.states:
         assert state.rate in kind.outputs
         assert f"= {state.rate}\n" in source
-    for output in (kind.columns or {}).values():
+    for output in (kind.labels or {}).values():
         assert output in kind.recorded
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from osimlite.simulation.elements.gather import ElementBuilder
@@ -19,8 +20,15 @@ def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
     return y[g[0]], y[s[FREEDOMS] + g[0]]
 
 
+@dataclass(frozen=True)
 class OnCoordinate(Geometry):
-    """A coordinate: value q (rad, m) and speed u; the output `force` is conjugate to the speed."""
+    """A coordinate: value q (rad, m) and speed u; the output `force` is conjugate to the speed.
+
+    Attributes:
+        field: that names the coordinate.
+    """
+
+    field: str = "coordinate"
 
     inputs = ("q", "u")
     before = ("q, u = coordinate(s, y, g, gp)",)
@@ -29,7 +37,7 @@ class OnCoordinate(Geometry):
 
     def read(self, builder: ElementBuilder, force: Any) -> int:
         """Place of the coordinate in the mechanism."""
-        return builder.coordinate(force)
+        return builder.coordinate(force, self.field)
 
     def pack(self, place: int, places: Places) -> tuple[Sequence[int], Sequence[float]]:
         """Its degree of freedom (-1 if it is locked), and its value then."""

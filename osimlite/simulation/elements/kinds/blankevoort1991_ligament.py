@@ -23,13 +23,13 @@ KIND = Kind(
     ligament,
     outputs=("tension", "elastic", "damping", "length", "rate", "strain", "strain_rate", "energy"),
     parameters=(positive("slack_length"), "linear_stiffness", "transition_strain", "damping_coefficient"),
-    columns={
-        ".force_spring": "elastic",
-        ".force_damping": "damping",
-        ".force_total": "tension",
-        ".length": "length",
-        ".lengthening_speed": "rate",
-        ".strain": "strain",
-        ".strain_rate": "strain_rate",
+    labels={
+        "{name}.force_spring": "elastic",
+        "{name}.force_damping": "damping",
+        "{name}.force_total": "tension",
+        "{name}.length": "length",
+        "{name}.lengthening_speed": "rate",
+        "{name}.strain": "strain",
+        "{name}.strain_rate": "strain_rate",
     },
 )

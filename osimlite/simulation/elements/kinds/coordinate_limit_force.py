@@ -38,5 +38,5 @@ KIND = Kind(
     outputs=("force", "dissipatedEnergy_rate", "energy"),
     parameters=(Numbers(6, _constants),),
     states=(State("dissipatedEnergy", exists=lambda force: force.compute_dissipation_energy, given=False),),
-    columns={"": "force", ".PotentialEnergy": "energy"},
+    labels={"{name}": "force", "{name}.PotentialEnergy": "energy"},
 )

@@ -12,5 +12,5 @@ KIND = Kind(
     of_two,
     outputs=("force",),
     parameters=(Expression("expression", ("q", "qdot")),),
-    columns={"": "force"},
+    labels={"{name}": "force"},
 )

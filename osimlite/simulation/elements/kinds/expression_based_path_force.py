@@ -22,5 +22,5 @@ KIND = Kind(
     tension,
     outputs=("tension",),
     parameters=("resting_length", "clamp_stretch", Expression("expression", ("s", "ldot"))),
-    columns={"_tension": "tension"},
+    labels={"{name}_tension": "tension"},
 )

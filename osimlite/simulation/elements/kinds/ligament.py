@@ -33,6 +33,6 @@ KIND = Kind(
     inputs=("length",),
     outputs=("tension", "ratio"),
     parameters=(positive("resting_length"), "pcsa_force", Curve("force_length_curve")),
-    columns={"": "tension"},
+    labels={"{name}": "tension"},
     stored=_energy,
 )

@@ -18,5 +18,5 @@ KIND = Kind(
         "cord_length",
     ),
     controlled=True,
-    columns={"": "tension"},
+    labels={"{name}": "tension"},
 )

@@ -17,5 +17,5 @@ KIND = Kind(
     spring,
     outputs=("tension", "energy"),
     parameters=("resting_length", "stiffness", "dissipation"),
-    columns={"_tension": "tension"},
+    labels={"{name}_tension": "tension"},
 )

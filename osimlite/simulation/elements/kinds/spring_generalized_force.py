@@ -17,5 +17,5 @@ KIND = Kind(
     spring,
     outputs=("force", "energy"),
     parameters=("stiffness", "rest_length", "viscosity"),
-    columns={"_Force": "force"},
+    labels={"{name}_Force": "force"},
 )
