@@ -297,7 +297,7 @@ def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:
     return [(note, note.owner) for note in subject.notes if note.kind == kind and note.owner is not None]
 
 
-@rule("OSIM112", "newer-class", severity=ERROR)
+@rule("OSIM113", "newer-class", severity=ERROR)
 def newer_class(subject: Subject, found: Found) -> None:
     """An object is of a class that OpenSim has only after 4.6.
 
@@ -307,7 +307,7 @@ def newer_class(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     In a set (bodies, joints, forces ...) OpenSim 4.6 refuses to load the file; elsewhere it leaves the object out.
-    Where all who read the file have the later version, leave the rule out: `ignore = ["OSIM112"]`.
+    Where all who read the file have the later version, leave the rule out: `ignore = ["OSIM113"]`.
 
     ## Example
     ```xml
