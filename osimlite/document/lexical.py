@@ -212,7 +212,7 @@ def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable
 
 
 def _legacy_list(read: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Lists of the first property system: commas count as white space, one pair of brackets may surround."""
+    """Lists of the first property system: blanks or commas between all words, one pair of brackets may surround."""
     plain = _words(read, 0, None)
 
     def convert(raw: str) -> Any:
@@ -221,6 +221,8 @@ def _legacy_list(read: Callable[[str], Any]) -> Callable[[str], Any]:
         stripped = raw.strip()
         if stripped[:1] + stripped[-1:] in ("()", "[]", "{}"):
             stripped = stripped[1:-1]
+        if "," in stripped and any(len(split(word)) != 1 for word in stripped.split(",")):
+            raise Unclean("unreadable", raw.strip())
         return plain(stripped.replace(",", " "))
 
     return convert

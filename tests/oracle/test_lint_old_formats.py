@@ -68,7 +68,26 @@ VECTORS = (
 WHOLE = ("4", "0", "-7", "+3", " 2 ", "3.0", "1e1", "abc", "", "4 4", "NaN", "99999999999", "0x3")
 NUMBERS = ("abc", "", "NaN", "-inf", "1e400", "1e-400", "1,5", "1 2", "5kg", "5e", "nan nan", "<x/>")
 
+DEFAULTS = (
+    *(f"<ControlLinear><default_max>{text}</default_max></ControlLinear>" for text in NUMBERS),
+    *(f"<CMC_Joint><weight>{text}</weight></CMC_Joint>" for text in (*NUMBERS, "1,5 2", "(1 2)", "1 2 a")),
+    *(f"<CMC_Joint><active>{text}</active></CMC_Joint>" for text in ("", "abc", "<x/>", "a<!-- b --> c")),
+    "<ControlLinear><x_nodes><ControlLinearNode/></x_nodes></ControlLinear>",
+    "<ControlLinear><x_nodes><Body/></x_nodes></ControlLinear>",
+)
+
+LISTS = ("0 1 2", "0,1,2", "0, 1 , 2", "(0 1 2)", "0,1 2", "0 1,2", "(0,1 2)", "0 1 2,", "0,,1,2", "0 1 5kg", "[0 1 2")
+
 CASES: dict[str, tuple[str, str, str]] = {
+    **{text: (OLD, '<Model name="old">', f'<Model name="old"><defaults>{text}</defaults>') for text in DEFAULTS},
+    **{
+        f"list {text}": (
+            OLD,
+            "LinearFunction><coefficients>1 0<",
+            f"SimmSpline><y>0 1 2</y><x>{text}</x><coefficients><",
+        )
+        for text in LISTS
+    },
     **{f"scale {text}": (OLD, "<scale_factors>1 1 1<", f"<scale_factors>{text}<") for text in VECTORS},
     **{f"place {text}": (OLD, "<location_in_parent>0 0 0<", f"<location_in_parent>{text}<") for text in VECTORS},
     **{f"frame {text}": (OLD, "<transform>0 0 0 1 0 0<", f"<transform>{text} 1 0 0<") for text in VECTORS},
@@ -119,6 +138,8 @@ def test_the_verdict_on_an_old_document_is_that_of_opensim(case, opensim_says, t
     text, old, new = CASES[case]
     assert old in text
     text = text.replace(old, new)
+    if case.startswith("list "):
+        text = text.replace("</LinearFunction>", "</SimmSpline>")
     if case == "set for a coordinate":
         text = text.replace("</motion_type></Coordinate>", "</motion_type></Coordinate></BodySet>")
     path = tmp_path / "old.osim"

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import isfinite
 
+from osimlite.document.lexical import ABSENT, Unclean, converter
 from osimlite.document.names import ATTRIBUTE
 from osimlite.document.notes import Note
+from osimlite.document.source import Source
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Object
+from osimlite.schema.fields import Value
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import field_specs
 from osimlite.text import nearest
@@ -132,7 +136,8 @@ def defaults_block(subject: Subject, found: Found) -> None:
     """The file has a `<defaults>` block.
 
     ## What it does
-    Reports `<defaults>`: a warning if there is something in it, else for information.
+    Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim cannot read in the
+    objects that belong to tools, a ControlLinear or a CMC_Joint, is an error: it refuses to load the file.
 
     ## Why is this bad
     Each object inside replaces the defaults of its class in the whole running program, for this file and for all that
@@ -154,6 +159,17 @@ def defaults_block(subject: Subject, found: Found) -> None:
     number = subject.element_of(model, "defaults")
     if number is not None and source.children(number):
         found("<defaults> changes the defaults of every model loaded from now on", model, number=number)
+        for item in source.children(number):
+            tag = source.spans[item].tag
+            for name, kind in _OF_TOOLS.get(tag, {}).items():
+                value = source.child(item, name)
+                if value is not None and (wanted := _unread(source, value, kind)):
+                    found(
+                        f"<{name}> of the {tag} in <defaults> is not {wanted}: OpenSim refuses to load the file",
+                        model,
+                        number=value,
+                        severity=ERROR,
+                    )
     elif number is not None:
         fix = without_element(source, number)
         found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
@@ -287,6 +303,40 @@ def not_upgradable(subject: Subject, found: Found) -> None:
         )
 
 
+def _unread(source: Source, number: int, kind: str) -> str:
+    """What an element should hold; empty if it does."""
+    span, inside = source.spans[number], source.children(number)
+    if kind == "nodes":
+        wrong = any(source.spans[child].tag != "ControlLinearNode" for child in inside)
+        return "a list of ControlLinearNode objects" if wrong else ""
+    pieces = [piece for piece in _COMMENT.split(source.text[span.tag_end : span.inner_end]) if piece.strip()]
+    if inside or len(pieces) > 1:
+        return "a value"
+    text = "".join(pieces)
+    try:
+        if kind == "number":
+            converter(Value("double", legacy=True))(text)
+        elif kind == "numbers":
+            numbers = converter(Value("double", "list", legacy=True))(text)
+            return "" if all(map(isfinite, numbers)) else "a list of finite numbers"
+    except Unclean as unclean:
+        if kind == "numbers":
+            return "a list of finite numbers"
+        # Of several numbers OpenSim takes the first, unless it is none, and of a word the beginning.
+        return "" if unclean.value is not ABSENT and isfinite(unclean.value) else "a number"
+    return ""
+
+
+_COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+_OF_TOOLS = {
+    "CMC_Joint": dict.fromkeys(["on", "wrt_body", "express_body", "active", "coordinate"], "text")
+    | dict.fromkeys(["weight", "kp", "kv", "ka", "r0", "r1", "r2"], "numbers")
+    | {"limit": "number"},
+    "ControlLinear": dict.fromkeys(["is_model_control", "extrapolate", "filter_on", "use_steps"], "text")
+    | dict.fromkeys(["default_min", "default_max", "kp", "kv"], "number")
+    | dict.fromkeys(["x_nodes", "min_nodes", "max_nodes"], "nodes"),
+}
+"""Classes that are no part of a model and that old files hold defaults of: how OpenSim reads what they say."""
 _KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag"))
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
