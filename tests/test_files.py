@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 
 from osimlite import files
+from osimlite.document.source import Source
 from osimlite.errors import MissingFileError, OsimliteError, SpecialFileError
 from osimlite.files import read_file
+from osimlite.lint.engine import check_source
 from tests.cli.command import Done, run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes and devices among its files")
@@ -69,6 +71,13 @@ def test_what_is_no_file_is_not_included(special: Path, tmp_path: Path) -> None:
     done = run("validate", "m.osim", "--format", "concise", "--no-cache", folder=tmp_path)
     assert done.code == 0
     assert f"warning OSIM702 BodySet should be read from '{special}', which is not read: this is a " in done.out
+
+
+def test_what_is_no_file_is_not_included_in_an_editor(special: Path, tmp_path: Path) -> None:
+    """The text may be that of a file that is not written yet."""
+    source = Source.of_characters(INCLUDING.format(special), str(tmp_path / "new.osim"))
+    (found,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
+    assert "which is not read: this is a " in found.message and found.message.endswith(": it stays empty")
 
 
 @pytest.mark.parametrize("command", ["info", "format", "upgrade", "translate", "simulate"])

@@ -97,7 +97,8 @@ def included_file(subject: Subject, found: Found) -> None:
     for note in subject.notes:
         if note.kind != "include" or note.owner is None or not note.value:
             continue
-        read = subject.folder is None or (note.owner.layout is not None and note.owner.layout.include is not None)
+        included = note.owner.layout is not None and note.owner.layout.include is not None
+        read = included or (subject.folder is None and not note.why)
         ignored = _has_content(subject.source, note.number)
         state = "is read from" if read else "should be read from"
         why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
