@@ -8,19 +8,20 @@ from types import ModuleType
 from osimlite.errors import MissingDependency
 
 
-def require(module: str, *, extra: str, purpose: str) -> ModuleType:
+def require(module: str, *, extra: str, purpose: str, instead: str = "") -> ModuleType:
     """Import an optional package, or say which extra of osimlite brings it.
 
     Args:
         module: name to import, e.g. ``"numpy"`` or ``"matplotlib.pyplot"``.
         extra: the extra of osimlite that installs it, e.g. ``"sim"``.
         purpose: what it is needed for, as the subject of a sentence: ``"the PyBullet engine"``.
+        instead: what does as well without it, if anything does.
 
     Raises:
         MissingDependency: the package is absent, or present and cannot be loaded.
     """
     package = module.partition(".")[0]
-    cure = f"run: pip install 'osimlite[{extra}]'"
+    cure = (f"take {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
     try:
         return import_module(module)
     except ModuleNotFoundError as error:

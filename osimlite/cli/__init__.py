@@ -167,6 +167,14 @@ def _run(words: list[str]) -> None:
         # Whoever read our output has gone; Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
+    except ModuleNotFoundError as error:
+        from osimlite.cli.doctor import bringing
+
+        extra = bringing(error.name)
+        if extra is None:
+            raise
+        complain(f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'")
+        raise SystemExit(2) from None
     except Exception as error:
         # The library that reads options does not tell under what name it can be caught.
         if not hasattr(error, "format_message"):

@@ -16,21 +16,37 @@ import typer
 from osimlite.cli._console import add_row, plain_console, say
 from osimlite.cli._progress import progress_bar
 
-PURPOSES = {
-    "": "read, write, check: build, validate, format, upgrade, diff, info",
-    "sim": "translate, simulate, gait, kinematics, inverse-dynamics",
-    "bullet": "simulate --engine bullet, simulate --gui",
-    "plot": "simulate --plot, gait --basin",
-    "view": "view, simulate --animate",
-    "yaml": "models as YAML",
-    "frame": "trajectory.to_frame()",
-    "sweep": "sweep",
-    "optimize": "optimize",
-    "lsp": "lsp: the language server for editors",
-    "oracle": "comparisons with OpenSim itself, in tests and benchmarks",
+NEEDS: dict[str, tuple[str, ...]] = {
+    "build": (),
+    "validate": (),
+    "format": (),
+    "upgrade": (),
+    "diff": (),
+    "info": (),
+    "translate": ("numpy",),
+    "simulate": ("numpy",),
+    "kinematics": ("numpy",),
+    "inverse-dynamics": ("numpy", "scipy"),
+    "view": ("numpy",),
+    "gait": ("numpy",),
+    "machine code for forces and motions, many times as fast": ("numba",),
+    "simulate --engine bullet": ("numpy", "pybullet"),
+    "simulate --gui": ("numpy", "pybullet"),
+    "simulate --plot": ("numpy", "matplotlib"),
+    "gait --basin": ("numpy", "matplotlib"),
+    "view --screenshot": ("numpy", "pillow"),
+    "simulate --animate": ("numpy", "pillow"),
+    "models as YAML": ("pyyaml",),
+    "trajectory.to_frame()": ("pandas",),
+    "sweep": ("numpy", "pyarrow", "filelock"),
+    "optimize": ("numpy", "pyarrow", "cma"),
+    "the language server for editors": ("pygls",),
+    "comparisons with OpenSim itself, in tests and benchmarks": ("opensim",),
 }
-"""What each extra is for; "" is the plain installation. `all` and `dev` gather the others and the tools of tests, and
-`fast` is an older name of `sim`."""
+"""The packages that a command, or an option of it, cannot do without, but for those of the plain installation."""
+
+EXTRAS = ("", "sim", "bullet", "view", "plot", "sweep", "optimize", "lsp", "yaml", "frame", "oracle")
+"""The plain installation and what is added to it; `all` and `dev` gather these, `fast` is an older name of `sim`."""
 
 MESHES = (".vtp", ".stl", ".obj")
 """Endings of mesh files."""
@@ -75,6 +91,7 @@ def doctor(
     say()
 
     wanted = requirements()
+    uses = purposes(wanted)
     every = {name for names in wanted.values() for name in names}
     found = {}
     with progress_bar("loading each package", len(every)) as progress:
@@ -88,7 +105,7 @@ def doctor(
         packages = [found[name] for name in names]
         missing = any(not package.version for package in packages)
         words = ", ".join(f"{item.name} {item.version or 'missing'}" for item in packages)
-        add_row(table, extra or "(none)", PURPOSES[extra], words)
+        add_row(table, extra or "(none)", ", ".join(uses[extra]), words)
         if extra and missing:
             table.add_row("", "", Text(f"pip install 'osimlite[{extra}]'", style="bold"))
     plain_console().print(table)
@@ -106,7 +123,7 @@ def doctor(
 
 def requirements() -> dict[str, list[str]]:
     """Names of the packages that each extra asks for, "" first."""
-    wanted: dict[str, list[str]] = {extra: [] for extra in PURPOSES}
+    wanted: dict[str, list[str]] = {extra: [] for extra in EXTRAS}
     for line in metadata.requires("osimlite") or []:
         name = re.split(r"[\s\[<>=!~;(]", line, maxsplit=1)[0]
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", line)
@@ -114,6 +131,22 @@ def requirements() -> dict[str, list[str]]:
         if of in wanted and name not in ("osimlite", *wanted[of]):
             wanted[of].append(name)
     return wanted
+
+
+def purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
+    """What each extra is for: the uses all of whose packages it brings, and no extra before it does."""
+    found: dict[str, list[str]] = {extra: [] for extra in wanted}
+    for use, packages in NEEDS.items():
+        extra = next((extra for extra, names in wanted.items() if {*packages} <= {*names}), None)
+        if extra is not None:
+            found[extra].append(use)
+    return found
+
+
+def bringing(module: str | None) -> str | None:
+    """The first extra that brings a module; None if none does."""
+    name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
+    return next((extra for extra, names in requirements().items() if extra and name in names), None)
 
 
 def examine(name: str) -> Package:

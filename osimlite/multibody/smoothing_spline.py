@@ -91,7 +91,7 @@ def _unit_spacing(points: Array) -> tuple[Array, float]:
 
 def _through(points: Array, values: Array, half_order: int) -> Any:
     """SciPy's spline through n points with values (n,) or (n, k): at both ends the derivatives m .. 2m - 2 vanish."""
-    interpolate = require("scipy.interpolate", extra="sim", purpose="splines")
+    interpolate = require("scipy.interpolate", extra="sim", purpose="a spline")
     degree, orders = 2 * half_order - 1, range(half_order, 2 * half_order - 1)
     spline, missing = None, values
     # The second time mends the rounding of the first, which uneven points make large: SciPy does not scale equations.

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import tomllib
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from typer import Typer
 from typer.testing import CliRunner
 
-from osimlite.cli.doctor import PURPOSES, Package, doctor, examine, requirements
+from osimlite import write
+from osimlite.cli.doctor import EXTRAS, NEEDS, Package, doctor, examine, purposes, requirements
+from osimlite.document.data import write_data
 from osimlite.errors import MissingFileError
+from osimlite.models.dynamic_walker import dynamic_walker
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,7 +34,88 @@ def run(*arguments: str) -> tuple[int, str]:
 
 def test_every_extra_has_a_purpose() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    assert {*extras, ""} - {*PURPOSES} == {"all", "dev", "fast"}
+    assert {*extras, ""} - {*EXTRAS} == {"all", "dev", "fast"}
+    found = purposes(requirements())
+    assert all(found[extra] for extra in EXTRAS)
+    assert sorted(use for uses in found.values() for use in uses) == sorted(NEEDS)
+    assert "translate" in found["sim"] and "view --screenshot" in found["view"] and "simulate --gui" in found["bullet"]
+
+
+def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
+    wanted = {"": ["lxml"], "sim": ["numba", "numpy"], "view": ["numpy", "pillow"], "more": ["numpy", "pillow"]}
+    found = purposes(wanted)
+    assert "validate" in found[""] and "kinematics" in found["sim"] and "view --screenshot" in found["view"]
+    assert not any("optimize" in uses for uses in found.values())
+
+
+MODULES = {"pillow": "PIL", "pyyaml": "yaml"}
+"""What is imported of a package, where that is not its name."""
+
+EXAMPLES = {
+    "build": "build dynamic-walker -o built.osim",
+    "validate": "validate w.osim --no-cache",
+    "format": "format --check w.osim",
+    "upgrade": "upgrade w.osim -o new.osim",
+    "diff": "diff w.osim w.osim",
+    "info": "info w.osim",
+    "translate": "translate w.osim",
+    "simulate": "simulate w.osim --to 0.005",
+    "kinematics": "kinematics w.osim m.mot",
+    "inverse-dynamics": "inverse-dynamics w.osim m.mot",
+    "view": "view w.osim --html v.html",
+    "gait": "gait w.osim --to 0.05",
+    "simulate --engine bullet": "simulate w.osim --to 0.005 --engine bullet",
+    "simulate --plot": "simulate w.osim --to 0.02 --plot",
+    "view --screenshot": "view w.osim --screenshot v.png",
+    "simulate --animate": "simulate w.osim --to 0.02 --animate",
+    "models as YAML": "build w.yaml -o built.osim",
+    "sweep": "sweep w.osim --vary RHip_rz=0:0.1:2 --to 0.005",
+    "optimize": "optimize w.osim --objective distance --vary RHip_rz=0:1 --vary LHip_rz=0:1 --budget 8 --to 0.005",
+}
+
+SCRIPT = """
+import sys
+from importlib.machinery import PathFinder
+absent, find = set(sys.argv[1].split(",")), PathFinder.find_spec
+PathFinder.find_spec = lambda name, *more: None if name.partition(".")[0] in absent else find(name, *more)
+from osimlite.cli import main
+main(sys.argv[2:])
+"""
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("work")
+    model = dynamic_walker()
+    write(model, place / "w.osim")
+    write_data(model, place / "w.yaml")
+    (place / "m.mot").write_text("m\nversion=1\nendheader\ntime Pelvis_tx\n" + "".join(f"0.{k} 0\n" for k in range(9)))
+    return place
+
+
+def call(words: str, absent: set[str], folder: Path) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, ",".join(absent), *words.split()],
+        capture_output=True, text=True, encoding="utf-8", cwd=folder, check=False, timeout=200,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("use", EXAMPLES)
+def test_what_is_needed_is_enough_and_is_needed(work: Path, use: str) -> None:
+    every = {MODULES.get(name, name) for names in NEEDS.values() for name in names} | {"scipy", "distributed"}
+    needed = {MODULES.get(name, name) for name in NEEDS[use]}
+    # Drawing libraries need packages of their own.
+    brought = {"PIL", "numpy"} if "matplotlib" in needed else set()
+    if needed - {*filter(find_spec, needed)}:
+        pytest.skip(f"needs {', '.join(sorted(needed))}")
+    code, told = call(EXAMPLES[use], every - needed - brought, work)
+    # A short walk has no cycle.
+    assert code == (1 if use == "gait" else 0), told
+    for name in needed:
+        code, told = call(EXAMPLES[use], {name}, work)
+        assert code == 2 and name in told and "pip install" in told and told.count("\n") == 1, told
 
 
 def test_packages_of_the_plain_installation() -> None:

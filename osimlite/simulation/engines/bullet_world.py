@@ -40,7 +40,7 @@ def muted(descriptor: int = 2) -> Iterator[None]:
 
 
 with muted():
-    require("pybullet", extra="bullet", purpose="the PyBullet engine")
+    require("pybullet", extra="bullet", purpose="the PyBullet engine", instead="--engine compiled, which does without")
     import pybullet as bullet
 
 NO_LIMIT = 1e9
