@@ -63,8 +63,14 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
 
 
 def tell_of_compiling() -> None:
-    """Let people on a terminal know why the first use of the compiled engine takes so long."""
+    """Let people know why a motion takes so long: the first use of the compiled engine, or one without a compiler."""
     import logging
+
+    class Said(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            complain(record.getMessage())
+
+    logging.getLogger("osimlite.simulation.engines.linking").addHandler(Said())
 
     class Once(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:

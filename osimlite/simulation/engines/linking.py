@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import logging
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -15,6 +16,8 @@ from osimlite.simulation.kernels import layout, pointers
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.pointers import Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS, law_function
+
+_log = logging.getLogger(__name__)
 
 KERNEL = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64)
 """A kernel: takes the three vectors, a state, room for its derivative, and the place of an item."""
@@ -131,7 +134,15 @@ COMPILED, PYTHON = _Compiled("machine code"), _Python("Python")
 
 def best() -> Code:
     """Machine code where numba is installed, else Python."""
-    return COMPILED if has_compiler() else PYTHON
+    if has_compiler():
+        return COMPILED
+    _warn()
+    return PYTHON
+
+
+@cache
+def _warn() -> None:
+    _log.warning("numba is not installed: forces are computed in Python, some thousand times slower; pip install numba")
 
 
 class Program:
