@@ -109,7 +109,7 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     assert isinstance(kind, Value)
     word = legacy_flag if kind.legacy and kind.scalar == "bool" else _WORDS[kind.scalar]
     if kind.shape in ("single", "optional"):
-        return text if kind.scalar == "string" else _one(word, kind.shape == "optional")
+        return text if kind.scalar == "string" else _one(word, kind.shape == "optional", kind.legacy)
     if kind.size is not None:
         return _exactly(kind.size)
     if kind.shape == "vector":
@@ -119,7 +119,7 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     return _words(word, kind.least, kind.most)
 
 
-def _one(read: Callable[[str], Any], optional: bool) -> Callable[[str], Any]:
+def _one(read: Callable[[str], Any], optional: bool, legacy: bool) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         # Almost every text is one clean number or switch; what follows this is for the rest.
         if read is real:
@@ -138,6 +138,13 @@ def _one(read: Callable[[str], Any], optional: bool) -> Callable[[str], Any]:
             raise Unclean("empty", "")
         if len(words) == 1:
             return read(words[0])
+        for word in words[1:] if not legacy else ():
+            # OpenSim reads them all before it takes the first, and takes none if it cannot read one.
+            try:
+                read(word)
+            except Unclean as unclean:
+                if unclean.value is ABSENT:
+                    raise
         raise Unclean("too-many", raw.strip(), read(words[0]))
 
     return convert

@@ -46,7 +46,10 @@ def axes_refused(joint: CustomJoint) -> bool:
     Measured on 1,200 random joints. A name that no component may have is refused as well, and one that a frame of the
     joint has: OpenSim calls the frame otherwise then and does not find it.
     """
-    declared = [coordinate.name for coordinate in coordinates_of(joint)]
+    # OpenSim has renamed the second of a name by then, so that no axis names it.
+    declared: list[str] = []
+    for coordinate in coordinates_of(joint):
+        declared.append(coordinate.name if coordinate.name not in declared else f"{coordinate.name}_{len(declared)}/")
     names = names_on_axes(joint)
     if any(frame.name in names and frame.name not in declared for frame in joint.frames):
         # The coordinate that is made up takes the name of the frame.

@@ -49,6 +49,8 @@ def test_nan_in_any_case() -> None:
         ("1e400", "unreadable", ABSENT),
         ("", "empty", ABSENT),
         ("5 6", "too-many", 5.0),
+        ("5 6 a", "unreadable", ABSENT),
+        ("5e", "unreadable", ABSENT),
     ],
 )
 def test_numbers_that_lose_something(text: str, trouble: str, value: object) -> None:
@@ -65,6 +67,7 @@ def test_numbers_that_lose_something(text: str, trouble: str, value: object) -> 
         ("1 2 3 4 5 6", "too-many", (1.0, 2.0, 3.0)),
         ("0,-0.2175,0", "too-few", ABSENT),
         ("0 abc 0", "unreadable", ABSENT),
+        ("0, 1,5 0", "unreadable", (0.0, 1.0, 0.0)),
         ("(0 -0.2175 0)", "unreadable", ABSENT),
         ("", "empty", ABSENT),
     ],

@@ -121,6 +121,7 @@ CASES: dict[str, tuple[str, str, str]] = {
         "<CoordinateSet><objects>",
         "<CoordinateSet><objects><WeldConstraint name='w'/>",
     ),
+    "coordinate doubled": (OLD, '<Coordinate name="turn">', '<Coordinate name="turn"/><Coordinate name="turn">'),
     "set for a coordinate": (OLD, '<Coordinate name="turn">', '<BodySet><Coordinate name="turn">'),
     "connector renamed": (YEARS_BETWEEN, PARENT, PARENT.replace("Connector_PhysicalFrame_", "Connector_Frame_")),
     "connector missing": (YEARS_BETWEEN, PARENT, ""),
