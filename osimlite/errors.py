@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from osimlite.text import visible
+from osimlite.text import brief, visible
 
 
 class OsimliteError(Exception):
@@ -24,7 +24,7 @@ class OsimliteError(Exception):
         self, message: str, *, file: str | None = None, line: int | None = None, column: int | None = None
     ) -> None:
         super().__init__(message)
-        self.message = message
+        self.message = brief(message)
         self.file = file
         self.line = line
         self.column = column

@@ -54,6 +54,17 @@ def _escape(character: str) -> str:
     return character.encode("unicode_escape").decode("ascii")
 
 
+LONGEST = 600
+"""Characters of a message; a plain sentence has fewer."""
+
+
+def brief(message: str) -> str:
+    """The message, without the middle of long values in it if it is long."""
+    if len(message) > LONGEST:
+        message = re.sub(r"(\S{60})\S{60,}(\S{20})", r"\1…\2", message)
+    return message if len(message) <= LONGEST else f"{message[: LONGEST - 201]}…{message[-200:]}"
+
+
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | None:
     """The known name most like `word` (case and a namespace before a colon ignored), or None if none is near."""
     from rapidfuzz import fuzz, process

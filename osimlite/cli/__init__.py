@@ -136,6 +136,10 @@ def _run(words: list[str]) -> None:
 
     # What is imported makes many objects and drops none: the collector would look through them again and again.
     gc.set_threshold(100_000)
+    # What draws tables takes any width at its word.
+    width = os.environ.get("COLUMNS", "")
+    if not (width.isdecimal() and len(width) < 5 and int(width)):
+        os.environ.pop("COLUMNS", None)
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Only the command that is asked for is loaded; without one, all are, for the help.

@@ -17,6 +17,8 @@ from osimlite.files import read_file
 _BLOCK = 4096
 """Characters between the places whose line is known at once."""
 
+_ATTRIBUTE = re.compile(r"""\s+([^\s=]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+
 
 class Position(NamedTuple):
     """A place in a text: 1-based line and column (in characters), and how many characters it covers."""
@@ -42,6 +44,7 @@ class Source:
         """Whether there is text beside elements, where that has been looked for in a well-formed text."""
         self.attributes: bool | None = None
         """Whether there are attributes without a meaning, where they have been looked for in a well-formed text."""
+        self._attributes: dict[int, dict[str, tuple[int, int, int]]] = {}
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 
@@ -66,6 +69,14 @@ class Source:
         source = cls(b"", file)
         source.data, source.text = text.encode("utf-8", "replace"), text
         return source
+
+    def attributes_of(self, number: int) -> dict[str, tuple[int, int, int]]:
+        """By the name of each attribute of an element: where the blanks before it begin, where it does, its end."""
+        if number not in self._attributes:
+            span = self.spans[number]
+            found = _ATTRIBUTE.finditer(self.text, span.start, span.tag_end)
+            self._attributes[number] = {match[1]: (match.start(), match.start(1), match.end()) for match in found}
+        return self._attributes[number]
 
     @cached_property
     def spans(self) -> Sequence[Span]:

@@ -21,6 +21,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.suppressions import suppressions
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
+from osimlite.text import brief
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
 
@@ -242,7 +243,7 @@ def _collector(known: Rule, subject: Subject, findings: list[Finding]) -> Found:
                 known.code,
                 known.name,
                 subject.config.severity_of(known, severity or known.severity_in(subject.version)),
-                message,
+                brief(message),
                 subject.file,
                 line,
                 column,

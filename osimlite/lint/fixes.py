@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 from osimlite.document.source import Position, Source
@@ -41,12 +40,8 @@ def without_attribute(source: Source | None, number: int, name: str, *, safe: bo
     """Take an attribute out."""
     if source is None:
         return None
-    span = source.spans[number]
-    head = source.text[span.start : span.tag_end]
-    match = re.search(rf"\s+{re.escape(name)}\s*=\s*(?:\"[^\"]*\"|'[^']*')", head)
-    if match is None:
-        return None
-    return Fix((Edit(span.start + match.start(), span.start + match.end(), ""),), safe)
+    found = source.attributes_of(number).get(name)
+    return Fix((Edit(found[0], found[2], ""),), safe) if found else None
 
 
 def without_text(source: Source, start: int, end: int) -> Fix:

@@ -78,25 +78,20 @@ def has_unknown_joints(subject: Subject) -> bool:
 
 def base_of(subject: Subject, frame: Component | None) -> Component | None:
     """The body or ground that a frame is fixed to, through any number of offset frames; looked for once per frame."""
-    if frame is None:
-        return None
     known = cast("dict[int, Component | None]", subject.kept.setdefault("bases", {}))
-    if id(frame) not in known:
-        known[id(frame)] = _base_of(subject, frame)
-    return known[id(frame)]
-
-
-def _base_of(subject: Subject, frame: Component | None) -> Component | None:
-    seen: set[int] = set()
-    while frame is not None and not isinstance(frame, (Body, Ground)):
-        if id(frame) in seen:
-            return None
-        seen.add(id(frame))
+    way: set[int] = set()
+    while frame is not None and not isinstance(frame, (Body, Ground)) and id(frame) not in known:
+        if id(frame) in way:
+            frame = None
+            break
+        way.add(id(frame))
         if isinstance(frame, StationDefinedFrame):
             station = subject.target_of(frame, "socket_point_a")
             frame = subject.target_of(station, "socket_parent_frame") if station is not None else None
-        elif "socket_parent" in type(frame).field_specs():
-            frame = subject.target_of(frame, "socket_parent")
         else:
-            return None
-    return frame
+            is_laid = "socket_parent" in type(frame).field_specs()
+            frame = subject.target_of(frame, "socket_parent") if is_laid else None
+    base = known.get(id(frame), frame)
+    # All that were passed on the way are fixed to the same.
+    known.update(dict.fromkeys(way, base))
+    return base

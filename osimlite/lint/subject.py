@@ -234,10 +234,8 @@ class Subject:
         """Where the name of an attribute stands."""
         if self.source is None:
             return None
-        span = self.source.spans[number]
-        head = self.source.text[span.start : span.tag_end]
-        match = re.search(rf"\s({re.escape(name)})\s*=", head)
-        return self.source.position(span.start + match.start(1), len(name)) if match else self.source.of_tag(number)
+        found = self.source.attributes_of(number).get(name)
+        return self.source.position(found[1], len(name)) if found else self.source.of_tag(number)
 
     def _given(self, item: Object | None) -> int | None:
         """The element of an object; of one the text does not give, that of the component above it."""

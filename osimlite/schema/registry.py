@@ -128,8 +128,9 @@ def class_for(tag: str) -> type[Object] | None:
     return None if found.abstract or found.tag != tag else found
 
 
-def tags() -> list[str]:
+@cache
+def tags() -> tuple[str, ...]:
     """Every tag that stands for a class in a file, sorted."""
     renamed = {name: tag for tag, name in _TAGS.items()}
     known = (renamed.get(name, name) for name in MODULES)
-    return sorted(tag for tag in known if class_for(tag) is not None)
+    return tuple(sorted(tag for tag in known if class_for(tag) is not None))

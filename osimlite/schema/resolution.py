@@ -114,7 +114,7 @@ def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Ca
             return Resolution(None, "empty")
         found = members(tree, owner, target).get(text)
         if found is None:
-            other = next((c for c in tree.components if last_name(tree.path_of(c) or "/") == text), None)
+            other = next(iter(tree.by_name.get(text, ())), None)
             return Resolution(None, "missing" if other is None else "wrong-type", other)
         return Resolution(found)
 
@@ -129,6 +129,9 @@ def _nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) ->
 PATH_RULES = frozenset(("socket", "owner-path", "model-path"))
 
 """The rules by which an absolute path leads to the same component from everywhere."""
+
+EVERYWHERE = frozenset(f"{kind}-name" for kind in ("coordinate", "body", "joint", "actuator", "muscle", "wrap-object"))
+"""The rules by which a bare name leads to the same component from everywhere."""
 
 RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "socket": _socket,

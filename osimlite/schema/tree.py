@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from weakref import WeakSet
 
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object, put_model
 from osimlite.schema.fields import Held, ObjectList, Reference
+from osimlite.schema.resolution import EVERYWHERE, PATH_RULES, RULES, last_name
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS as ILLEGAL_CHARACTERS
-from osimlite.schema.resolution import PATH_RULES, RULES, last_name
 from osimlite.schema.resolution import Failure as Failure
 from osimlite.schema.resolution import Resolution as Resolution
 from osimlite.schema.resolution import is_a as is_a
@@ -78,6 +78,7 @@ class Tree:
         self._naming: list[tuple[Object, Component]] = []
         # By class: what its objects are put into, whether they can name others, and what they can hold.
         self._shelves: dict[type[Object], tuple[list[Object], bool, tuple[Holding, ...]]] = {}
+        self._spellings: dict[tuple[str, str], list[str]] = {}
         self._names: dict[str, dict[str, Component]] = {}
         self._resolved: dict[tuple[str, str, str], Resolution] = {}
         self._parts: dict[int, tuple[Component, list[Component]]] = {}
@@ -208,9 +209,20 @@ class Tree:
             return path
         return bare
 
+    @cached_property
+    def by_name(self) -> dict[str, list[Component]]:
+        """By the name at the end of its path, the first component of each class."""
+        found: dict[str, dict[type[Component], Component]] = {}
+        for component in self.components:
+            found.setdefault(last_name(self._paths[id(component)]), {}).setdefault(type(component), component)
+        return {name: list(components.values()) for name, components in found.items()}
+
     def spellings(self, use: Use) -> list[str]:
         """Every text that would be right in this place, the shortest form of each component."""
         reference = use.reference
+        key = reference.rule, reference.target
+        if key in self._spellings:
+            return self._spellings[key]
         names = set()
         for component in self.components:
             if reference.rule == "own-joint-coordinate" and self._parents.get(id(component)) is not use.owner:
@@ -219,7 +231,10 @@ class Tree:
                 text = self.text_for(use.owner, reference, component)
                 if self.lookup(reference, text, use.owner).target is component:
                     names.add(text)
-        return sorted(names)
+        spellings = sorted(names)
+        if reference.rule in EVERYWHERE:
+            self._spellings[key] = spellings
+        return spellings
 
     def _place(self, component: Component, path: str) -> None:
         """Enter a component at `path` ("" for the model), what belongs to it, and all that is below it."""
@@ -236,10 +251,14 @@ class Tree:
                 below.append(part)
                 self._parents[id(part)] = component
                 self._put(part, f"{path}/{part.name}")
+        counts: dict[str, int] = {}
         for name, child in children:
             unique = name
             if name in taken:
-                unique = self._unique(name, taken)
+                number = counts.get(name, 0)
+                while (unique := f"{name}_{number}") in taken:
+                    number += 1
+                counts[name] = number + 1
                 self.renamed.append(Renamed(child, unique, taken[name]))
             taken[unique] = child
             below.append(child)
@@ -290,13 +309,6 @@ class Tree:
             if not item.is_component:
                 self._owners[id(item)] = owner
                 self._own(item, owner)
-
-    @staticmethod
-    def _unique(name: str, taken: dict[str, Component]) -> str:
-        unique, count = name, 0
-        while unique in taken:
-            unique, count = f"{name}_{count}", count + 1
-        return unique
 
     def _internal_parts(self, owner: Component) -> list[Component]:
         """The parts that OpenSim makes for itself; the same ones for the same owner, as long as it lives."""

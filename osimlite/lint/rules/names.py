@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject
@@ -216,9 +218,9 @@ def _last(text: str) -> str:
 
 def _who_names(subject: Subject, target: Object) -> list[str]:
     """Who holds a reference that leads to a component."""
-    holders = [
-        called(use.owner)
-        for use in subject.uses
-        if use.reference.rule not in ("file", "column", "input") and subject.resolution(use).target is target
-    ]
-    return list(dict.fromkeys(holders))
+    known = cast("dict[int, dict[str, None]]", subject.kept.setdefault("holders", {}))
+    if not known:
+        for use in subject.uses:
+            if use.reference.rule not in ("file", "column", "input"):
+                known.setdefault(id(subject.resolution(use).target), {})[called(use.owner)] = None
+    return list(known.get(id(target), ()))

@@ -333,10 +333,7 @@ def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
         return at_path
     if "/" in text:
         return None
-    for component in tree.components:
-        if component.name == text and not is_a(component, use.reference.target):
-            return component
-    return None
+    return next((item for item in tree.by_name.get(text, ()) if not is_a(item, use.reference.target)), None)
 
 
 def _wants_plain_path(use: Use) -> bool:

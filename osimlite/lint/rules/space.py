@@ -71,14 +71,18 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
     </ComponentSet>
     ```
     """
+    followed: set[int] = set()
     for offset in subject.each(PhysicalOffsetFrame):
-        seen: list[Component] = []
+        way: dict[int, PhysicalOffsetFrame] = {}
         here: Component | None = offset
-        while isinstance(here, PhysicalOffsetFrame) and not any(known is here for known in seen):
-            seen.append(here)
+        while isinstance(here, PhysicalOffsetFrame) and id(here) not in followed:
+            followed.add(id(here))
+            way[id(here)] = here
             here = subject.target_of(here, "socket_parent")
-        if here is offset:
-            found(f"{called(offset)} is fixed to itself: OpenSim never comes to an end", offset, tag="socket_parent")
+        # The way ends on itself: what it passed since it was here first is the circle.
+        circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
+        for link in circle:
+            found(f"{called(link)} is fixed to itself: OpenSim never comes to an end", link, tag="socket_parent")
     for frame in subject.each(StationDefinedFrame):
         if _rests_on_itself(subject, frame):
             found(f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end", frame)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, Found, rule
@@ -392,7 +393,7 @@ def _fate(subject: Subject, note: Note) -> str:
     return "leaves the object out, and fails where it needs one"
 
 
-def _acceptable(spec: FieldSpec | None) -> list[str]:
+def _acceptable(spec: FieldSpec | None) -> Sequence[str]:
     if spec is None or spec.accepts is None:
         return tags()
     return [tag for tag in tags() if (cls := class_for(tag)) is not None and issubclass(cls, spec.accepts)]

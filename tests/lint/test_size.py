@@ -1,0 +1,77 @@
+"""What is found in large bad models: the work grows with their size, and messages do not."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.lint.engine import check_source
+from osimlite.text import LONGEST
+
+BODY = "<Body name='{}' {}><mass>1</mass>{}</Body>"
+
+
+def model(bodies: str, rest: str = "") -> str:
+    return (
+        "<OpenSimDocument Version='40600'><Model name='m'>"
+        f"<BodySet name='bodyset'><objects>{bodies}</objects></BodySet>{rest}</Model></OpenSimDocument>"
+    )
+
+
+def frames(count: int, first: str) -> str:
+    links = (first, *(f"/componentset/f{k}" for k in range(count - 1)))
+    items = "".join(
+        f"<PhysicalOffsetFrame name='f{k}'><socket_parent>{link}</socket_parent></PhysicalOffsetFrame>"
+        for k, link in enumerate(links)
+    )
+    return model(
+        BODY.format("b", "", ""), f"<ComponentSet name='componentset'><objects>{items}</objects></ComponentSet>"
+    )
+
+
+LIMIT = "<CoordinateLimitForce name='s{0}'><coordinate>x{0}</coordinate></CoordinateLimitForce>"
+KINDS = {
+    "bodies of one name": lambda n: model(BODY.format("b", "", "") * n),
+    "attributes": lambda n: model(BODY.format("b", " ".join(f"a{k}='1'" for k in range(n)), "")),
+    "elements": lambda n: model(BODY.format("b", "", "<foo>1</foo>" * n)),
+    "classes": lambda n: model("<Foo name='x'/>" * n),
+    "frames of frames": lambda n: frames(n, "/bodyset/b"),
+    "frames in a circle": lambda n: frames(n, f"/componentset/f{n - 1}"),
+    "names of nothing": lambda n: model(
+        BODY.format("b", "", ""),
+        f"<ForceSet name='forceset'><objects>{''.join(LIMIT.format(k) for k in range(n))}</objects></ForceSet>",
+    ),
+}
+
+
+def calls(text: str) -> int:
+    """How many functions are called, and steps of generators taken, to check a text."""
+    count = 0
+
+    def note(*_: object) -> None:
+        nonlocal count
+        count += 1
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        check_source(Source.of_characters(text))
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_four_times_as_much_is_four_times_the_work(kind):
+    calls(KINDS[kind](10))
+    small, large = calls(KINDS[kind](100)), calls(KINDS[kind](400))
+    assert large < 5.5 * small
+
+
+@pytest.mark.parametrize("value", ["1" * 5_000_000, "1 " * 100_000, "x" * 100_000])
+def test_long_values_are_cut(value):
+    report = check_source(Source.of_characters(model(BODY.format("b", "", "").replace(">1<", f">{value}<"))))
+    assert report.findings
+    assert all(len(finding.message) <= LONGEST for finding in report.findings)
