@@ -135,13 +135,13 @@ WITHOUT_PYBULLET = "import sys; sys.modules['pybullet'] = None; from osimlite.cl
 def test_without_pybullet(walker, tmp_path, words, code, said):
     pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_PYBULLET, "simulate", walker, "--to", "0.1", *words],
+        [sys.executable, "-c", WITHOUT_PYBULLET, "simulate", walker, "--to", "0.1", "-o", "r", *words],
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == code, done.stderr
     assert said in done.stdout + done.stderr
     if code == 0:
-        assert json.loads((tmp_path / "summary.json").read_text())["engine"] == "compiled"
+        assert json.loads((tmp_path / "r" / "summary.json").read_text())["engine"] == "compiled"
 
 
 def test_auto_is_bullet_where_it_is_installed(monkeypatch):
