@@ -14,6 +14,7 @@ MEANINGS = {
     "--to": "seconds, but the format of translate",
     "--output": "a file or a folder, as the command writes",
     "--seed": "of what it makes random",
+    "--all": "findings of validate, or classes of info",
     "--accuracy": "the step map of gait takes a finer one",
     "--set": "where a motion starts, but the pose that view shows",
     "--diff": "of mends, or of layout",
