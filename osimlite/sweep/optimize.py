@@ -19,7 +19,7 @@ from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import KEY, Partial, damage_told, local, partial_of, schema, spare, spare_strangers
+from osimlite.sweep.results import KEY, Partial, damage_told, partial_of, schema, spare, spare_strangers
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import Enough, Search, method_named
@@ -186,8 +186,8 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
         spare(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        with damage_told(path):
-            before = pq.read_table(local(path), page_checksum_verification=True)
+        with damage_told(path), open(path, "rb") as stream:
+            before = pq.read_table(stream, page_checksum_verification=True)
         if resume:
             partial = Partial(path, table)
             for batch in before.to_batches():

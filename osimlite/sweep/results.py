@@ -58,11 +58,6 @@ def _arrow() -> Any:
     return require("pyarrow", extra="sweep", purpose="a table of results")
 
 
-def local(path: str | Path) -> str:
-    """A path of which pyarrow does not think that what is before a colon is the name of a protocol."""
-    return os.path.abspath(path)
-
-
 def schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
     """Of a table: type of each column by its name ("int64", "float64" or "string"), and the settings."""
     pa = _arrow()
@@ -81,7 +76,9 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     if not Path(path).exists():
         raise MissingFileError("cannot read the file: no such file", file=str(path))
     try:
-        return _settings_in(pq.read_schema(local(path)))
+        # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and that all is UTF-8.
+        with open(path, "rb") as stream:
+            return _settings_in(pq.read_schema(stream))
     except (ValueError, OSError):
         raise OsimliteError("this file is not the results of a sweep; give them another name", file=str(path)) from None
 
@@ -228,7 +225,10 @@ class Partial:
         beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         waiting: list[Any] = []
         try:
-            with pq.ParquetWriter(local(beside), self.schema, write_page_checksum=True) as writer:
+            with (
+                beside.open("wb") as stream,
+                pq.ParquetWriter(stream, self.schema, write_page_checksum=True) as writer,
+            ):
 
                 def put(least: int) -> None:
                     table = pa.Table.from_batches(waiting, self.schema)
@@ -374,7 +374,11 @@ def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     found: dict[str, Range] = {}
     counts = dict.fromkeys(names, 0)
-    with damage_told(path), pq.ParquetFile(local(path), page_checksum_verification=True) as file:
+    with (
+        damage_told(path),
+        open(path, "rb") as stream,
+        pq.ParquetFile(stream, page_checksum_verification=True) as file,
+    ):
         for batch in file.iter_batches(columns=["run", *names]):
             runs = batch.column("run").to_numpy()
             for name in names:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -174,3 +175,12 @@ def test_without_a_sliding_coordinate_there_is_no_distance(folder: Path, capsys:
     assert "distance" not in pq.read_table("results.parquet").column_names
     assert run(*words, "--measure", "distance", "-o", "d.parquet") == 2
     assert "no distance" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only here may a file's name be any bytes")
+def test_results_may_have_a_name_that_is_no_utf_8(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["sweep", "walker.osim", "--to", "0.01", "--vary", "RHip_rz=0:0.1:2", "-o", "caf\udce9.parquet"]
+    assert run(*words) == 0 and run(*words) == 0
+    assert "caf\\xe9.parquet" in capsys.readouterr().out
+    with open("caf\udce9.parquet", "rb") as stream:
+        assert pq.read_table(stream).num_rows == 2
