@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import osimlite
-from osimlite.gait.footing import find_footing
+from osimlite.gait.foot_contacts import find_footing
 from osimlite.gait.steps import Scuff, Step, Walk, along_slope, follow
 from osimlite.simulation import Simulation
 

@@ -110,7 +110,7 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
             of ``--set`` without a unit can hardly be meant in rad.
     """
     from osimlite.errors import ModelError, OsimliteError, SettingError
-    from osimlite.simulation.start import doubt_of, in_units_of
+    from osimlite.simulation.start import in_units_of, suspect_value
 
     found = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
@@ -119,7 +119,7 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
             found[name] = in_units_of(mechanism, name, text)
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
-            if option == "--set" and (odd := doubt_of(info, name, text)):
+            if option == "--set" and (odd := suspect_value(info, name, text)):
                 raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.

@@ -166,7 +166,7 @@ def _walk(
     """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
     from osimlite.errors import OsimliteError
     from osimlite.gait.cycle import find_cycle
-    from osimlite.gait.footing import find_footing
+    from osimlite.gait.foot_contacts import find_footing
     from osimlite.gait.stepmap import StepMap
     from osimlite.gait.steps import walk_many
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from osimlite.gait.footing import Footing
+from osimlite.gait.foot_contacts import FootContacts
 from osimlite.gait.steps import along_slope
 from osimlite.simulation.many import BatchEngine
 from osimlite.simulation.runs import Floats, Ints
@@ -31,7 +31,7 @@ class Carriers:
     lift: int | None
 
 
-def carriers(engine: BatchEngine, footing: Footing) -> Carriers:
+def carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     """Find the coordinates that carry a walker as a whole, by moving each at some poses."""
     n = len(engine.order)
     contacts = _contacts(engine, footing)
@@ -53,7 +53,7 @@ def carriers(engine: BatchEngine, footing: Footing) -> Carriers:
 
 def stood(
     engine: BatchEngine,
-    footing: Footing,
+    footing: FootContacts,
     states: Floats,
     depth: float = 0.0,
     foot: int = 0,
@@ -85,7 +85,7 @@ def stood(
     return placed
 
 
-def planted(engine: BatchEngine, footing: Footing, states: Floats, *, numbers: Floats | None = None) -> Floats:
+def planted(engine: BatchEngine, footing: FootContacts, states: Floats, *, numbers: Floats | None = None) -> Floats:
     """States (W, y) put on the ground with the deeper foot, which is at rest there.
 
     The walker is lifted or lowered until that foot only just touches; then the speeds of the coordinates that carry it
@@ -145,6 +145,6 @@ def _centres(engine: BatchEngine, states: Floats, numbers: Floats | None = None,
     return places
 
 
-def _contacts(engine: BatchEngine, footing: Footing) -> Ints:
+def _contacts(engine: BatchEngine, footing: FootContacts) -> Ints:
     names = [name for foot in footing.feet for name in foot] + list(footing.falls)
     return np.array([engine.contacts.index(name) for name in names])

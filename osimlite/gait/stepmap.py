@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError, UnsupportedError
-from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.gait.steps import Step, along_slope, falls, room_for, walks_of
 from osimlite.gait.symmetry import leg_exchange, neutral_directions
 from osimlite.multibody.mechanism import Mechanism
@@ -92,7 +92,7 @@ class StepMap:
         engine: BatchEngine,
         near: ArrayLike,
         *,
-        footing: Footing | None = None,
+        footing: FootContacts | None = None,
         accuracy: float = TIGHT,
         longest: float = LONGEST,
         threads: int | None = None,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.many import ENDINGS, NO_LIMIT, BatchEngine, Runs, Watch, run_many
 from osimlite.simulation.runs import Floats
@@ -90,7 +90,7 @@ class Walk:
         return sum(step.time < first for step in self.steps)
 
 
-def falls(footing: Footing) -> list[Watch]:
+def falls(footing: FootContacts) -> list[Watch]:
     """Watches that stop a run where the walk ends."""
     return [Watch(f"{FALL}{contact}", contact=contact, stops=1) for contact in footing.falls]
 
@@ -105,7 +105,7 @@ def walk_many(
     states: ArrayLike,
     to: float,
     *,
-    footing: Footing | None = None,
+    footing: FootContacts | None = None,
     numbers: ArrayLike | None = None,
     accuracy: float = DEFAULT_ACCURACY,
     most_tries: int = NO_LIMIT,
@@ -138,7 +138,7 @@ def walks_of(
     engine: BatchEngine,
     states: ArrayLike,
     runs: Runs,
-    footing: Footing,
+    footing: FootContacts,
     *,
     numbers: ArrayLike | None = None,
     room: int | None = None,
@@ -182,7 +182,7 @@ def walks_of(
 
 
 def follow(
-    footing: Footing,
+    footing: FootContacts,
     contacts: Sequence[str],
     events: Sequence[tuple[float, str, bool]],
     states: Floats,

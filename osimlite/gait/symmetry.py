@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.gait.footing import Footing
+from osimlite.gait.foot_contacts import FootContacts
 from osimlite.multibody.mechanism import GROUND
 from osimlite.simulation.elements.contact import HuntCrossley
 from osimlite.simulation.many import BatchEngine
@@ -21,7 +21,7 @@ UNEVEN = 10.0
 """A state at which the derivative is so many times less even than at most others is left out."""
 
 
-def leg_exchange(engine: BatchEngine, footing: Footing, states: ArrayLike) -> Ints | None:
+def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) -> Ints | None:
     """The places (y,) from which the state is taken when the legs change parts, or None if they are not alike.
 
     The coordinates of one leg, from where the legs part to the foot, change places with those of the other, and

@@ -23,7 +23,7 @@ from osimlite.multibody.motions import (
     AxisMotion,
     Fixed,
     Motion,
-    SimbodyDrift,
+    SimbodyAccelerationError,
     SphericalMotion,
     X,
     Y,
@@ -108,14 +108,14 @@ def custom(
     """Motions of a CustomJoint: three translations along axes of F, then three body-fixed rotations.
 
     With `opensim_derivatives` the velocity-dependent accelerations are Simbody's; see
-    :class:`osimlite.multibody.motions.SimbodyDrift`.
+    :class:`osimlite.multibody.motions.SimbodyAccelerationError`.
 
     Raises:
         ModelError: an axis has no direction.
     """
     slides = tuple(_along("translate", axis) for axis in translations)
     turns = tuple(_along("rotate", axis) for axis in rotations)
-    return (*slides, SimbodyDrift(turns), *turns) if opensim_derivatives else (*slides, *turns)
+    return (*slides, SimbodyAccelerationError(turns), *turns) if opensim_derivatives else (*slides, *turns)
 
 
 def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:

@@ -114,7 +114,7 @@ class AxisMotion(Motion):
 
 
 @dataclass(frozen=True, eq=False)
-class SimbodyDrift(Motion):
+class SimbodyAccelerationError(Motion):
     """No motion, but the error of Simbody's angular acceleration of a CustomJoint with these three `turns` after it.
 
     The angular velocity is W r with the rates r of the three angles and the axes W, each turned by the angles before
@@ -161,20 +161,20 @@ class SimbodyDrift(Motion):
             return ()
         places = tuple(sorted(set().union(*(turn.coordinates for turn in self.turns))))
         return tuple(
-            AxisMotion("rotate", np.array(axis), places, DriftAngle(self, places, row))
+            AxisMotion("rotate", np.array(axis), places, AccelerationErrorAngle(self, places, row))
             for row, axis in enumerate((X, Y, Z))
         )
 
 
 @dataclass(frozen=True, eq=False)
-class DriftAngle(Function):
-    """An angle that is zero with a rate of zero, whose second derivative is one component of a `SimbodyDrift`.
+class AccelerationErrorAngle(Function):
+    """An angle that is zero with a rate of zero; its second derivative is a component of a `SimbodyAccelerationError`.
 
     Attributes:
         places: of its arguments among the coordinates of the joint.
     """
 
-    drift: SimbodyDrift
+    drift: SimbodyAccelerationError
     places: tuple[int, ...]
     component: int
 

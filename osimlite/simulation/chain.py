@@ -14,14 +14,14 @@ from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.script import ZERO, Matrix, Scalar, Script, Vector, matrix, vector
 
 
-class Placed(NamedTuple):
+class Pose(NamedTuple):
     """A frame in ground."""
 
     rotation: Matrix
     origin: Vector
 
 
-class Column(NamedTuple):
+class JacobianColumn(NamedTuple):
     """What a unit rate of one joint gives: angular velocity of a body, and velocity of a point of it."""
 
     joint: int
@@ -57,16 +57,16 @@ class Chain:
             joint = self.parent(joint)
         return tuple(reversed(found))
 
-    def body(self, script: Script, body: int) -> Placed:
+    def body(self, script: Script, body: int) -> Pose:
         """Frame of a body, or of ground."""
         if body == GROUND:
-            return Placed(matrix(((1, 0, 0), (0, 1, 0), (0, 0, 1))), ZERO)
+            return Pose(matrix(((1, 0, 0), (0, 1, 0), (0, 0, 1))), ZERO)
         link, frame = self._links[body]
 
-        def place() -> Placed:
+        def place() -> Pose:
             return self._moved(script, self._link(script, self._above.get(link.name, -1)), frame)
 
-        placed: Placed = script.once(("body", body), place)
+        placed: Pose = script.once(("body", body), place)
         return placed
 
     def point(self, script: Script, body: int, station: Vector) -> Vector:
@@ -82,7 +82,7 @@ class Chain:
         """A direction fixed in a body."""
         return script.apply(self.body(script, body).rotation, along)
 
-    def columns(self, script: Script, base: int, body: int, point: Vector) -> list[Column]:
+    def columns(self, script: Script, base: int, body: int, point: Vector) -> list[JacobianColumn]:
         """Motion of `body` relative to `base`, the point taken as one of either, by each joint between them."""
         inner, outer = self.path(base), self.path(body)
         found = []
@@ -93,13 +93,13 @@ class Chain:
                 axis, anchor = self.axis(script, joint)
                 axis = script.combine((sign, axis))
                 if self.joints[joint].kind == "prismatic":
-                    found.append(Column(joint, ZERO, axis))
+                    found.append(JacobianColumn(joint, ZERO, axis))
                 else:
                     arm = script.combine((1.0, point), (-1.0, anchor))
-                    found.append(Column(joint, axis, script.cross(axis, arm)))
+                    found.append(JacobianColumn(joint, axis, script.cross(axis, arm)))
         return found
 
-    def velocity(self, script: Script, columns: Sequence[Column], *, turning: bool = False) -> Vector:
+    def velocity(self, script: Script, columns: Sequence[JacobianColumn], *, turning: bool = False) -> Vector:
         """Velocity of the point of some columns, or the angular velocity."""
         return script.combine(
             *((f"r{column.joint}", column.turning if turning else column.moving) for column in columns)
@@ -116,35 +116,35 @@ class Chain:
         return found
 
     # --------------------------------------------------------------------------------------------- helpers
-    def _origin(self, script: Script, joint: int) -> Placed:
+    def _origin(self, script: Script, joint: int) -> Pose:
         """Frame of a joint before its own motion."""
-        placed: Placed = script.once(
+        placed: Pose = script.once(
             ("joint", joint),
             lambda: self._moved(script, self._link(script, self.parent(joint)), self.joints[joint].origin),
         )
         return placed
 
-    def _link(self, script: Script, joint: int) -> Placed:
+    def _link(self, script: Script, joint: int) -> Pose:
         """Frame of the link that a joint moves, or of ground."""
         if joint < 0:
             return self.body(script, GROUND)
 
-        def make() -> Placed:
+        def make() -> Pose:
             start = self._origin(script, joint)
             if self.joints[joint].kind == "prismatic":
                 axis, _ = self.axis(script, joint)
-                return Placed(start.rotation, script.combine((1.0, start.origin), (f"q{joint}", axis)))
+                return Pose(start.rotation, script.combine((1.0, start.origin), (f"q{joint}", axis)))
             turn = _turn(script, vector(self.joints[joint].axis), f"q{joint}")
-            return Placed(script.multiply(start.rotation, turn), start.origin)
+            return Pose(script.multiply(start.rotation, turn), start.origin)
 
-        placed: Placed = script.once(("link", joint), make)
+        placed: Pose = script.once(("link", joint), make)
         return placed
 
     @staticmethod
-    def _moved(script: Script, start: Placed, frame: object) -> Placed:
+    def _moved(script: Script, start: Pose, frame: object) -> Pose:
         rows = [list(row) for row in frame]  # type: ignore[attr-defined]
         turn, shift = matrix(row[:3] for row in rows[:3]), vector(row[3] for row in rows[:3])
-        return Placed(
+        return Pose(
             script.multiply(start.rotation, turn),
             script.combine((1.0, start.origin), (1.0, script.apply(start.rotation, shift))),
         )

@@ -15,7 +15,7 @@ import numpy as np
 from osimlite.multibody.functions import IDENTITY, Function, Univariate
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.motions import DriftAngle
+from osimlite.multibody.motions import AccelerationErrorAngle
 from osimlite.multibody.spatial import Array
 from osimlite.robot.lines import as_line
 from osimlite.robot.robot import RobotJoint
@@ -57,13 +57,13 @@ class Reduction:
         self._single: list[tuple[int, Univariate, int]] = []
         self._several: list[tuple[int, Function, list[int], list[int], list[int]]] = []
         # The three angles of one CustomJoint at once; the last list has their rows.
-        self._drifts: dict[object, tuple[DriftAngle, list[int], list[int], list[int], list[int]]] = {}
+        self._drifts: dict[object, tuple[AccelerationErrorAngle, list[int], list[int], list[int], list[int]]] = {}
         for row, joint in enumerate(joints):
             places = list(joint.coordinates)
             moving = [k for k, place in enumerate(places) if place in number]
             columns = [number[places[k]] for k in moving]
             line = as_line(joint.function) if len(places) == 1 else None
-            if isinstance(joint.function, DriftAngle):
+            if isinstance(joint.function, AccelerationErrorAngle):
                 key = (id(joint.function.drift), joint.coordinates)
                 drift = self._drifts.setdefault(key, (joint.function, places, moving, columns, [0, 0, 0]))
                 drift[-1][joint.function.component] = row

@@ -25,10 +25,10 @@ from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.options import Options
 from osimlite.simulation.recorder import Recorder
-from osimlite.simulation.start import doubt_of, in_units_of, starting, state_in
+from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Stepper
-from osimlite.simulation.summary import course, outcome, versions
+from osimlite.simulation.summary import integration_summary, result_summary, versions
 from osimlite.simulation.trajectory import Report, Trajectory
 
 QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -143,7 +143,7 @@ class Simulation:
             initial = self.state_in(initial)
         for name, value in (initial or {}).items():
             if name not in self.paths:
-                tell(doubt_of(self.mechanism.coordinates[self.mechanism.coordinate_index(name)], name, value))
+                tell(suspect_value(self.mechanism.coordinates[self.mechanism.coordinate_index(name)], name, value))
         initial, initial_speeds = (
             {
                 name: float(value) if name in self.paths else in_units_of(self.mechanism, name, value)
@@ -245,8 +245,8 @@ class Simulation:
                 "model": self.mechanism.name,
                 "engine": engine.name,
                 "route": engine.route,
-                **course(stepper, settings, wall),
-                **outcome(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
+                **integration_summary(stepper, settings, wall),
+                **result_summary(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
                 "skipped_forces": list(self.forces.skipped),
                 "constraints": self.constraints,
                 "versions": versions(engine),

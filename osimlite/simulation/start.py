@@ -37,7 +37,7 @@ def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
     return read.value
 
 
-def doubt_of(info: CoordinateInfo, name: str, given: float | str) -> str:
+def suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
     """What is odd about a value as people give it: degrees that are taken for radians.
 
     Args:

@@ -15,7 +15,7 @@ Moment = tuple[float, list[float]]
 """Time (s) and state in the engine's order."""
 
 
-def course(stepper: Stepper, settings: Mapping[str, Any], wall: float) -> dict[str, Any]:
+def integration_summary(stepper: Stepper, settings: Mapping[str, Any], wall: float) -> dict[str, Any]:
     """How a motion was followed.
 
     Args:
@@ -33,7 +33,7 @@ def course(stepper: Stepper, settings: Mapping[str, Any], wall: float) -> dict[s
     }
 
 
-def outcome(engine: Engine, recorder: Recorder, start: Moment, end: Moment) -> dict[str, Any]:
+def result_summary(engine: Engine, recorder: Recorder, start: Moment, end: Moment) -> dict[str, Any]:
     """What became of a motion: its energies at both ends, when contacts began and ended, and how hard they pushed.
 
     Args:

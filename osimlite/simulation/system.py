@@ -116,8 +116,8 @@ class System:
         Raises:
             SimulationError: the rates of coordinates are not defined there.
         """
-        status = self.realize(t, y, layout.TOUCHED)
-        if status != layout.FINE:
+        status = self.realize(t, y, layout.FORCE_STAGE)
+        if status != layout.OK:
             raise self.refusal(status, t, y)
         self.note_loads(self._pairs[:, :3])
         return self.found()

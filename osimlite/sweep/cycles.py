@@ -21,7 +21,7 @@ from osimlite._require import require
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.gait.basin import perturbed, walks_from
 from osimlite.gait.cycle import CONVERGED, MOST_STEPS, Cycle, find_cycle, step_matrix
-from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.gait.starts import planted, upright
 from osimlite.gait.stepmap import TIGHT, StepMap
 from osimlite.gait.steps import Walk, walk_many
@@ -150,7 +150,7 @@ class CycleSearch:
             raise SettingError("walkers are drawn at random; vary some values and speeds of coordinates at the start")
         self._least = [item.low for item in plan.variables]
         given: Any = self.variants.given.engine
-        self.footing: Footing = find_footing(given, feet)
+        self.footing: FootContacts = find_footing(given, feet)
         if len(self.footing.feet) != 2:
             raise SettingError(
                 f"a cycle is looked for on two feet; '{given.mechanism.name}' has another number of them"

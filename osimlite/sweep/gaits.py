@@ -18,7 +18,7 @@ from osimlite.gait.stepmap import TIGHT, refuse_constraints
 from osimlite.gait.steps import Walk, walk_many
 from osimlite.sweep.cycles import Candidate, CycleSearch, Found, Progress, along
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.results import refuse_others, spare_strangers
+from osimlite.sweep.results import refuse_others, refuse_overwrite
 from osimlite.sweep.stability import Improvement, cost
 from osimlite.sweep.variables import Floats
 
@@ -157,7 +157,7 @@ def _spare(folder: Path, wanted: dict[str, Any]) -> None:
     try:
         before = dict(json.loads(summary.read_text(encoding="utf-8"))["settings"])
     except (OSError, ValueError, LookupError, TypeError):
-        spare_strangers(folder / name for name in (BEST, CYCLES, SUMMARY))
+        refuse_overwrite(folder / name for name in (BEST, CYCLES, SUMMARY))
     else:
         refuse_others(summary, before, wanted)
 

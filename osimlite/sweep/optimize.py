@@ -19,10 +19,10 @@ from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import KEY, Partial, damage_told, partial_of, schema, spare, spare_strangers
+from osimlite.sweep.results import KEY, Partial, damage_told, partial_of, refuse_overwrite, schema, spare
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
-from osimlite.sweep.search import Enough, Search, method_named
+from osimlite.sweep.search import BudgetExhausted, Search, method_named
 from osimlite.sweep.variables import Floats, refuse_counts
 from osimlite.sweep.variants import Variants
 from osimlite.text import counted
@@ -150,7 +150,7 @@ def optimize(
         )
         evaluations.partial, ended = partial, ""
         try:
-            with suppress(Enough):
+            with suppress(BudgetExhausted):
                 ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
             partial.finish()
         except KeyboardInterrupt:
@@ -200,7 +200,7 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
                 "--resume, or replace them with --force"
             )
     if not force and not path.exists() and not partial_of(path).exists():
-        spare_strangers(path.with_name(name) for name in (BEST, SUMMARY))
+        refuse_overwrite(path.with_name(name) for name in (BEST, SUMMARY))
     partial = Partial(path, table, resume=resume)
     partial.read(evaluations.remember)
     return partial
@@ -249,7 +249,7 @@ class _Evaluations:
         """Costs (k,) of points (k, d) of the cube of the free variables; of those that the budget allows at least."""
         wanted, points = len(points), points[: self.budget - self.count]
         if len(points) == 0:
-            raise Enough
+            raise BudgetExhausted
         values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
         for column, place in enumerate(self.free):
             item = self.plan.variables[place]
@@ -273,7 +273,7 @@ class _Evaluations:
         if self.progress is not None:
             self.progress(self.count, self.budget)
         if len(points) < wanted:
-            raise Enough
+            raise BudgetExhausted
         return np.array(costs)
 
     def _cost(self, status: str, value: float) -> float:

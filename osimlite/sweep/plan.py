@@ -19,7 +19,7 @@ from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.engines import engine_name
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
-from osimlite.simulation.start import doubt_of, in_units_of
+from osimlite.simulation.start import in_units_of, suspect_value
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.variables import Parameter, Range, Variable, variables
 from osimlite.text import did_you_mean
@@ -203,5 +203,5 @@ def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -
     level = in_units_of(mechanism, name, given)
     if not isfinite(level):
         raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")
-    tell(doubt_of(infos[name], name, given))
+    tell(suspect_value(infos[name], name, given))
     return Stop(name, level, is_below)

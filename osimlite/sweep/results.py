@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def defer_sigint() -> Iterator[None]:
     """Put off an interruption by the keyboard until what is within is done."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -128,7 +128,7 @@ def refuse_others(path: Path, before: Mapping[str, Any], wanted: Mapping[str, An
         )
 
 
-def spare_strangers(paths: Iterable[Path]) -> None:
+def refuse_overwrite(paths: Iterable[Path]) -> None:
     """Stop before files are lost of which nothing says that they are results of the same command.
 
     Raises:
@@ -191,7 +191,7 @@ class Partial:
             pa.array(column, field.type, from_pandas=False) for column, field in zip(columns, self.schema, strict=True)
         ]
         batch = pa.record_batch(arrays, schema=self.schema)
-        with undisturbed():
+        with defer_sigint():
             try:
                 self._put(batch)
             except OSError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, partial_of, schema, spare, undisturbed
+from osimlite.sweep.results import Partial, defer_sigint, partial_of, schema, spare
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
 
@@ -195,7 +195,7 @@ class _Work:
 
     def _save(self) -> None:
         """Write the rows before which none is missing."""
-        with undisturbed():
+        with defer_sigint():
             self._write()
 
     def _write(self) -> None:

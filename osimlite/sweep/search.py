@@ -18,10 +18,10 @@ from osimlite.sweep.variables import Floats
 from osimlite.text import or_known
 
 Ask = Callable[[Floats], Floats]
-"""Costs (k,) of points (k, d); raises `Enough` when no more are wanted."""
+"""Costs (k,) of points (k, d); raises `BudgetExhausted` when no more are wanted."""
 
 
-class Enough(Exception):
+class BudgetExhausted(Exception):
     """There have been as many evaluations as were allowed."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.errors import OsimliteError
 from osimlite.sweep.cycles import CycleSearch, Found, Progress
-from osimlite.sweep.search import Enough, Search, cma, nelder_mead
+from osimlite.sweep.search import BudgetExhausted, Search, cma, nelder_mead
 from osimlite.sweep.variables import Floats
 
 FIRST_REACH, WORST = 0.05, 100.0
@@ -63,7 +63,7 @@ class Improvement:
         def ask(points: Floats) -> Floats:
             nonlocal tried
             if tried >= budget or self._is_enough(self.best) != rounds:
-                raise Enough
+                raise BudgetExhausted
             tried += len(points)
             if progress is not None:
                 progress(min(tried, budget), budget)
@@ -71,7 +71,7 @@ class Improvement:
 
         while tried < budget:
             rounds = self._is_enough(self.best)
-            with suppress(Enough):
+            with suppress(BudgetExhausted):
                 look(ask, Search(self.best.fractions, FIRST_REACH, None, seed, True, budget, TOLERANCE))
             seed += 1
 

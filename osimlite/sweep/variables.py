@@ -27,7 +27,7 @@ from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, quantity
 from osimlite.schema.model import Model
-from osimlite.simulation.start import doubt_of
+from osimlite.simulation.start import suspect_value
 from osimlite.sweep.properties import Place, places
 from osimlite.text import did_you_mean
 
@@ -268,7 +268,7 @@ def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
     assert isinstance(made.target, Start)
     ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
     info = mechanism.coordinates[mechanism.coordinate_index(made.target.coordinate)]
-    odd = (doubt_of(info, made.name, end) for end in ends)
+    odd = (suspect_value(info, made.name, end) for end in ends)
     return next((words for words in odd if words), "")
 
 

@@ -28,7 +28,7 @@ from osimlite.sweep.plan import Plan
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
 
 if TYPE_CHECKING:
-    from osimlite.gait.footing import Footing
+    from osimlite.gait.foot_contacts import FootContacts
 
 PRESSED = 8e-4
 """So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
@@ -214,9 +214,9 @@ class Variants:
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
 
     # ------------------------------------------------------------------------------------------------ helpers
-    def _footing(self, engine: Any) -> Footing:
+    def _footing(self, engine: Any) -> FootContacts:
         """The feet that a walker is planted on."""
-        from osimlite.gait.footing import find_footing
+        from osimlite.gait.foot_contacts import find_footing
 
         if engine.name != "compiled":
             raise SettingError("a walker is planted with --engine compiled only")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.gait.steps import SHORTEST, Walk, along_slope, falls, room_for, walks_of
 from osimlite.sweep.measures import Batch, Measure
 from osimlite.sweep.variables import Floats
@@ -64,17 +64,17 @@ def _measure(name: str, engine: Any, feet: Sequence[str] | None, number: Callabl
     return _made(name, footing, lambda batch: np.array([number(walk) for walk in _walks(footing, batch)], float))
 
 
-def _footing(name: str, engine: Any, feet: Sequence[str] | None) -> Footing:
+def _footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts:
     if engine.name != "compiled":
         raise SettingError(f"the measure '{name}' needs --engine compiled")
     return find_footing(engine, feet)
 
 
-def _made(name: str, footing: Footing, numbers: Callable[[Batch], Floats]) -> Measure:
+def _made(name: str, footing: FootContacts, numbers: Callable[[Batch], Floats]) -> Measure:
     return Measure(name, numbers, tuple(falls(footing)), room_for, True)
 
 
-def _walks(footing: Footing, batch: Batch) -> list[Walk]:
+def _walks(footing: FootContacts, batch: Batch) -> list[Walk]:
     walks: list[Walk] | None = batch.memory.get("walks")
     if walks is None:
         walks = walks_of(batch.engine, batch.starts, batch.runs, footing, numbers=batch.numbers)

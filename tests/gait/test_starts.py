@@ -10,7 +10,7 @@ from osimlite.simulation import Simulation
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
-from osimlite.gait.footing import find_footing
+from osimlite.gait.foot_contacts import find_footing
 from osimlite.gait.starts import carriers, planted, stood, upright
 from osimlite.gait.steps import along_slope
 

@@ -14,7 +14,7 @@ from osimlite.simulation import Simulation
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.gait import steps
-from osimlite.gait.footing import Footing, find_footing
+from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.gait.steps import Walk, along_slope, walk_many
 from osimlite.simulation.run import simulate
 
@@ -33,7 +33,7 @@ def start_of(engine) -> np.ndarray:
 
 
 def test_feet_are_found_by_structure(engine):
-    assert find_footing(engine) == Footing(FEET, ("RHipForce", "LHipForce", "RKneeForce", "LKneeForce"))
+    assert find_footing(engine) == FootContacts(FEET, ("RHipForce", "LHipForce", "RKneeForce", "LKneeForce"))
 
 
 def test_names_decide_nothing_where_the_structure_does():
@@ -46,7 +46,9 @@ def test_names_decide_nothing_where_the_structure_does():
 
 def test_feet_may_be_given(engine):
     footing = find_footing(engine, ["RFootForce + RKneeForce", "LFootForce"])
-    assert footing == Footing((("RFootForce", "RKneeForce"), ("LFootForce",)), ("RHipForce", "LHipForce", "LKneeForce"))
+    assert footing == FootContacts(
+        (("RFootForce", "RKneeForce"), ("LFootForce",)), ("RHipForce", "LHipForce", "LKneeForce")
+    )
     with pytest.raises(OsimliteError, match="'RFotForce'; did you mean 'RFootForce'"):
         find_footing(engine, ["RFotForce", "LFootForce"])
     with pytest.raises(OsimliteError, match="two feet"):
@@ -93,7 +95,7 @@ def follow(events, along, touching=(False, False)) -> Walk:
     contacts = ["RFootForce", "LFootForce", "RHipForce"]
     states = np.arange(len(events), dtype=float)[:, None]
     return steps.follow(
-        Footing(FEET, ("RHipForce",)), contacts, events, states, np.array(along), np.array((*touching, False))
+        FootContacts(FEET, ("RHipForce",)), contacts, events, states, np.array(along), np.array((*touching, False))
     )
 
 
@@ -129,7 +131,7 @@ def test_what_is_a_step():
 
 def test_a_heel_and_a_toe_are_one_foot():
     events = [(0.1, "heel", True), (0.2, "toe", True), (0.5, "heel", False), (0.6, "toe", False), (0.9, "heel", True)]
-    footing = Footing((("heel", "toe"), ("other",)), ())
+    footing = FootContacts((("heel", "toe"), ("other",)), ())
     walk = steps.follow(
         footing,
         ["heel", "toe", "other"],

@@ -65,7 +65,7 @@ VECTORS = (
     *("1e-320 1 1", "1. .5 +1e0", "1.5x 1 1", "a 1 1", "", "1,,1 1", "{1 1 1}", "[1 1 1", "1 1e 1", "<!-- a -->1 1 1"),
     *("1 <!-- a --> 1 1", "<x/>", "1 1 1<x/>"),
 )
-WHOLE = ("4", "0", "-7", "+3", " 2 ", "3.0", "1e1", "abc", "", "4 4", "NaN", "99999999999", "0x3")
+ACCELERATION_STAGE = ("4", "0", "-7", "+3", " 2 ", "3.0", "1e1", "abc", "", "4 4", "NaN", "99999999999", "0x3")
 NUMBERS = ("abc", "", "NaN", "-inf", "1e400", "1e-400", "1,5", "1 2", "5kg", "5e", "nan nan", "<x/>")
 
 DEFAULTS = (
@@ -91,9 +91,9 @@ CASES: dict[str, tuple[str, str, str]] = {
     **{f"scale {text}": (OLD, "<scale_factors>1 1 1<", f"<scale_factors>{text}<") for text in VECTORS},
     **{f"place {text}": (OLD, "<location_in_parent>0 0 0<", f"<location_in_parent>{text}<") for text in VECTORS},
     **{f"frame {text}": (OLD, "<transform>0 0 0 1 0 0<", f"<transform>{text} 1 0 0<") for text in VECTORS},
-    **{f"shown {text}": (OLD, ">4</display_preference", f">{text}</display_preference") for text in WHOLE},
-    **{f"skin {text}": (OLD, ">3</display_preference", f">{text}</display_preference") for text in WHOLE},
-    **{f"path {text}": (OLD, ">1</display_preference", f">{text}</display_preference") for text in WHOLE},
+    **{f"shown {text}": (OLD, ">4</display_preference", f">{text}</display_preference") for text in ACCELERATION_STAGE},
+    **{f"skin {text}": (OLD, ">3</display_preference", f">{text}</display_preference") for text in ACCELERATION_STAGE},
+    **{f"path {text}": (OLD, ">1</display_preference", f">{text}</display_preference") for text in ACCELERATION_STAGE},
     **{f"inertia {text}": (OLD, "<inertia_yy>1<", f"<inertia_yy>{text}<") for text in NUMBERS},
     **{
         f"control {text}": (OLD, "<min_control>0<", f"<min_control>{text}<")

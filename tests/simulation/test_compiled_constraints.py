@@ -168,12 +168,12 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
         y = np.array(simulation.initial_state({}, {}))
     y += np.random.default_rng(1).uniform(-0.02, 0.02, len(y))
     python = System(engine.mechanism, engine.forces, code=PYTHON)
-    assert python.realize(0.0, y.tolist(), layout.WHOLE) == layout.FINE
+    assert python.realize(0.0, y.tolist(), layout.ACCELERATION_STAGE) == layout.OK
     assert python.found() == engine.derivative(0.0, y)
     ends = run_many(engine, [y], 1e-30, accuracy=1e-8)
     room, found = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(len(y))
     room[layout.SCRATCH : layout.SCRATCH + 2] = 1e-9, np.inf
-    assert law_function("project")(python.program.ints, engine.numbers, room, y, found, 0) == layout.FINE
+    assert law_function("project")(python.program.ints, engine.numbers, room, y, found, 0) == layout.OK
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()
 
 

@@ -7,7 +7,7 @@ from types import FunctionType
 import pytest
 
 from osimlite.simulation.engines import sources
-from osimlite.simulation.kernels import hold, least_squares, pointers
+from osimlite.simulation.kernels import constrained_dynamics, least_squares, pointers
 from osimlite.simulation.kernels.table import LAW_MODULES, law_function
 
 
@@ -42,11 +42,11 @@ def test_an_edited_function_concerns_those_that_call_it(changed):
     constants = tuple(0.5 if item == 0.0 else item for item in reflect.__code__.co_consts)
     found = changed(least_squares, "reflect", edited(reflect, co_consts=constants))
     # `project` solves by the addresses of these laws.
-    assert found == {"factorise_law", "minimum_norm_law", "hold"}
+    assert found == {"factorise_law", "minimum_norm_law", "constrained_dynamics"}
 
 
 def test_a_changed_number_concerns_those_that_use_it(changed):
-    assert changed(hold, "SAFE_MASS", 2.0 * hold.SAFE_MASS) == {"hold"}
+    assert changed(constrained_dynamics, "SAFE_MASS", 2.0 * constrained_dynamics.SAFE_MASS) == {"constrained_dynamics"}
 
 
 def test_words_and_places_concern_nobody(changed):
@@ -59,7 +59,7 @@ def test_words_and_places_concern_nobody(changed):
 
 def test_the_settings_of_the_compiler_concern_all(changed, monkeypatch):
     monkeypatch.setattr(sources, "_settings", lambda: "other")
-    assert changed(hold, "SAFE_MASS", hold.SAFE_MASS) == set(LAW_MODULES)
+    assert changed(constrained_dynamics, "SAFE_MASS", constrained_dynamics.SAFE_MASS) == set(LAW_MODULES)
 
 
 def test_what_a_process_keeps_concerns_nobody(changed):

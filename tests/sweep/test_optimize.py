@@ -14,7 +14,7 @@ from osimlite.simulation import Simulation
 from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.run import Interrupted
-from osimlite.sweep.search import METHODS, Enough, Search
+from osimlite.sweep.search import METHODS, BudgetExhausted, Search
 
 pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
@@ -33,7 +33,7 @@ def test_methods_find_the_bottom_of_a_bowl(method):
 
     def ask(points):
         if len(asked) + len(points) > 2000:
-            raise Enough
+            raise BudgetExhausted
         asked.extend(points.tolist())
         return np.sum((points - bottom) ** 2 * (1.0, 10.0, 3.0), axis=1)
 

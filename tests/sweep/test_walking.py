@@ -7,7 +7,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.gait.footing import find_footing
+from osimlite.gait.foot_contacts import find_footing
 from osimlite.gait.starts import planted
 from osimlite.gait.steps import along_slope, walk_many
 from osimlite.models.dynamic_walker import dynamic_walker

@@ -23,7 +23,7 @@ from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.functions import Function, Linear, Scaled
 from osimlite.multibody.joints import TransformAxis, custom
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.motions import DriftAngle, EllipsoidPoint
+from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
@@ -166,7 +166,7 @@ def test_no_function_is_forgotten():
 
     ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.multibody")}
     # An error of Simbody's accelerations is no part of a pose.
-    assert ours - {DriftAngle} == {type(function) for function, _ in FUNCTIONS}
+    assert ours - {AccelerationErrorAngle} == {type(function) for function, _ in FUNCTIONS}
 
     class Other(Function):
         def evaluate(self, arguments):

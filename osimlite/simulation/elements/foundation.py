@@ -34,7 +34,7 @@ from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 from osimlite.simulation.kernels.layout import LINK_WORK, RECORD, WORK_LINK
 from osimlite.simulation.kernels.meshes import MESH_WORK, load_mesh
 from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import station, turning, velocity
+from osimlite.simulation.kernels.points import angular_velocity, station, velocity
 
 Load = tuple[float, float, float, float, float, float, float]
 """Force (N), torque about a point (N·m), and energy (J)."""
@@ -257,7 +257,7 @@ class _Meshes:
         load: Sequence[float] = [0.0] * 7
         if np.linalg.norm(about - other) < first.radius + second.radius:
             u, v = (np.array(velocity(s, w, link, ax, ay, az)) for link in (self.one.link, self.two.link))
-            a, b = (np.array(turning(s, w, link)) for link in (self.one.link, self.two.link))
+            a, b = (np.array(angular_velocity(s, w, link)) for link in (self.one.link, self.two.link))
             (vx, vy, vz), (wx, wy, wz) = (u - v).tolist(), (a - b).tolist()
             load = self.springs.load(one, two, (ax, ay, az), (vx, vy, vz, wx, wy, wz))
         load_mesh(s, w, item, ax, ay, az, *load)

@@ -128,7 +128,7 @@ class Kind:
         scope: dict[str, Any] = {
             **self.geometry.functions(),
             **{name: value for term in self.terms for name, value in term.functions().items()},
-            **{name: getattr(layout, name) for name in ("NUMBERS", "RECORD", "FREEDOMS", "TIME", "FINE")},
+            **{name: getattr(layout, name) for name in ("NUMBERS", "RECORD", "FREEDOMS", "TIME", "OK")},
             "at": pointers.at,
             "law": self.law,
             "__name__": f"{__package__}.kinds.{self.name}",
@@ -168,7 +168,7 @@ class Kind:
         lines += [f"found[{place}] = {name}" for name, place in self.recorded.items()]
         for state, place in of_states.items():
             lines += [f"if i[{place}] > 0:", f"    f[i[{place}]] = {state.rate}"]
-        return "\n    ".join([*lines, *self.geometry.after, "return FINE"]) + "\n"
+        return "\n    ".join([*lines, *self.geometry.after, "return OK"]) + "\n"
 
     @property
     def _heads(self) -> int:

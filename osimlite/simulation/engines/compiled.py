@@ -72,8 +72,8 @@ class CompiledEngine(System):
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
         """(qdot, udot, zdot) at a state."""
-        status = self.realize(t, y, layout.WHOLE)
-        if status != layout.FINE:
+        status = self.realize(t, y, layout.ACCELERATION_STAGE)
+        if status != layout.OK:
             raise self.refusal(status, t, y)
         self.note_loads(self._pairs[:, :3])
         return self.found()

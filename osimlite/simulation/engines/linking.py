@@ -185,7 +185,7 @@ class Program:
             except Exception as error:
                 self.failures.append(error)
                 return layout.FAILED
-            return layout.FINE
+            return layout.OK
 
         return kernel
 

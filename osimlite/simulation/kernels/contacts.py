@@ -7,9 +7,9 @@ The numbers of a pair are the centre and the normal of surface 1 in its link, it
 from __future__ import annotations
 
 from osimlite.forces.hunt_crossley import contact_force, half_space_sphere, sphere_sphere
-from osimlite.simulation.kernels.layout import FINE, NUMBERS, OWN, RECORD
+from osimlite.simulation.kernels.layout import NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import direction, push, station, velocity
+from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
 
 RADIUS = 10
 """Place of the radius of surface 2 among them."""
@@ -25,7 +25,7 @@ def touch_half_space(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     d, px, py, pz = half_space_sphere(ox, oy, oz, nx, ny, nz, cx, cy, cz, p[10], p[12])
     if d > 0.0:
         press(s, x, w, item, d, p[10], nx, ny, nz, px, py, pz)
-    return FINE
+    return OK
 
 
 def touch_spheres(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -37,7 +37,7 @@ def touch_spheres(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
     d, radius, nx, ny, nz, px, py, pz = sphere_sphere(ox, oy, oz, p[6], cx, cy, cz, p[10], p[12])
     if d > 0.0:
         press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
-    return FINE
+    return OK
 
 
 def press(
@@ -64,5 +64,5 @@ def press(
     )
     found[0], found[1], found[2], found[3], found[4], found[5] = fx, fy, fz, px, py, pz
     found[6], found[7] = d, radius
-    push(s, w, two, px, py, pz, fx, fy, fz)
-    push(s, w, one, px, py, pz, -fx, -fy, -fz)
+    apply_force(s, w, two, px, py, pz, fx, fy, fz)
+    apply_force(s, w, one, px, py, pz, -fx, -fy, -fz)

@@ -11,18 +11,18 @@ from __future__ import annotations
 from osimlite.simulation.kernels.layout import (
     ABOVE,
     ACCELERATION,
+    CONSTRAINED,
+    CONSTRAINED_DYNAMICS,
     CONTACT_WORK,
     CONTACTS,
     DEPTH,
     DEPTH_OF,
     END_FREEDOM,
-    FINE,
     FIRST_FREEDOM,
+    FORCE_STAGE,
     FREEDOM_AT,
     FREEDOM_INTS,
     FREEDOMS,
-    HELD,
-    HOLD,
     INERTIA,
     INERTIA_AT,
     ITEM_AT,
@@ -33,17 +33,17 @@ from osimlite.simulation.kernels.layout import (
     LINK_INTS,
     LINK_WORK,
     LINKS,
-    MOVED,
+    OK,
     ORIGIN,
     PARENT,
-    PLACED,
     POSITION,
+    POSITION_STAGE,
     ROTATION,
     ROW,
     SINGULAR_MASS,
     STATE_SIZE,
-    TOUCHED,
     VELOCITY,
+    VELOCITY_STAGE,
     WORK_COLUMN,
     WORK_CONTACT,
     WORK_LINK,
@@ -57,36 +57,36 @@ SMALLEST_PIVOT = 1e-13
 """What of the inertia that a speed moves must be left after all others that it carries are free."""
 
 
-def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, how_far: int) -> int:
+def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
     """The derivative f of the state y = (q, u, z); what else there is to know stays in `w`. Nothing depends on z.
 
     Returns:
-        FINE or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
+        OK or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
     """
     place(s, x, w, y, f)
-    if how_far == PLACED:
-        return FINE
+    if stage == POSITION_STAGE:
+        return OK
     status = move(s, x, w, y, f)
-    if status != FINE or how_far == MOVED:
+    if status != OK or stage == VELOCITY_STAGE:
         return status
-    if how_far == TOUCHED:
-        unload(s, w)
-        status = push_all(s, x, w, y, f)
-        collect(s, w, at(f, s[FREEDOMS]))
+    if stage == FORCE_STAGE:
+        clear_wrenches(s, w)
+        status = apply_forces(s, x, w, y, f)
+        generalized_forces(s, w, at(f, s[FREEDOMS]))
         return status
-    weigh(s, x, w)
-    status = push_all(s, x, w, y, f)
-    if status != FINE:
+    spatial_inertias_and_bias(s, x, w)
+    status = apply_forces(s, x, w, y, f)
+    if status != OK:
         return status
     right = at(f, s[FREEDOMS])
-    gather(s, w, right)
-    if s[HELD] > 0:
-        return call(s[LAWS + s[s[HELD] + HOLD]], s, x, w, y, f, 0)
+    composite_rigid_body(s, w, right)
+    if s[CONSTRAINED] > 0:
+        return call(s[LAWS + s[s[CONSTRAINED] + CONSTRAINED_DYNAMICS]], s, x, w, y, f, 0)
     singular = solve(s, w, right)
     if singular >= 0:
         f[0] = singular
         return SINGULAR_MASS
-    return FINE
+    return OK
 
 
 def momentum(
@@ -104,7 +104,7 @@ def momentum(
     )
 
 
-def weigh(s: Ints, x: Floats, w: Floats) -> None:
+def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
     """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
     for link in range(s[LINKS]):
         b, here = at(x, INERTIA_AT + 10 * link), at(w, s[WORK_LINK] + LINK_WORK * link)
@@ -139,7 +139,7 @@ def weigh(s: Ints, x: Floats, w: Floats) -> None:
         load[5] = -hz - (wx * ly - wy * lx)
 
 
-def unload(s: Ints, w: Floats) -> None:
+def clear_wrenches(s: Ints, w: Floats) -> None:
     """No wrench on any link."""
     for link in range(s[LINKS]):
         load = at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
@@ -147,11 +147,11 @@ def unload(s: Ints, w: Floats) -> None:
             load[k] = 0.0
 
 
-def push_all(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
+def apply_forces(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     """Add what all items push to the wrenches, or to the generalized forces behind the rates in f.
 
     Returns:
-        FINE, or what the kernel of an item says; then f[0] is the number of the item.
+        OK, or what the kernel of an item says; then f[0] is the number of the item.
     """
     for number in range(s[FREEDOMS], s[STATE_SIZE]):
         f[number] = 0.0
@@ -161,13 +161,13 @@ def push_all(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     for number in range(s[ITEMS]):
         item = s[s[ITEM_AT] + number]
         status = call(s[item + LAW], s, x, w, y, f, item)
-        if status != FINE:
+        if status != OK:
             f[0] = number
             return status
-    return FINE
+    return OK
 
 
-def collect(s: Ints, w: Floats, right: Floats) -> None:
+def generalized_forces(s: Ints, w: Floats, right: Floats) -> None:
     """The generalized forces of the wrenches, inwards from the leaves."""
     columns = at(w, s[WORK_COLUMN])
     for link in range(s[LINKS] - 1, -1, -1):
@@ -182,7 +182,7 @@ def collect(s: Ints, w: Floats, right: Floats) -> None:
                 above[k] += load[k]
 
 
-def gather(s: Ints, w: Floats, right: Floats) -> None:
+def composite_rigid_body(s: Ints, w: Floats, right: Floats) -> None:
     """Mass matrix, and the generalized forces, inwards from the leaves."""
     freedoms, columns = at(s, s[FREEDOM_AT]), at(w, s[WORK_COLUMN])
     for link in range(s[LINKS] - 1, -1, -1):

@@ -16,9 +16,9 @@ from osimlite.simulation.kernels.layout import (
     ARGUMENTS,
     CURVATURE,
     EXTRA,
-    FINE,
     FREEDOMS,
     GRADIENT,
+    OK,
     OPERATION_AT,
     OPERATION_INTS,
     OPERATION_WORK,
@@ -147,7 +147,7 @@ def amount_by_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation
     speed = y[s[FREEDOMS] + freedom] if freedom >= 0 else 0.0
     a[AMOUNT], a[RATE], a[CURVATURE] = value, slope * speed, curvature * speed * speed
     w[j[GRADIENT]] = slope
-    return FINE
+    return OK
 
 
 def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
@@ -155,7 +155,7 @@ def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, opera
     j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
     size, arguments, constants, gradient = j[ARGUMENT_COUNT], at(s, j[ARGUMENTS]), at(x, j[EXTRA]), at(w, j[GRADIENT])
     a[AMOUNT], a[RATE], a[CURVATURE] = several_at(size, arguments, constants, y, at(y, s[FREEDOMS]), gradient)
-    return FINE
+    return OK
 
 
 def several_at(

@@ -31,7 +31,7 @@ WORK_SIZE = 17
 """Length of w."""
 CONTACT_AT = 18
 """Where the places of the records of the pairs stand, by contact."""
-HELD = 19
+CONSTRAINED = 19
 """Place of the record of all constraints, 0 if there are none."""
 STATE_SIZE = 20
 """Length of a state: values, speeds, and auxiliary states."""
@@ -61,8 +61,9 @@ LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
 """Of an item: address of its kernel, places in x and w of what it owns there, number of the first contact of its
 element, and from OWN on integers of its own."""
 
-HOLD, PROJECT, BONDS, BOND_AT, EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
-"""Of all constraints: the laws that find accelerations and that project states; count of the bonds, and where the
+CONSTRAINED_DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = 0, 1, 2, 3
+EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 4, 5, 6, 7, 8, 9
+"""Of all constraints: the laws that find accelerations and that project states; count of the constraints, and where the
 places of their records stand; counts of the equations, of those that bind positions, and of coordinates that are just
 locked; count of the balls, and where the places of their arguments stand; count of the numbers of the mass matrix."""
 WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = 10, 11, 12, 13
@@ -71,11 +72,11 @@ WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = 14, 15, 16, 17
 """Places in w of room: for (m, n) numbers, for a factor of them, for solving, for states."""
 FACTORISE, MINIMUM_NORM = 18, 19
 """The laws that factorise equations, and that solve them then."""
-HELD_INTS = 20
+CONSTRAINED_INTS = 20
 
-FIRST_EQUATION, END_EQUATION, END_POSITION, BOND_OWN = 2, 3, 4, 5
-"""Of a bond, after its law and the place of its numbers: its equations, of which those up to the second end bind
-positions, and from BOND_OWN on integers of its own."""
+FIRST_EQUATION, END_EQUATION, END_POSITION, CONSTRAINT_OWN = 2, 3, 4, 5
+"""Of a constraint, after its law and the place of its numbers: its equations, of which those up to the second end bind
+positions, and from CONSTRAINT_OWN on integers of its own."""
 
 # Numbers.
 GRAVITY_AT, INERTIA_AT = 0, 3
@@ -104,12 +105,12 @@ FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
 # Kinds.
 TURN, SLIDE, BALL, BALL_BACK, DRIFT = 0, 1, 2, 3, 4
 """Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one that is passed from end to
-start, a SimbodyDrift."""
+start, a SimbodyAccelerationError."""
 NOTHING, SHIFT, MOVE = 0, 1, 2
 """Fixed transforms: none, a translation, any."""
-FINE, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED = 0, 1, 2, 3, 4
+OK, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED = 0, 1, 2, 3, 4
 """What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined; of a
 projection: too far from where the constraints hold; of a kernel in Python: it raised an error."""
-WHOLE, PLACED, TOUCHED, MOVED = 0, 1, 2, 3
+ACCELERATION_STAGE, POSITION_STAGE, FORCE_STAGE, VELOCITY_STAGE = 0, 1, 2, 3
 """How far an evaluation goes: to the accelerations, to the places of the links, to the forces (those that items apply
 are then in the place of the accelerations), to the velocities."""

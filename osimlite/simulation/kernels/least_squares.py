@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.simulation.kernels.layout import FACTORISE, FREEDOMS, HELD, LAWS, MINIMUM_NORM, SCRATCH
+from osimlite.simulation.kernels.layout import CONSTRAINED, FACTORISE, FREEDOMS, LAWS, MINIMUM_NORM, SCRATCH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 # A factor of count equations for size unknowns: the turned equations with the reflections (count, size), their diagonal
@@ -26,12 +26,12 @@ def factor_room(count: int, size: int) -> int:
 def factored(s: Ints, w: Floats, count: int, a: Floats, smallest: float) -> int:
     """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
     w[SCRATCH] = smallest
-    return call(s[LAWS + s[s[HELD] + FACTORISE]], s, w, w, a, a, count)
+    return call(s[LAWS + s[s[CONSTRAINED] + FACTORISE]], s, w, w, a, a, count)
 
 
 def solved(s: Ints, count: int, a: Floats, values: Floats, room: Floats, x: Floats) -> None:
     """The shortest x that comes nearest to fulfilling equations that were `factored`, see `minimum_norm`."""
-    call(s[LAWS + s[s[HELD] + MINIMUM_NORM]], s, values, room, a, x, count)
+    call(s[LAWS + s[s[CONSTRAINED] + MINIMUM_NORM]], s, values, room, a, x, count)
 
 
 def factorise_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:

@@ -10,20 +10,20 @@ from typing import NamedTuple
 
 from osimlite.simulation.integrators import next_step_size
 from osimlite.simulation.kernels.layout import (
+    ACCELERATION_STAGE,
+    CONSTRAINED,
     CONTACT_WORK,
     CONTACTS,
-    FINE,
+    FORCE_STAGE,
     FREEDOMS,
-    HELD,
     LAWS,
-    PLACED,
+    OK,
+    POSITION_STAGE,
     PROJECT,
     SCRATCH,
     SINGULAR_MASS,
     STATE_SIZE,
     TIME,
-    TOUCHED,
-    WHOLE,
     WORK_CONTACT,
     WORK_STATE,
 )
@@ -147,20 +147,20 @@ def run_several(
             levels,
         )
         endings[k] = run(m, at(states, k * size))
-    return FINE
+    return OK
 
 
-def evaluated(m: Motion, t: float, y: Floats, f: Floats, how_far: int) -> int:
+def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
     """Evaluate at a time."""
     m.w[TIME] = t
-    return call(m.s[LAWS], m.s, m.x, m.w, y, f, how_far)
+    return call(m.s[LAWS], m.s, m.x, m.w, y, f, stage)
 
 
 def projected(m: Motion, t: float, y: Floats, off: Floats, has_errors: int, limit: float) -> bool:
     """Move a state to where the constraints hold, and tell whether they do; see `projection.project`."""
     s, w = m.s, m.w
     w[TIME], w[SCRATCH], w[SCRATCH + 1] = t, m.settings[ACCURACY] / 10.0, limit
-    return call(s[LAWS + s[s[HELD] + PROJECT]], s, m.x, w, y, off, has_errors) == FINE
+    return call(s[LAWS + s[s[CONSTRAINED] + PROJECT]], s, m.x, w, y, off, has_errors) == OK
 
 
 def run(m: Motion, y: Floats) -> int:
@@ -172,13 +172,13 @@ def run(m: Motion, y: Floats) -> int:
     before = at(room, STATES * size)
     after = at(before, s[CONTACTS] + sizes[WATCHES])
     limit = m.settings[LIMIT]
-    if s[HELD] > 0 and sizes[START_HOLDS] == 0 and not projected(m, clock[0], y, f0, 0, inf):
+    if s[CONSTRAINED] > 0 and sizes[START_HOLDS] == 0 and not projected(m, clock[0], y, f0, 0, inf):
         return FAILED
     copy(size, y, y0)
-    status = evaluated(m, clock[0], y0, f0, WHOLE)
+    status = evaluated(m, clock[0], y0, f0, ACCELERATION_STAGE)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
         counts[EVALUATIONS] = 1
-    if status != FINE or not is_finite(size, f0):
+    if status != OK or not is_finite(size, f0):
         return FAILED
     levels_at(m, y0, before)
     note_peaks(m, clock[0])
@@ -193,7 +193,7 @@ def run(m: Motion, y: Floats) -> int:
         if t1 <= t0:
             return FAILED if t1 < t0 else TOO_MANY
         counts[EVALUATIONS] += 1
-        if evaluated(m, t1, y1, f1, WHOLE) != FINE or not is_finite(size, f1):
+        if evaluated(m, t1, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
             return FAILED
         counts[TAKEN] += 1
         clock[0] = t1
@@ -248,10 +248,10 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
         for k in range(size):
             companion[k] = 0.2 * (y1[k] - companion[k])
-        error = norm(m, y0, companion) if status == FINE else inf
+        error = norm(m, y0, companion) if status == OK else inf
         # As in Simbody: what half a step would not mend, neither does the projection.
-        if m.s[HELD] > 0 and error <= 16.0 * accuracy:
-            error = held_error(m, t1, y0, y1, companion)
+        if m.s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
+            error = projected_error(m, t1, y0, y1, companion)
         clock[1] = min(next_step_size(h, error, accuracy, cut), settings[LARGEST_STEP])
         if error <= accuracy:
             return t1
@@ -260,7 +260,7 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         clock[1] = max(clock[1], smallest)
 
 
-def held_error(m: Motion, t1: float, y0: Floats, y1: Floats, errors: Floats) -> float:
+def projected_error(m: Motion, t1: float, y0: Floats, y1: Floats, errors: Floats) -> float:
     """Move the end of a step to where the constraints hold; the norm of the error there."""
     tolerance = m.settings[ACCURACY] / 10.0
     for k in range(m.s[STATE_SIZE]):
@@ -276,7 +276,7 @@ def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) 
     room = at(m.w, m.s[WORK_STATE] + 4 * size)
     ya, fa, fb, fc, companion = room, at(room, size), at(room, 2 * size), at(room, 3 * size), at(room, 4 * size)
     h = t1 - t0
-    status = FINE
+    status = OK
     for stage in range(4):
         # Where the next evaluation is to be.
         y, f, t = ya, fa, t1
@@ -297,8 +297,8 @@ def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) 
             c, y = h / 2.0, companion
             for k in range(size):
                 companion[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
-        status = evaluated(m, t, y, f, WHOLE)
-        if status != FINE and stage < 3:
+        status = evaluated(m, t, y, f, ACCELERATION_STAGE)
+        if status != OK and stage < 3:
             break
     if status == SINGULAR_MASS and not is_finite(size, companion if stage == 3 else ya):
         # A state that is not finite only makes the step smaller.
@@ -337,7 +337,7 @@ def inside(
 ) -> None:
     """State y at a time within a step, where the constraints hold if it can be moved there."""
     cubic(m.s[STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
-    if m.s[HELD] > 0:
+    if m.s[CONSTRAINED] > 0:
         projected(m, t, y, y, 0, inf)
 
 
@@ -407,7 +407,7 @@ def note_events(
                 break
             inside(m, t0, y0, f0, t1, y1, f1, middle, ya)
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
-            evaluated(m, middle, ya, fa, TOUCHED if touch else PLACED)
+            evaluated(m, middle, ya, fa, FORCE_STAGE if touch else POSITION_STAGE)
             levels_at(m, ya, found)
             if (found[number] > 0.0) == rises:
                 high = middle

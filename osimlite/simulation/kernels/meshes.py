@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from osimlite.forces.elastic_foundation import spring_in_half_space, spring_in_sphere, spring_load
-from osimlite.simulation.kernels.layout import CONTACT_AT, DEPTH_OF, FINE, FIRST_CONTACT, NUMBERS, OWN, RECORD
+from osimlite.simulation.kernels.layout import CONTACT_AT, DEPTH_OF, FIRST_CONTACT, NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import direction, push, station, turn, turning, velocity
+from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
 
 SPRINGS = 16
 """Where the springs stand among the numbers: stiffness and middle in the link of each."""
@@ -32,14 +32,14 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     gx, gy, gz = ax - ox, ay - oy, az - oz
     if is_plane:
         if gx * nx + gy * ny + gz * nz >= p[10]:
-            return FINE
+            return OK
     elif gx * gx + gy * gy + gz * gz >= (p[6] + p[10]) * (p[6] + p[10]):
-        return FINE
+        return OK
     ux, uy, uz = velocity(s, w, one, ax, ay, az)
     vx, vy, vz = velocity(s, w, two, ax, ay, az)
     vx, vy, vz = ux - vx, uy - vy, uz - vz
-    ux, uy, uz = turning(s, w, one)
-    wx, wy, wz = turning(s, w, two)
+    ux, uy, uz = angular_velocity(s, w, one)
+    wx, wy, wz = angular_velocity(s, w, two)
     wx, wy, wz = ux - wx, uy - wy, uz - wz
     fx = fy = fz = tx = ty = tz = energy = 0.0
     for k in range(count):
@@ -62,7 +62,7 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
             tz += qz
             energy += stored
     load_mesh(s, w, item, ax, ay, az, fx, fy, fz, tx, ty, tz, energy)
-    return FINE
+    return OK
 
 
 def load_mesh(
@@ -85,10 +85,10 @@ def load_mesh(
     one, two, found = i[OWN], i[OWN + 1], at(w, i[RECORD])
     found[0], found[1], found[2], found[3], found[4], found[5] = fx, fy, fz, ax, ay, az
     found[6], found[7], found[8], found[9] = tx, ty, tz, energy
-    push(s, w, two, ax, ay, az, fx, fy, fz)
-    turn(s, w, two, tx, ty, tz)
-    push(s, w, one, ax, ay, az, -fx, -fy, -fz)
-    turn(s, w, one, -tx, -ty, -tz)
+    apply_force(s, w, two, ax, ay, az, fx, fy, fz)
+    apply_torque(s, w, two, tx, ty, tz)
+    apply_force(s, w, one, ax, ay, az, -fx, -fy, -fz)
+    apply_torque(s, w, one, -tx, -ty, -tz)
     contact = at(w, s[s[s[CONTACT_AT] + i[FIRST_CONTACT] + i[OWN + 2]] + RECORD])
     contact[0], contact[1], contact[2], contact[3], contact[4], contact[5] = fx, fy, fz, ax, ay, az
     if fx != 0.0 or fy != 0.0 or fz != 0.0:

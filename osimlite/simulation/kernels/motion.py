@@ -13,7 +13,6 @@ from osimlite.simulation.kernels.layout import (
     BEFORE,
     CURVATURE,
     END_OPERATION,
-    FINE,
     FIRST_OPERATION,
     FIXED_AT,
     FIXED_NUMBERS,
@@ -30,6 +29,7 @@ from osimlite.simulation.kernels.layout import (
     MOTION,
     MOVE,
     NOTHING,
+    OK,
     OPERATION_AT,
     OPERATION_INTS,
     OPERATION_WORK,
@@ -138,7 +138,7 @@ def set_frame(
 
 def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     """After `place`: velocities, accelerations without udot, columns of the speeds, rates of the coordinates."""
-    status, size = FINE, s[FREEDOMS]
+    status, size = OK, s[FREEDOMS]
     for freedom in range(size):
         f[freedom] = y[size + freedom]
     for k in range(s[SUMMED]):

@@ -12,7 +12,7 @@ from osimlite.errors import UnsupportedError
 from osimlite.multibody.functions import IDENTITY
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyDrift, SphericalMotion
+from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyAccelerationError, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
@@ -20,7 +20,7 @@ from osimlite.simulation.elements.items import ForceElement, Placement, Places
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.merson import STATES
-from osimlite.simulation.kernels.pack_bonds import bond_of, room_for
+from osimlite.simulation.kernels.pack_constraints import constraint_record, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS
 from osimlite.simulation.states import StateLayout
@@ -115,13 +115,13 @@ def _operations(
         chain.reverse()
     found: list[_Operation] = []
     of_motion: dict[int, _Operation] = {}
-    drifts: list[tuple[_Operation, SimbodyDrift]] = []
+    drifts: list[tuple[_Operation, SimbodyAccelerationError]] = []
     for motion in chain:
         places = [own[number] for number in motion.coordinates]
         still = free.isdisjoint(places)
         if isinstance(motion, Fixed):
             frame = frame @ (inverse(motion.matrix) if mobilizer.reversed else motion.matrix)
-        elif isinstance(motion, SimbodyDrift):
+        elif isinstance(motion, SimbodyAccelerationError):
             if motion.elementary() and not free.isdisjoint(own):
                 sign = -1 if mobilizer.reversed else 1
                 found.append(_Operation(at.DRIFT, frame, [], looked_at=[sign, *own[:2]]))
@@ -224,7 +224,7 @@ class _Packer:
         above = self.link_records()
         self.freedom_records(above)
         self.operation_records()
-        self.bond_records(Constrained(self.places.mechanism, order))
+        self.constraint_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
         ints[at.STATE_SIZE] = 2 * size + len(self.states)
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
@@ -311,35 +311,37 @@ class _Packer:
             record = [item.kind, _kind_of(item.before), freedom, law, arguments, len(freedoms), extra, gradient]
             self.ints[start + at.OPERATION_INTS * number : start + at.OPERATION_INTS * (number + 1)] = record
 
-    def bond_records(self, constrained: Constrained) -> None:
+    def constraint_records(self, constrained: Constrained) -> None:
         """Write what constraints need, if there are any."""
         if not constrained.constraints:
             return
         start, size = len(self.ints), self.ints[at.FREEDOMS]
-        head = [0] * at.HELD_INTS
-        self.ints[at.HELD] = start
+        head = [0] * at.CONSTRAINED_INTS
+        self.ints[at.CONSTRAINED] = start
         self.ints += head
-        bonds = [bond_of(item, self.places, self.balls) for item in constrained.constraints]
+        constraints = [constraint_record(item, self.places, self.balls) for item in constrained.constraints]
         records: list[int] = []
         equations = 0
-        for bond in bonds:
+        for constraint in constraints:
             records.append(len(self.ints))
-            end, end_position = equations + bond.equations, equations + bond.positions
-            ints = [x + self.room(bond.room) if k == bond.room_at else x for k, x in enumerate(bond.ints)]
-            self.ints += [self.law(bond.law), len(self.numbers), equations, end, end_position, *ints]
-            self.numbers += bond.numbers
+            end, end_position = equations + constraint.equations, equations + constraint.positions
+            ints = [
+                x + self.room(constraint.room) if k == constraint.room_at else x for k, x in enumerate(constraint.ints)
+            ]
+            self.ints += [self.law(constraint.law), len(self.numbers), equations, end, end_position, *ints]
+            self.numbers += constraint.numbers
             equations = end
-        head[at.HOLD], head[at.PROJECT] = self.law("hold"), self.law("project")
+        head[at.CONSTRAINED_DYNAMICS], head[at.PROJECT] = self.law("constrained_dynamics"), self.law("project")
         head[at.FACTORISE], head[at.MINIMUM_NORM] = self.law("factorise_law"), self.law("minimum_norm_law")
-        head[at.BONDS], head[at.BOND_AT] = len(bonds), len(self.ints)
+        head[at.CONSTRAINTS], head[at.CONSTRAINT_AT] = len(constraints), len(self.ints)
         self.ints += records
         head[at.BALLS], head[at.BALL_AT] = len(self.balls), len(self.ints)
         self.ints += self.balls.values()
-        head[at.EQUATIONS], head[at.POSITIONS] = equations, sum(bond.positions for bond in bonds)
+        head[at.EQUATIONS], head[at.POSITIONS] = equations, sum(constraint.positions for constraint in constraints)
         head[at.LOCKS], head[at.ENTRIES] = constrained.locks, self.entries
         for place, count in room_for(equations, size, self.entries).items():
             head[place] = self.room(count)
-        self.ints[start : start + at.HELD_INTS] = head
+        self.ints[start : start + at.CONSTRAINED_INTS] = head
 
     def item_records(self) -> list[list[tuple[int, int]]]:
         """Write the items; the records of the contacts come first, in their order."""

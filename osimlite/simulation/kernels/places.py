@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, FINE, LAWS, NUMBERS, OWN, PLACED, STATE_SIZE
+from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, LAWS, NUMBERS, OK, OWN, POSITION_STAGE, STATE_SIZE
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
 
@@ -26,11 +26,11 @@ def contact_places(
     pairs, size = s[CONTACTS], s[STATE_SIZE]
     for k in range(count):
         x = at(vectors, each * rows[k])
-        call(s[LAWS], s, x, w, at(states, size * k), room, PLACED)
+        call(s[LAWS], s, x, w, at(states, size * k), room, POSITION_STAGE)
         for pair in range(pairs):
             i, to = at(s, s[s[CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
             a, one, two = at(x, i[NUMBERS]), i[OWN], i[OWN + 1]
             to[0], to[1], to[2] = station(s, w, one, a[0], a[1], a[2])
             to[3], to[4], to[5] = direction(s, w, one, a[3], a[4], a[5])
             to[6], to[7], to[8] = station(s, w, two, a[7], a[8], a[9])
-    return FINE
+    return OK

@@ -44,7 +44,7 @@ def velocity(s: Ints, w: Floats, link: int, x: float, y: float, z: float) -> tup
     return v[3] + v[1] * pz - v[2] * py, v[4] + v[2] * px - v[0] * pz, v[5] + v[0] * py - v[1] * px
 
 
-def turning(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
+def angular_velocity(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
     """Angular velocity of a link."""
     if link < 0:
         return 0.0, 0.0, 0.0
@@ -71,7 +71,7 @@ def acceleration(
     )
 
 
-def twist(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
+def angular_acceleration_bias(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
     """Angular acceleration of a link while the speeds do not change."""
     if link < 0:
         return 0.0, 0.0, 0.0
@@ -79,7 +79,7 @@ def twist(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
     return a[0], a[1], a[2]
 
 
-def push(s: Ints, w: Floats, link: int, x: float, y: float, z: float, fx: float, fy: float, fz: float) -> None:
+def apply_force(s: Ints, w: Floats, link: int, x: float, y: float, z: float, fx: float, fy: float, fz: float) -> None:
     """Apply a force at a point of ground to a link."""
     if link < 0:
         return
@@ -93,7 +93,7 @@ def push(s: Ints, w: Floats, link: int, x: float, y: float, z: float, fx: float,
     load[5] += fz
 
 
-def turn(s: Ints, w: Floats, link: int, tx: float, ty: float, tz: float) -> None:
+def apply_torque(s: Ints, w: Floats, link: int, tx: float, ty: float, tz: float) -> None:
     """Apply a torque to a link."""
     if link < 0:
         return

@@ -5,24 +5,24 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from osimlite.simulation.constrained import FINEST, ITERATIONS, OVERSHOOT, REDUNDANT
-from osimlite.simulation.kernels.hold import bind
+from osimlite.simulation.kernels.constrained_dynamics import bind
 from osimlite.simulation.kernels.layout import (
     BALL_AT,
     BALLS,
-    BOND_AT,
-    BONDS,
+    CONSTRAINED,
+    CONSTRAINT_AT,
+    CONSTRAINTS,
     END_POSITION,
     EQUATIONS,
     FAR,
-    FINE,
     FIRST_EQUATION,
     FREEDOMS,
-    HELD,
     LAWS,
     LOCKS,
-    MOVED,
+    OK,
     POSITIONS,
     SCRATCH,
+    VELOCITY_STAGE,
     WORK_ERRORS,
     WORK_FACTOR,
     WORK_KEPT,
@@ -48,19 +48,19 @@ def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: i
         has_errors: 0 if that is not known.
 
     Returns:
-        FINE if they hold then.
+        OK if they hold then.
     """
-    size, h = s[FREEDOMS], at(s, s[HELD])
+    size, h = s[FREEDOMS], at(s, s[CONSTRAINED])
     tolerance, limit = w[SCRATCH], w[SCRATCH + 1]
     trial = at(w, h[WORK_TRIAL])
     for k in range(2 * size):
         trial[k] = y[k]
     status = bound(s, x, w, trial)
-    if status == FINE:
+    if status == OK:
         status = project_values(s, x, w, trial, off, has_errors, tolerance, limit)
-    if status == FINE:
+    if status == OK:
         status = project_speeds(s, w, trial, at(off, size), has_errors, tolerance, limit)
-    if status == FINE:
+    if status == OK:
         for k in range(2 * size):
             y[k] = trial[k]
     return status
@@ -68,9 +68,9 @@ def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: i
 
 def bound(s: Ints, x: Floats, w: Floats, y: Floats) -> int:
     """All equations at a state."""
-    f = at(w, s[s[HELD] + WORK_TRIAL] + 2 * s[FREEDOMS])
-    status = call(s[LAWS], s, x, w, y, f, MOVED)
-    if status == FINE:
+    f = at(w, s[s[CONSTRAINED] + WORK_TRIAL] + 2 * s[FREEDOMS])
+    status = call(s[LAWS], s, x, w, y, f, VELOCITY_STAGE)
+    if status == OK:
         bind(s, x, w, y, f)
     return status
 
@@ -79,13 +79,13 @@ def project_values(
     s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
 ) -> int:
     """Change the values of a state whose equations are known, and the errors with them; the equations follow."""
-    size, h = s[FREEDOMS], at(s, s[HELD])
+    size, h = s[FREEDOMS], at(s, s[CONSTRAINED])
     count, kept, factor = h[POSITIONS], at(w, h[WORK_KEPT]), at(w, h[WORK_FACTOR])
     errors = at(w, h[WORK_SYSTEM])
     room, step, following = at(errors, count), at(errors, 2 * count), at(w, h[WORK_TRIAL] + 4 * size)
     norm = position_errors(s, w, errors)
     if norm <= tolerance:
-        return FINE
+        return OK
     if not norm <= limit:
         return FAR
     for iteration in range(ITERATIONS):
@@ -97,7 +97,7 @@ def project_values(
         for k in range(size):
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
-        if bound(s, x, w, following) == FINE:
+        if bound(s, x, w, following) == OK:
             norm = position_errors(s, w, errors)
         if iteration > 0 and not norm <= before:
             norm = before
@@ -117,13 +117,13 @@ def project_values(
 
 def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float) -> int:
     """Change the speeds of a state whose equations are known, and their errors with them."""
-    size, h = s[FREEDOMS], at(s, s[HELD])
+    size, h = s[FREEDOMS], at(s, s[CONSTRAINED])
     count, rows, factor = h[EQUATIONS], at(w, h[WORK_ROWS]), at(w, h[WORK_FACTOR])
     errors, scales, u = at(w, h[WORK_SYSTEM]), at(w, h[WORK_TRIAL] + 4 * size), at(y, size)
     room, step = at(errors, count), at(errors, 2 * count)
     norm = speed_errors(s, w, u, errors)
     if norm <= tolerance:
-        return FINE
+        return OK
     if not norm <= limit:
         return FAR
     for k in range(size):
@@ -146,7 +146,7 @@ def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, 
         across(s, count, rows, factor, off, errors, room, step)
         for k in range(size):
             off[k] -= scales[k] * step[k]
-    return FINE
+    return OK
 
 
 def across(
@@ -170,10 +170,10 @@ def across(
 
 def position_errors(s: Ints, w: Floats, errors: Floats) -> float:
     """The errors of the positions one after the other, and their root mean square."""
-    h, count, total = at(s, s[HELD]), 0, 0.0
-    for number in range(h[BONDS]):
-        bond = at(s, s[h[BOND_AT] + number])
-        for row in range(bond[FIRST_EQUATION], bond[END_POSITION]):
+    h, count, total = at(s, s[CONSTRAINED]), 0, 0.0
+    for number in range(h[CONSTRAINTS]):
+        constraint = at(s, s[h[CONSTRAINT_AT] + number])
+        for row in range(constraint[FIRST_EQUATION], constraint[END_POSITION]):
             errors[count] = w[h[WORK_ERRORS] + row]
             total += errors[count] * errors[count]
             count += 1
@@ -182,7 +182,7 @@ def position_errors(s: Ints, w: Floats, errors: Floats) -> float:
 
 def speed_errors(s: Ints, w: Floats, u: Floats, errors: Floats) -> float:
     """The errors of the speeds, and their root mean square."""
-    h, size, total = at(s, s[HELD]), s[FREEDOMS], 0.0
+    h, size, total = at(s, s[CONSTRAINED]), s[FREEDOMS], 0.0
     rows, rates = at(w, h[WORK_ROWS]), at(w, h[WORK_RATES])
     for i in range(h[EQUATIONS]):
         error = -rates[i]
@@ -195,10 +195,10 @@ def speed_errors(s: Ints, w: Floats, u: Floats, errors: Floats) -> float:
 
 def rows_by_values(s: Ints, w: Floats, y: Floats, rows: Floats) -> None:
     """Derivatives of the errors of the positions by the coordinates."""
-    h, size, count = at(s, s[HELD]), s[FREEDOMS], 0
-    for number in range(h[BONDS]):
-        bond = at(s, s[h[BOND_AT] + number])
-        for i in range(bond[FIRST_EQUATION], bond[END_POSITION]):
+    h, size, count = at(s, s[CONSTRAINED]), s[FREEDOMS], 0
+    for number in range(h[CONSTRAINTS]):
+        constraint = at(s, s[h[CONSTRAINT_AT] + number])
+        for i in range(constraint[FIRST_EQUATION], constraint[END_POSITION]):
             row, given = at(rows, size * count), at(w, h[WORK_ROWS] + size * i)
             for k in range(size):
                 row[k] = given[k]

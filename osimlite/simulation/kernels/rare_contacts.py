@@ -9,10 +9,10 @@ from osimlite.simulation.kernels.contacts import press
 from osimlite.simulation.kernels.layout import (
     CONTACT_AT,
     DEPTH_OF,
-    FINE,
     FIRST_CONTACT,
     LAW,
     NUMBERS,
+    OK,
     OWN,
     RECORD,
 )
@@ -35,7 +35,7 @@ def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
     )
     if d > 0.0:
         press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
-    return FINE
+    return OK
 
 
 def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -46,7 +46,7 @@ def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     bx, by, bz = station(s, w, two, p[7], p[8], p[9])
     gx, gy, gz = bx - ax, by - ay, bz - az
     if gx * gx + gy * gy + gz * gz >= (p[6] + p[10]) * (p[6] + p[10]):
-        return FINE
+        return OK
     axx, ayx, azx = direction(s, w, one, p[18], p[19], p[20])
     axy, ayy, azy = direction(s, w, one, p[21], p[22], p[23])
     axz, ayz, azz = direction(s, w, one, p[24], p[25], p[26])
@@ -59,7 +59,7 @@ def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     )  # fmt: skip
     if d > 0.0:
         press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
-    return FINE
+    return OK
 
 
 def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -102,8 +102,8 @@ def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
             if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
                 pair = pair_of(at(links, count), pairs, one, two)
                 if pair >= 0 and separates(s, x, w, y, f, s[s[CONTACT_AT] + i[FIRST_CONTACT] + pair]):
-                    return FINE
-    return FINE
+                    return OK
+    return OK
 
 
 def near(a: Floats, b: Floats, one: float, two: float) -> bool:

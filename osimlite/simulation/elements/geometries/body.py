@@ -14,21 +14,21 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import direction, push, station, turn, velocity
+from osimlite.simulation.kernels.points import apply_force, apply_torque, direction, station, velocity
 
 
 def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:
     """Turn a body about an axis, and another the other way."""
     ax, ay, az = direction(s, w, g[2], gp[0], gp[1], gp[2])
-    turn(s, w, g[0], torque * ax, torque * ay, torque * az)
-    turn(s, w, g[1], -torque * ax, -torque * ay, -torque * az)
+    apply_torque(s, w, g[0], torque * ax, torque * ay, torque * az)
+    apply_torque(s, w, g[1], -torque * ax, -torque * ay, -torque * az)
 
 
 def push_along(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     """Push a body along a direction at a point."""
     px, py, pz = station(s, w, g[1], gp[0], gp[1], gp[2])
     ax, ay, az = direction(s, w, g[2], gp[3], gp[4], gp[5])
-    push(s, w, g[0], px, py, pz, force * ax, force * ay, force * az)
+    apply_force(s, w, g[0], px, py, pz, force * ax, force * ay, force * az)
 
 
 def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
@@ -38,8 +38,8 @@ def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     dx, dy, dz = ax - bx, ay - by, az - bz
     length = sqrt(dx * dx + dy * dy + dz * dz)
     size = force / length if length > 0.0 else 0.0
-    push(s, w, g[0], ax, ay, az, size * dx, size * dy, size * dz)
-    push(s, w, g[1], ax, ay, az, -size * dx, -size * dy, -size * dz)
+    apply_force(s, w, g[0], ax, ay, az, size * dx, size * dy, size * dz)
+    apply_force(s, w, g[1], ax, ay, az, -size * dx, -size * dy, -size * dz)
 
 
 def station_motion(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
@@ -51,7 +51,7 @@ def station_motion(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tup
 
 def push_station(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
     """Push a station; the record then has the force."""
-    push(s, w, g[0], room[0], room[1], room[2], fx, fy, fz)
+    apply_force(s, w, g[0], room[0], room[1], room[2], fx, fy, fz)
     room[0], room[1], room[2] = fx, fy, fz
 
 

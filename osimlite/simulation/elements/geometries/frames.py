@@ -14,7 +14,7 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import direction, push, station, turn, turning, velocity
+from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
 
 DEVIATIONS, LOADS, RATES, R1, R2, ROOM = 12, 18, 24, 30, 39, 48
 """Places in the record, after force and moment on the second frame and the origins of both."""
@@ -44,8 +44,8 @@ def deviate(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> None:
     # The moving frame is carried around by the other.
     ux, uy, uz = velocity(s, w, g[0], bx, by, bz)
     dx, dy, dz, vx, vy, vz = bx - ax, by - ay, bz - az, vx - ux, vy - uy, vz - uz
-    wx, wy, wz = turning(s, w, g[1])
-    ux, uy, uz = turning(s, w, g[0])
+    wx, wy, wz = angular_velocity(s, w, g[1])
+    ux, uy, uz = angular_velocity(s, w, g[0])
     wx, wy, wz = wx - ux, wy - uy, wz - uz
     for k in range(3):
         d[3 + k] = r[k] * dx + r[3 + k] * dy + r[6 + k] * dz
@@ -67,10 +67,10 @@ def load_frames(s: Ints, w: Floats, g: Ints, room: Floats) -> None:
         room[k] = r[3 * k] * loads[3] + r[3 * k + 1] * loads[4] + r[3 * k + 2] * loads[5]
         room[3 + k] = z[3 * k] * mx + z[3 * k + 1] * my + z[3 * k + 2] * mz
     fx, fy, fz, tx, ty, tz = room[0], room[1], room[2], room[3], room[4], room[5]
-    push(s, w, g[1], room[9], room[10], room[11], fx, fy, fz)
-    push(s, w, g[0], room[9], room[10], room[11], -fx, -fy, -fz)
-    turn(s, w, g[1], tx, ty, tz)
-    turn(s, w, g[0], -tx, -ty, -tz)
+    apply_force(s, w, g[1], room[9], room[10], room[11], fx, fy, fz)
+    apply_force(s, w, g[0], room[9], room[10], room[11], -fx, -fy, -fz)
+    apply_torque(s, w, g[1], tx, ty, tz)
+    apply_torque(s, w, g[0], -tx, -ty, -tz)
 
 
 def damped(rate: float, damping: float) -> float:

@@ -11,7 +11,7 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import push, station, velocity
+from osimlite.simulation.kernels.points import apply_force, station, velocity
 
 
 def line(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float]:
@@ -32,8 +32,8 @@ def line(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, 
 def pull_ends(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, tension: float) -> None:
     """Pull at both ends; then the record has force and recorded point of either."""
     fx, fy, fz = tension * room[0], tension * room[1], tension * room[2]
-    push(s, w, g[0], room[3], room[4], room[5], fx, fy, fz)
-    push(s, w, g[1], room[6], room[7], room[8], -fx, -fy, -fz)
+    apply_force(s, w, g[0], room[3], room[4], room[5], fx, fy, fz)
+    apply_force(s, w, g[1], room[6], room[7], room[8], -fx, -fy, -fz)
     room[0], room[1], room[2] = fx, fy, fz
     room[3], room[4], room[5] = station(s, w, g[0], gp[6], gp[7], gp[8])
     room[6], room[7], room[8] = -fx, -fy, -fz

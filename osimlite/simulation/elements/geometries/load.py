@@ -11,7 +11,7 @@ from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.functions import table_of_one, value_at
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import direction, push, station, turn
+from osimlite.simulation.kernels.points import apply_force, apply_torque, direction, station
 
 FRAME = 12
 """Numbers of a frame: rotation by columns and origin in its link."""
@@ -39,10 +39,10 @@ def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) 
             for k in range(3):
                 ex, ey, ez = direction(s, w, link, gp[3 * k], gp[3 * k + 1], gp[3 * k + 2])
                 room[3 + k] = ex * ax + ey * ay + ez * az
-        push(s, w, link, px, py, pz, room[0], room[1], room[2])
+        apply_force(s, w, link, px, py, pz, room[0], room[1], room[2])
     if g[5] > 0:
         turn_vector(s, w, g[1], at(gp, FRAME), at(room, 6))
-        turn(s, w, link, room[6], room[7], room[8])
+        apply_torque(s, w, link, room[6], room[7], room[8])
 
 
 def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, vector: Floats) -> None:

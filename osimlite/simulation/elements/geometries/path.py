@@ -12,7 +12,7 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of,
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import push, station, velocity
+from osimlite.simulation.kernels.points import apply_force, station, velocity
 
 Point = tuple[int, Triple]
 """A body, and a station in it (m)."""
@@ -49,8 +49,8 @@ def pull_path(s: Ints, w: Floats, g: Ints, gp: Floats, tension: float) -> None:
         if part > 0.0:
             by_length = tension / part
             fx, fy, fz = by_length * dx, by_length * dy, by_length * dz
-            push(s, w, links[k - 1], ax, ay, az, fx, fy, fz)
-            push(s, w, links[k], bx, by, bz, -fx, -fy, -fz)
+            apply_force(s, w, links[k - 1], ax, ay, az, fx, fy, fz)
+            apply_force(s, w, links[k], bx, by, bz, -fx, -fy, -fz)
         ax, ay, az = bx, by, bz
 
 

@@ -14,7 +14,7 @@ from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import direction, push, station, velocity
+from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
 
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -41,8 +41,8 @@ def approach(s: Ints, w: Floats, g: Ints, room: Floats) -> tuple[float, float, f
 def push_both(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
     """Push the sphere and, the other way, the half space at the point of contact; the force goes into the record."""
     room[0], room[1], room[2] = fx, fy, fz
-    push(s, w, g[1], room[3], room[4], room[5], fx, fy, fz)
-    push(s, w, g[0], room[3], room[4], room[5], -fx, -fy, -fz)
+    apply_force(s, w, g[1], room[3], room[4], room[5], fx, fy, fz)
+    apply_force(s, w, g[0], room[3], room[4], room[5], -fx, -fy, -fz)
 
 
 class SphereOnPlane(Geometry):

@@ -9,9 +9,9 @@ from osimlite.simulation.kernels.layout import (
     ARGUMENTS,
     CURVATURE,
     EXTRA,
-    FINE,
     FREEDOMS,
     GRADIENT,
+    OK,
     OPERATION_AT,
     OPERATION_INTS,
     OPERATION_WORK,
@@ -54,7 +54,7 @@ def amount_by_arc(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation
     w[j[GRADIENT]], w[j[GRADIENT] + 1] = da, db
     kept[AMOUNT], kept[RATE] = size * v * share, da * ua + db * ub
     kept[CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
-    return FINE
+    return OK
 
 
 def along_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:

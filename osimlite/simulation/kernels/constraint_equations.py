@@ -12,19 +12,19 @@ from math import sqrt
 from osimlite.simulation.kernels.functions import MONOMIALS, several_at, value_at
 from osimlite.simulation.kernels.layout import (
     ABOVE,
-    BOND_OWN,
+    CONSTRAINED,
+    CONSTRAINT_OWN,
     END_EQUATION,
     END_FREEDOM,
-    FINE,
     FIRST_EQUATION,
     FREEDOM_AT,
     FREEDOM_INTS,
     FREEDOMS,
-    HELD,
     LINK_AT,
     LINK_INTS,
     LINK_WORK,
     NUMBERS,
+    OK,
     ORIGIN,
     SCRATCH,
     TIME,
@@ -36,7 +36,14 @@ from osimlite.simulation.kernels.layout import (
     WORK_ROWS,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import acceleration, direction, station, turning, twist, velocity
+from osimlite.simulation.kernels.points import (
+    acceleration,
+    angular_acceleration_bias,
+    angular_velocity,
+    direction,
+    station,
+    velocity,
+)
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
 AXIS, ARM = 0, 1
@@ -51,27 +58,27 @@ COORDINATE_INTS = 3
 """Of a coordinate: its degree of freedom, the place of the arguments of its ball or -1, and its number among these."""
 
 
-def prescribe(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, bond: int) -> int:
+def prescribe(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """A coordinate follows a function of time, whose table is all its numbers."""
-    i, h = at(s, bond), at(s, s[HELD])
-    row, own = i[FIRST_EQUATION], at(i, BOND_OWN)
+    i, h = at(s, constraint), at(s, s[CONSTRAINED])
+    row, own = i[FIRST_EQUATION], at(i, CONSTRAINT_OWN)
     value, slope, curvature = value_at(at(x, i[NUMBERS]), w[TIME])
     w[h[WORK_ERRORS] + row] = y[own[0]] - value
     w[h[WORK_RATES] + row] = slope
     bias = add_coordinate(s, y, f, own, 1.0, at(w, h[WORK_ROWS] + s[FREEDOMS] * row))
     w[h[WORK_DRIFTS] + row] = curvature - bias
-    return FINE
+    return OK
 
 
-def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, bond: int) -> int:
+def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """A coordinate is a function of others.
 
     Its integers are the dependent coordinate, the place of room for the gradient, the count of the others, their
     degrees of freedom, and each coordinate again in full; its numbers the values of coordinates at rest, the dependent
     one first, and the table of the function.
     """
-    i, h, p = at(s, bond), at(s, s[HELD]), at(x, s[bond + NUMBERS])
-    row, own = i[FIRST_EQUATION], at(i, BOND_OWN)
+    i, h, p = at(s, constraint), at(s, s[CONSTRAINED]), at(x, s[constraint + NUMBERS])
+    row, own = i[FIRST_EQUATION], at(i, CONSTRAINT_OWN)
     size, freedoms = own[COORDINATE_INTS + 1], at(own, COORDINATE_INTS + 2)
     others, gradient, constants = at(freedoms, size), at(w, own[COORDINATE_INTS]), at(p, 1)
     if int(constants[size]) >= MONOMIALS:
@@ -90,7 +97,7 @@ def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, bond: int) -> in
         bias += add_coordinate(s, y, f, at(others, COORDINATE_INTS * k), gradient[k], to)
     w[h[WORK_ERRORS] + row] = value - (y[own[0]] if own[0] >= 0 else p[0])
     w[h[WORK_DRIFTS] + row] = -bias - curvature
-    return FINE
+    return OK
 
 
 def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats) -> float:
@@ -121,13 +128,16 @@ def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: floa
     return bias
 
 
-def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, bond: int) -> int:
+def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """Some equations between bodies; its integers and numbers are theirs."""
-    i, h = at(s, bond), at(s, s[HELD])
+    i, h = at(s, constraint), at(s, s[CONSTRAINED])
     first, size = i[FIRST_EQUATION], s[FREEDOMS]
     one, two = at(w, SCRATCH), at(w, SCRATCH + 9)
     for row in range(first, i[END_EQUATION]):
-        own, p = at(i, BOND_OWN + EQUATION_INTS * (row - first)), at(x, i[NUMBERS] + EQUATION_NUMBERS * (row - first))
+        own, p = (
+            at(i, CONSTRAINT_OWN + EQUATION_INTS * (row - first)),
+            at(x, i[NUMBERS] + EQUATION_NUMBERS * (row - first)),
+        )
         a, b, q, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), at(p, 6), p[12]
         to = at(w, h[WORK_ROWS] + size * row)
         follow(s, x, w, a, p, one)
@@ -154,7 +164,7 @@ def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, bond: int) 
         else:
             drift = slip(s, w, b, q, one, two, to)
         w[h[WORK_ERRORS] + row], w[h[WORK_DRIFTS] + row] = error, -drift
-    return FINE
+    return OK
 
 
 def follow(s: Ints, x: Floats, w: Floats, vector: Ints, p: Floats, found: Floats) -> None:
@@ -162,8 +172,8 @@ def follow(s: Ints, x: Floats, w: Floats, vector: Ints, p: Floats, found: Floats
     one, two = vector[1], vector[2]
     if vector[0] == AXIS:
         ex, ey, ez = direction(s, w, one, p[0], p[1], p[2])
-        wx, wy, wz = turning(s, w, one)
-        tx, ty, tz = twist(s, w, one)
+        wx, wy, wz = angular_velocity(s, w, one)
+        tx, ty, tz = angular_acceleration_bias(s, w, one)
         rx, ry, rz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
         found[0], found[1], found[2], found[3], found[4], found[5] = ex, ey, ez, rx, ry, rz
         found[6] = ty * ez - tz * ey + wy * rz - wz * ry
@@ -200,8 +210,8 @@ def slip(s: Ints, w: Floats, arm: Ints, p: Floats, one: Floats, two: Floats, row
     px, py, pz = station(s, w, surface, p[0], p[1], p[2])
     add_force(s, w, surface, px, py, pz, -ex, -ey, -ez, row)
     add_force(s, w, roller, px, py, pz, ex, ey, ez, row)
-    wx, wy, wz = turning(s, w, roller)
-    tx, ty, tz = twist(s, w, roller)
+    wx, wy, wz = angular_velocity(s, w, roller)
+    tx, ty, tz = angular_acceleration_bias(s, w, roller)
     drift: float = (
         one[3] * (vx - wy * bz + wz * by) + one[4] * (vy - wz * bx + wx * bz) + one[5] * (vz - wx * by + wy * bx)
     )

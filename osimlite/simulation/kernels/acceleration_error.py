@@ -1,4 +1,4 @@
-"""The error of Simbody's angular acceleration of a CustomJoint; see `osimlite.multibody.motions.SimbodyDrift`."""
+"""The error of Simbody's angular acceleration of a CustomJoint, as `SimbodyAccelerationError` has it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from osimlite.simulation.kernels.layout import (
     ARGUMENT_COUNT,
     ARGUMENTS,
     AXIS,
-    FINE,
     FREEDOM,
     FREEDOMS,
     GRADIENT,
+    OK,
     OPERATION_AT,
     OPERATION_INTS,
     OPERATION_WORK,
@@ -29,7 +29,7 @@ def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: 
     """Nothing moves."""
     kept, frame = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH)
     kept[POINT], kept[POINT + 1], kept[POINT + 2] = frame[9], frame[10], frame[11]
-    return FINE
+    return OK
 
 
 def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
@@ -68,7 +68,7 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
         found[k] = 0.0
     found[6], found[7], found[8] = py * tz - pz * ty, pz * tx - px * tz, px * ty - py * tx
     found[9], found[10], found[11] = tx, ty, tz
-    return FINE
+    return OK
 
 
 def rate(s: Ints, w: Floats, u: Floats, operation: int) -> float:

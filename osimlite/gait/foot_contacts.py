@@ -16,7 +16,7 @@ _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", r
 
 
 @dataclass(frozen=True)
-class Footing:
+class FootContacts:
     """The contacts of a walker with the ground.
 
     Attributes:
@@ -43,7 +43,7 @@ class _Sole:
     reach: float  # from where the joint holds the body, m
 
 
-def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Footing:
+def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> FootContacts:
     """Tell the feet from what must not touch the ground.
 
     The bodies that touch the ground and carry no other body that does are the ends of the legs. On each, the contact
@@ -77,7 +77,7 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             raise OsimliteError(f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each")
     else:
         given = _feet(engine.mechanism, soles)
-    return Footing(given, tuple(name for name in known if not any(name in foot for foot in given)))
+    return FootContacts(given, tuple(name for name in known if not any(name in foot for foot in given)))
 
 
 def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...], ...]:

@@ -7,9 +7,9 @@ from osimlite.simulation.kernels.layout import (
     AXIS,
     BALL,
     EXTRA,
-    FINE,
     FREEDOMS,
     MOTION,
+    OK,
     OPERATION_AT,
     OPERATION_INTS,
     OPERATION_WORK,
@@ -57,7 +57,7 @@ def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
         pz -= zx * ex + zy * ey + zz * ez
         set_frame(at(kept, AXIS), xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz)
     set_frame(frame, xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz)
-    return FINE
+    return OK
 
 
 def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
@@ -111,4 +111,4 @@ def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: in
     f[angles[0]] = ux + s2 / c2 * across
     f[angles[1]] = c1 * uy + s1 * uz
     f[angles[2]] = -across / c2
-    return FINE
+    return OK

@@ -12,18 +12,18 @@ from osimlite.simulation.constrained import SAFE_COUPLING, SAFE_MASS
 from osimlite.simulation.kernels.dynamics import SMALLEST_PIVOT, solve
 from osimlite.simulation.kernels.layout import (
     ABOVE,
-    BOND_AT,
-    BONDS,
+    CONSTRAINED,
+    CONSTRAINT_AT,
+    CONSTRAINTS,
     DEPTH,
     ENTRIES,
     EQUATIONS,
-    FINE,
     FREEDOM_AT,
     FREEDOM_INTS,
     FREEDOMS,
-    HELD,
     LAW,
     LAWS,
+    OK,
     ROW,
     SINGULAR_MASS,
     WORK_DRIFTS,
@@ -38,9 +38,9 @@ from osimlite.simulation.kernels.least_squares import apply_q, cholesky, factore
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 
-def hold(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
+def constrained_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
     """Solve for the accelerations: the second half of f has the generalized forces before."""
-    h, size = at(s, s[HELD]), s[FREEDOMS]
+    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
     right = at(f, size)
     bind(s, x, w, y, f)
     # Of the mass matrix and the forces, nothing is left when they have been solved for.
@@ -51,26 +51,26 @@ def hold(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> in
     for k in range(size):
         forces[k] = right[k]
     if solve(s, w, right) < 0 and by_multipliers(s, w, right, at(forces, size)):
-        return FINE
+        return OK
     return by_directions(s, w, system, forces, right, at(forces, size))
 
 
 def bind(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
     """Fill in all equations; f has the rates of the coordinates."""
-    h, size = at(s, s[HELD]), s[FREEDOMS]
+    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
     rows, rates = at(w, h[WORK_ROWS]), at(w, h[WORK_RATES])
     for k in range(h[EQUATIONS] * size):
         rows[k] = 0.0
     for k in range(h[EQUATIONS]):
         rates[k] = 0.0
-    for number in range(h[BONDS]):
-        bond = s[h[BOND_AT] + number]
-        call(s[LAWS + s[bond + LAW]], s, x, w, y, f, bond)
+    for number in range(h[CONSTRAINTS]):
+        constraint = s[h[CONSTRAINT_AT] + number]
+        call(s[LAWS + s[constraint + LAW]], s, x, w, y, f, constraint)
 
 
 def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
     """From the accelerations without constraints to those with them, if that is safe; room for (m + 1) m numbers."""
-    h, size = at(s, s[HELD]), s[FREEDOMS]
+    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
     count, freedoms, pivots = h[EQUATIONS], at(s, s[FREEDOM_AT]), at(w, s[WORK_PIVOT])
     for k in range(size):
         if not w[freedoms[FREEDOM_INTS * k + ROW]] > SAFE_MASS * pivots[k]:
@@ -133,9 +133,9 @@ def solve_again(s: Ints, w: Floats, right: Floats) -> None:
 
 def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats) -> int:
     """The accelerations by the null space of the equations; room for 2 n (n + 1) numbers, or 2 m more than that."""
-    h, size = at(s, s[HELD]), s[FREEDOMS]
+    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
     count, rows, drifts, equations = h[EQUATIONS], at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_FACTOR])
-    # All equations weigh the same, but those that are rounding errors.
+    # All equations spatial_inertias_and_bias the same, but those that are rounding errors.
     values, spare = room, at(room, count)
     longest = 0.0
     for i in range(count):
@@ -178,7 +178,7 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
     for j in range(free):
         for k in range(size):
             right[k] += rest[j] * basis[size * j + k]
-    return FINE
+    return OK
 
 
 def times_mass(s: Ints, matrix: Floats, u: Floats, found: Floats) -> None:

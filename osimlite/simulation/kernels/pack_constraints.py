@@ -16,7 +16,7 @@ from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels import layout as at
-from osimlite.simulation.kernels.bonds import ARM, AXIS, DISTANCE, PRODUCT, SLIP
+from osimlite.simulation.kernels.constraint_equations import ARM, AXIS, DISTANCE, PRODUCT, SLIP
 from osimlite.simulation.kernels.functions import function_table, table_of_one
 from osimlite.simulation.kernels.least_squares import factor_room
 
@@ -24,7 +24,7 @@ Balls = Mapping[tuple[int, ...], int]
 """By the degrees of freedom of a ball, where the place of its arguments is."""
 
 
-class Bond(NamedTuple):
+class ConstraintRecord(NamedTuple):
     """One constraint.
 
     Attributes:
@@ -60,8 +60,8 @@ class _Equation(NamedTuple):
     wanted: float = 0.0
 
 
-def bond_of(constraint: Constraint, places: Places, balls: Balls) -> Bond:
-    """The bond that keeps up a constraint.
+def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> ConstraintRecord:
+    """The constraint that keeps up a constraint.
 
     Raises:
         UnsupportedError: there is no law for it, or for its function.
@@ -69,7 +69,7 @@ def bond_of(constraint: Constraint, places: Places, balls: Balls) -> Bond:
     match constraint:
         case Prescribed():
             table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
-            return Bond("prescribe", _coordinate(constraint.coordinate, places, balls), table)
+            return ConstraintRecord("prescribe", _coordinate(constraint.coordinate, places, balls), table)
         case Coupler():
             return _coupler(constraint, places, balls)
         case b.RollingConstraint():
@@ -117,7 +117,7 @@ def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
     return [freedom, -1, 0]
 
 
-def _coupler(constraint: Coupler, places: Places, balls: Balls) -> Bond:
+def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRecord:
     others = constraint.independent
     table = function_table(constraint.function, f"the function of '{constraint.name}'")
     dependent = _coordinate(constraint.dependent, places, balls)
@@ -125,17 +125,17 @@ def _coupler(constraint: Coupler, places: Places, balls: Balls) -> Bond:
     for place in others:
         ints += _coordinate(place, places, balls)
     numbers = [places.locked_value(place) for place in (constraint.dependent, *others)]
-    return Bond("couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent))
+    return ConstraintRecord("couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent))
 
 
-def _between(equations: Sequence[_Equation], positions: int | None = None) -> Bond:
+def _between(equations: Sequence[_Equation], positions: int | None = None) -> ConstraintRecord:
     ints: list[int] = []
     numbers: list[float] = []
     for item in equations:
         ints += [item.kind, *item.first.ints, *item.second.ints]
         numbers += [*item.first.numbers, *item.second.numbers, item.wanted]
     count = len(equations)
-    return Bond("bind_bodies", ints, numbers, count, count if positions is None else positions)
+    return ConstraintRecord("bind_bodies", ints, numbers, count, count if positions is None else positions)
 
 
 def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
