@@ -39,7 +39,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "models as YAML": ("pyyaml",),
     "trajectory.to_frame()": ("pandas",),
     "sweep": ("numpy", "pyarrow", "filelock"),
-    "optimize": ("numpy", "pyarrow", "cma"),
+    "optimize": ("numpy", "pyarrow", "filelock", "cma"),
     "the language server for editors": ("pygls",),
     "comparisons with OpenSim itself, in tests and benchmarks": ("opensim",),
 }
