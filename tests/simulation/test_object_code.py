@@ -43,7 +43,7 @@ def run(address):
 
 def test_what_is_stored_is_found_again(folder):
     assert object_code.load("answer", "one") is None
-    assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    assert run(object_code.keep("answer", "one", object_code.translated(TEXT), "answer")) == 48
     (kept,) = folder.iterdir()
     assert run(object_code.load("answer", "one")) == 48
     # Of other sources.
@@ -59,7 +59,7 @@ def test_what_is_stored_is_found_again(folder):
     ):
         kept.write_bytes(damaged)
         assert object_code.load("answer", "one") is None
-    assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    assert run(object_code.keep("answer", "one", object_code.translated(TEXT), "answer")) == 48
     assert run(object_code.load("answer", "one")) == 48
 
 
@@ -69,7 +69,7 @@ def test_without_a_folder(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(object_code, "_folders", lambda: [blocked / "inside"])
     object_code._tell_once.cache_clear()
     for _ in range(2):
-        assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+        assert run(object_code.keep("answer", "one", object_code.translated(TEXT), "answer")) == 48
     (told,) = caplog.messages
     assert "compiled anew in every run" in told and str(blocked) in told
 
@@ -77,13 +77,13 @@ def test_without_a_folder(tmp_path, monkeypatch, caplog):
 @pytest.mark.parametrize("mode", [0o775, 0o757, 0o1777])
 def test_code_that_others_could_have_written_is_neither_run_nor_kept(folder, caplog, mode):
     """Whoever can write there can choose a checksum that fits."""
-    object_code.store("answer", "one", TEXT, "answer")
+    object_code.keep("answer", "one", object_code.translated(TEXT), "answer")
     folder.chmod(mode)
     assert object_code.load("answer", "one") is None
     object_code._tell_once.cache_clear()
     (kept,) = folder.iterdir()
     kept.unlink()
-    assert run(object_code.store("answer", "one", TEXT, "answer")) == 48
+    assert run(object_code.keep("answer", "one", object_code.translated(TEXT), "answer")) == 48
     assert not list(folder.iterdir()) and f"'{folder}' can be written by others" in caplog.text
 
 

@@ -59,18 +59,6 @@ def _parsed(head: bytes) -> object:
         return None
 
 
-def store(name: str, digest: str, text: str, symbol: str) -> int:
-    """Translate an entry and keep it in a file, if there is a folder for that; returns its address.
-
-    Args:
-        name: of the entry.
-        digest: of the sources.
-        text: in the intermediate language of LLVM.
-        symbol: what it is called there.
-    """
-    return keep(name, digest, translated(text), symbol)
-
-
 def translated(text: str) -> bytes:
     """Code in the object format of the system from the intermediate language of LLVM."""
     code: bytes = _machine().emit_object(llvm.parse_assembly(text))
@@ -78,7 +66,14 @@ def translated(text: str) -> bytes:
 
 
 def keep(name: str, digest: str, code: bytes, symbol: str) -> int:
-    """Keep code in a file, if there is a folder for that; returns the address of the entry. Arguments as of `store`."""
+    """Keep code in a file, if there is a folder for that; returns the address of the entry.
+
+    Args:
+        name: of the entry.
+        digest: of the sources.
+        code: in the object format of the system.
+        symbol: what the entry is called there.
+    """
     told = {"symbol": symbol, "sha256": hashlib.sha256(code).hexdigest()}
     refusals = []
     for folder in _folders():

@@ -102,7 +102,9 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         order += sorted(own & free)
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
-    return _Packer(places, links, ends, forces.elements).packed(tuple(order))
+    return _Packer(places, links, ends, forces.elements, StateLayout(mechanism, order, forces.elements)).packed(
+        tuple(order)
+    )
 
 
 def _operations(
@@ -193,12 +195,19 @@ def _inertia(link: _Link) -> list[float]:
 class _Packer:
     """Puts everything at its place in the vectors."""
 
-    def __init__(self, places: Places, links: list[_Link], ends: list[int], elements: Sequence[ForceElement]) -> None:
+    def __init__(
+        self,
+        places: Places,
+        links: list[_Link],
+        ends: list[int],
+        elements: Sequence[ForceElement],
+        state: StateLayout,
+    ) -> None:
         self.places = places
         self.links = links
         self.ends = ends
         self.elements = elements
-        self.states = StateLayout(places.mechanism, (), elements).variables
+        self.state = state
         self.operations = [operation for link in links for operation in link.operations]
         self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
@@ -226,7 +235,7 @@ class _Packer:
         self.operation_records()
         self.constraint_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
-        ints[at.STATE_SIZE] = 2 * size + len(self.states)
+        ints[at.STATE_SIZE] = self.state.size
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
         ints[at.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
@@ -348,7 +357,6 @@ class _Packer:
         groups = [element.items(self.places) for element in self.elements]
         self.ints[at.CONTACTS] = sum(item.is_contact for group in groups for item in group)
         contact = self.ints[at.WORK_CONTACT] = self.room(at.CONTACT_WORK * self.ints[at.CONTACTS])
-        place_of = {id(state): 2 * self.ints[at.FREEDOMS] + number for number, state in enumerate(self.states)}
         records: list[int] = []
         pairs: list[int] = []
         found: list[list[tuple[int, int]]] = []
@@ -364,8 +372,8 @@ class _Packer:
                     records.append(len(self.ints))
                 self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
                 own = list(item.ints)
-                for at_state, state in zip(item.states, element.states, strict=False):
-                    own[at_state] = place_of[id(state)]
+                for number, at_state in enumerate(item.states):
+                    own[at_state] = self.state.first_of(element) + number
                 self.ints += [0, len(self.numbers), place, first, *own]
                 self.numbers += item.numbers
         self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)

@@ -120,7 +120,3 @@ class GivenLoad(Geometry):
         """They."""
         groups = force.place.groups
         return [record[3 * number + axis] for number in range(3) if groups[number] for axis in range(3)]
-
-
-class PrescribedLoad(GivenLoad):
-    """The load of a component that has its functions itself."""
