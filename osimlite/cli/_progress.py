@@ -19,27 +19,43 @@ if TYPE_CHECKING:
 def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None]]:
     """A progress bar on standard error, if that is a terminal, once the work has taken a second.
 
-    What is yielded takes how much is done, and of how much if that has become known. The library that draws the bar
-    is loaded when it first shows. It has no thread of its own: processes may be started beside it.
+    What is yielded takes how much is done, of how much if that has become known, and what tells more of it, which takes
+    how much is done in a second. The library that draws the bar is loaded when it first shows. It has no thread of its
+    own: processes may be started beside it.
     """
     is_terminal = sys.stderr.isatty()
     due = time.monotonic() + 1.0
     bar: Progress | None = None
 
-    def advance(done: float, of: float | None = None) -> None:
+    def advance(done: float, of: float | None = None, more: Callable[[float], str] | None = None) -> None:
         nonlocal bar, due
         if not is_terminal or (now := time.monotonic()) < due:
             return
         due = now + 0.1
         if bar is None:
             bar = _started(title)
-        bar.update(bar.task_ids[0], completed=done, total=total if of is None else of, refresh=True)
+        bar.update(bar.task_ids[0], completed=done, total=total if of is None else of)
+        if more is not None:
+            bar.update(bar.task_ids[0], more=more(bar.tasks[0].speed or 0.0))
+        bar.refresh()
 
     try:
         yield advance
     finally:
         if bar is not None:
             bar.stop()
+
+
+@contextmanager
+def motion_bar(title: str, to: float) -> Iterator[Callable[[float, float], None]]:
+    """A progress bar for a motion up to a time (s).
+
+    What is yielded takes the time reached and the length of the steps, s.
+    """
+    with progress_bar(title, to) as advance:
+        yield lambda t, step: advance(
+            t, None, lambda rate: f"{t:.6g} s, steps of {step:.2g} s, {rate:.2g} s in a second"
+        )
 
 
 @contextmanager
@@ -94,8 +110,9 @@ def _started(title: str) -> Progress:
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[more]}", markup=False),
     )
     bar = Progress(*columns, console=plain_console(file=unguarded(sys.stderr)), transient=True, auto_refresh=False)
-    bar.add_task(visible(title), total=None)
+    bar.add_task(visible(title), total=None, more="")
     bar.start()
     return bar

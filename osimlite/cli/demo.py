@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from osimlite.cli._console import add_row, plain_console, say, show
-from osimlite.cli._progress import progress_bar
+from osimlite.cli._progress import motion_bar, progress_bar
 from osimlite.text import visible
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _work(tour: _Tour) -> tuple[Model, Trajectory]:
         urdf.write(folder / "urdf")
         tell(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
 
-    with tour.step("Simulate two seconds") as tell, progress_bar("   simulating", 2.0) as progress:
+    with tour.step("Simulate two seconds") as tell, motion_bar("   simulating", 2.0) as progress:
         trajectory = simulate(model, to=2.0, report_interval=0.01, progress=progress)
         trajectory.write(folder)
         difference = distance_to_opensim(trajectory)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from osimlite.cli import _options as options
-from osimlite.cli._console import Facts
-from osimlite.cli._progress import progress_bar
+from osimlite.cli._console import Facts, complain
+from osimlite.cli._progress import motion_bar, progress_bar
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
@@ -63,7 +63,7 @@ def simulate(
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
-    Nothing is written unless the whole simulation succeeds.
+    Nothing is written if the simulation fails. Ctrl-C ends it and keeps what was recorded, without pictures.
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """
@@ -80,6 +80,7 @@ def simulate(
     model = read(file)
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
+    from osimlite.simulation.trajectory import Interrupted
 
     with Simulation(
         model,
@@ -94,17 +95,27 @@ def simulate(
         initial = {} if states is None else simulation.state_in(states)
         initial |= options.quantities(start, simulation.mechanism, "--set")
         speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
-        with progress_bar("simulating", to) as progress:
-            trajectory = simulation.run(
-                to,
-                accuracy=DEFAULT_ACCURACY if accuracy is None else accuracy,
-                fixed_step=LIVE_STEP if gui and fixed_step is None else fixed_step,
-                report_interval=report_interval,
-                initial=initial,
-                initial_speeds=speeds,
-                progress=progress,
+        results = options.results_folder(file, output)
+        try:
+            with motion_bar("simulating", to) as progress:
+                trajectory = simulation.run(
+                    to,
+                    accuracy=DEFAULT_ACCURACY if accuracy is None else accuracy,
+                    fixed_step=LIVE_STEP if gui and fixed_step is None else fixed_step,
+                    report_interval=report_interval,
+                    initial=initial,
+                    initial_speeds=speeds,
+                    progress=progress,
+                )
+        except Interrupted as stopped:
+            trajectory = stopped.trajectory
+            # After many steps, it takes a while to work out what is written.
+            complain(
+                f"interrupted at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'"
             )
-        files = _write(model, trajectory, options.results_folder(file, output), plot=plot, animate=animate)
+            _told(trajectory, _write(model, trajectory, results, plot=False, animate=False)).show()
+            raise typer.Exit(130) from None
+        files = _write(model, trajectory, results, plot=plot, animate=animate)
         _told(trajectory, files).show()
         simulation.hold()
 

@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from osimlite.simulation.storage import read_sto as read_sto
     from osimlite.simulation.storage import write_sto as write_sto
     from osimlite.simulation.table_stream import stream_table as stream_table
+    from osimlite.simulation.trajectory import Interrupted as Interrupted
     from osimlite.simulation.trajectory import Trajectory as Trajectory
 
 __getattr__ = imported_when_used(
     __name__,
     {
+        "Interrupted": "osimlite.simulation.trajectory",
         "Options": "osimlite.simulation.options",
         "Simulation": "osimlite.simulation.run",
         "StoTable": "osimlite.simulation.storage",

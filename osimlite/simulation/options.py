@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from osimlite.errors import SettingError
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.stepper import Progress
 from osimlite.text import or_known
-
-Progress = Callable[[float], object]
-"""Called with the simulated time (s) reached."""
-
 
 PER_RUN = "accuracy", "fixed_step", "report_interval", "initial", "initial_speeds", "progress"
 """The options of a run; the others are chosen when a model is made ready."""
@@ -34,7 +31,8 @@ class Options:
             for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of
             states stands for its last row.
         initial_speeds: generalized speeds that do not start at their default, likewise.
-        progress: called with the simulated time at every recorded moment.
+        progress: called with the simulated time reached and the length of the steps there (both in s), after every
+            step, or after several that are quick.
         route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
             osimlite's own "recursion", or "auto" for the quickest that is possible.
         skip_unsupported: leave out forces that cannot be computed; the summary lists them.

@@ -29,7 +29,7 @@ from osimlite.simulation.start import in_units_of, starting, state_in, suspect_v
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
-from osimlite.simulation.trajectory import Report, Trajectory
+from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
 QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
 """What is not finite is refused by name where it counts; numpy need not warn of it too."""
@@ -49,6 +49,7 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
             `initial`, `initial_speeds`, `skip_unsupported` and the others.
 
     Raises:
+        Interrupted: Ctrl-C ended the motion; it has the trajectory up to there.
         ModelError: the model is not a mechanism, or a name does not exist.
         UnsupportedError: the model has a joint, constraint or force that cannot be computed.
         SimulationError: the motion cannot be computed any further, no pose or speeds fulfil the constraints with what
@@ -158,6 +159,10 @@ class Simulation:
         stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
         recorder.begin(stepper)
         states = stepper.table(times, chosen.progress)
+        times = times[: len(states)]
+        if times[-1] < stepper.time:
+            # Where Ctrl-C ended it, which somebody may want to go on from.
+            times, states = [*times, stepper.time], [*states, stepper.state]
         if not isfinite(sum(states[-1])):
             raise SimulationError("the motion is not finite any more; ask for more accuracy")
         wall = time.perf_counter() - started
@@ -170,7 +175,10 @@ class Simulation:
             **{name: getattr(chosen, name) for name in TOLD},
             **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }
-        return self._trajectory(times, states, stepper, recorder, wanted, wall)
+        trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall)
+        if stepper.interrupted:
+            raise Interrupted(trajectory)
+        return trajectory
 
     def hold(self) -> None:
         """Keep the last pose in the window until somebody closes it; nothing without a window."""

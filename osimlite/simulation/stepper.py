@@ -8,6 +8,7 @@ floats are quicker than arrays here up to some 30 states.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import inf, isfinite
 from typing import Any, Protocol
@@ -16,6 +17,8 @@ from osimlite.errors import SimulationError
 
 Derivative = Callable[[float, list[float]], Sequence[float]]
 Observer = Callable[[float, list[float]], object]
+Progress = Callable[[float, float], object]
+"""Called now and then with the simulated time reached and the present length of the steps, both in s."""
 
 
 class Projection(Protocol):
@@ -64,7 +67,10 @@ class Stepper(ABC):
         derivative: f(time, state).
         evaluations: calls of f so far.
         taken: steps taken so far.
+        interrupted: whether Ctrl-C ended a table.
     """
+
+    interrupted = False
 
     def __init__(
         self,
@@ -127,13 +133,25 @@ class Stepper(ABC):
                 self.step(times[-1])
             yield t, self.at(t)
 
-    def table(self, times: Sequence[float], progress: Callable[[float], object] | None = None) -> Sequence[Any]:
-        """The states at times that do not decrease (s), one row for each; `progress` is called with every time."""
-        rows = []
-        for t, state in self.reports(times):
-            rows.append(state)
-            if progress is not None:
-                progress(t)
+    def table(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
+        """The states at times that do not decrease (s), one row for each, or for those reached when Ctrl-C came.
+
+        Args:
+            times: of the rows, s.
+            progress: called after every step, or after several that are quick.
+        """
+        rows: list[list[float]] = []
+        try:
+            for t in times:
+                while self.time < t:
+                    self.step(times[-1])
+                    if progress is not None:
+                        progress(self.time, self.time - self._previous[0])
+                rows.append(self.at(t))
+        except KeyboardInterrupt:
+            self.interrupted = True
+            # It may have come after a step and before its rows.
+            rows += [self.at(t) for t in times[len(rows) : bisect_right(times, self.time)]]
         return rows
 
     def at(self, t: float) -> list[float]:

@@ -30,6 +30,8 @@ def integration_summary(stepper: Stepper, settings: Mapping[str, Any], wall: flo
         "attempted_steps": stepper.attempted if isinstance(stepper, RungeKuttaMerson) else stepper.taken,
         "evaluations": stepper.evaluations,
         "wall_time_s": wall,
+        "interrupted": stepper.interrupted,
+        "time_reached_s": stepper.time,
     }
 
 

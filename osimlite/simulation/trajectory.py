@@ -157,6 +157,18 @@ class Trajectory:
         return [base / name for name in texts]
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C ended a simulation.
+
+    Attributes:
+        trajectory: up to where it was ended, which is the last moment.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        super().__init__(trajectory)
+        self.trajectory = trajectory
+
+
 class Report:
     """How a trajectory gets what it works out later.
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
+import select
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +37,49 @@ def test_files_and_table(walker, tmp_path):
     assert states.times[-1] == 0.5 and len(states.times) == 51
     assert max(map(len, out.splitlines())) <= 80 and "RFootForce" in out
     assert json.loads((tmp_path / "r" / "summary.json").read_text())["settings"]["initial_speeds"] == {"LKnee_rz": -1.5}
+
+
+@pytest.fixture
+def stiff(tmp_path: Path) -> Path:
+    """A bob between stops, which swings some ten thousand times in a second."""
+    model = osimlite.Model(name="stiff")
+    bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    slide = osimlite.SliderJoint(name="rail", coordinates=[osimlite.Coordinate(name="x", default_value=1.0)])
+    model.add(slide.between(model.ground, bob))
+    stops = {"lower_limit": -0.01, "upper_limit": 0.0, "lower_stiffness": 1e10, "upper_stiffness": 1e10}
+    limit = osimlite.CoordinateLimitForce(name="stop", coordinate="x", damping=0.0, transition=1e-3, **stops)
+    model.add(limit)
+    osimlite.write(model, tmp_path / "stiff.osim")
+    return tmp_path / "stiff.osim"
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+@pytest.mark.parametrize("choice", [("--accuracy", "1e-9"), ("--fixed-step", "1e-8")])
+def test_a_long_run_tells_how_far_it_is_and_keeps_what_it_has_after_ctrl_c(stiff, engine, choice):
+    ours, theirs = pty.openpty()
+    words = ["simulate", stiff.name, "--engine", engine, *choice, "--to", "9", "--report-interval", "9", "--plot"]
+    command = [sys.executable, "-m", "osimlite", *words]
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "160"}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=theirs, text=True, cwd=stiff.parent, env=environment
+    ) as process:
+        said, is_sent = "", False
+        while process.poll() is None or select.select([ours], [], [], 0.0)[0]:
+            if select.select([ours], [], [], 0.1)[0]:
+                said += os.read(ours, 10_000).decode()
+            if "s in a second" in said and not is_sent:
+                process.send_signal(signal.SIGINT)
+                is_sent = True
+        out = process.stdout.read()
+    assert process.returncode == 130, said
+    assert "simulating" in said and "s, steps of " in said and "interrupted at" in said and "Traceback" not in said
+    assert "steps" in out
+    folder = stiff.parent / "stiff"
+    assert sorted(path.name for path in folder.iterdir()) == ["forces.sto", "states.sto", "summary.json"]
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["interrupted"] is True and 0.0 < summary["time_reached_s"] < 9.0
+    for name in ("states.sto", "forces.sto"):
+        assert read_sto(folder / name).times.tolist() == [0.0, summary["time_reached_s"]]
 
 
 def test_fixed_step(walker, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import signal
 from importlib.util import find_spec
 
 import numpy as np
@@ -19,7 +20,8 @@ from osimlite.errors import (
     SimulationError,
     UnsupportedError,
 )
-from osimlite.simulation import Simulation, read_sto
+from osimlite.simulation import Interrupted, Simulation, read_sto
+from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.run import report_times
 
 
@@ -110,10 +112,63 @@ def test_report_times(to, interval, times):
     assert report_times(to, interval)[-1] == to
 
 
-def test_progress_reaches_the_end(pendulum):
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+@pytest.mark.parametrize("fixed_step", [None, 1e-3])
+def test_progress_needs_no_recorded_row(pendulum, engine, fixed_step):
     seen = []
-    osimlite.simulate(pendulum, to=0.5, report_interval=0.1, progress=seen.append)
-    assert seen == pytest.approx([0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    choices = {} if fixed_step is None else {"fixed_step": fixed_step}
+    motion = osimlite.simulate(
+        pendulum, 30.0, engine, report_interval=30.0, progress=lambda *told: seen.append(told), **choices
+    )
+    times, steps = zip(*seen, strict=True)
+    assert len(motion.times) == 2 and len(times) > 2
+    assert list(times) == sorted(set(times)) and times[-1] == 30.0
+    assert min(steps) > 0.0 and (fixed_step is None or steps == pytest.approx([fixed_step] * len(steps)))
+
+
+def interrupting(after: int):
+    """Presses Ctrl-C when it is called for the last of so many times."""
+    left = [after]
+
+    def progress(t: float, step: float) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            signal.raise_signal(signal.SIGINT)
+
+    return progress
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+@pytest.mark.parametrize("choices", [{"accuracy": 1e-9}, {"fixed_step": 7e-3}])
+@pytest.mark.parametrize("after", [1, 2, 5])
+def test_what_was_recorded_before_ctrl_c_is_kept(pendulum, engine, choices, after):
+    with Simulation(pendulum, engine) as simulation:
+        whole = simulation.run(30.0, **choices)
+        with pytest.raises(KeyboardInterrupt) as stopped:
+            simulation.run(30.0, progress=interrupting(after), **choices)
+        assert isinstance(stopped.value, Interrupted)
+        part = stopped.value.trajectory
+        end = part.times[-1]
+        assert 0.0 < end < 30.0
+        # The same rows up to there, and one of where it ended.
+        rows = int(np.searchsorted(whole.times, end))
+        assert len(part.times) == rows + 1
+        assert np.array_equal(part.values[:rows], whole.values[:rows])
+        assert np.array_equal(part.speeds[:rows], whole.speeds[:rows])
+        assert part.summary["interrupted"] is True and part.summary["time_reached_s"] == end
+        assert part.summary["settings"]["to"] == 30.0 and 0 < part.summary["steps"] < whole.summary["steps"]
+        assert whole.summary["interrupted"] is False and whole.summary["time_reached_s"] == 30.0
+        assert part.summary["energy_J"]["end"]["total"] == part.energy["total"][-1]
+
+
+def test_ctrl_c_before_the_first_step(pendulum, monkeypatch):
+    """Within machine code, which is heard only when it ends."""
+    with Simulation(pendulum, "compiled") as simulation:
+        monkeypatch.setattr(Batch, "run", lambda batch: signal.raise_signal(signal.SIGINT))
+        with pytest.raises(Interrupted) as stopped:
+            simulation.run(1.0)
+        part = stopped.value.trajectory
+        assert part.times.tolist() == [0.0] and np.isfinite(part.values).all() and part.summary["steps"] == 0
 
 
 def test_one_simulation_runs_many_times(pendulum):

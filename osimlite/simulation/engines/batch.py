@@ -92,6 +92,10 @@ class Batch:
         self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
         self._room = int(engine.structure[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
 
+    def allow(self, steps: int) -> None:
+        """Let the next call end after so many steps, for which the log must have room."""
+        self._sizes[merson.MOST_LOGGED] = steps
+
     def run(self, first: int = 0, last: int | None = None) -> None:
         """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
         vectors, room = self._vectors, np.zeros(self._room)

@@ -6,11 +6,12 @@ they call. The code serves every model: models and parameters are arrays.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError, SimulationError
@@ -29,11 +30,14 @@ from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import BatchEngine, BatchOptions
 from osimlite.simulation.runs import Runs
-from osimlite.simulation.stepper import Observer, Stepper
+from osimlite.simulation.stepper import Observer, Progress, Stepper
 from osimlite.simulation.system import System
 
-LOGGED_STEPS = 512
-"""So many steps are taken in one call of a motion that is watched."""
+FIRST_STEPS, LOGGED_STEPS = 8, 512
+"""So many steps are taken in the first call of a motion that is watched, and in any other at most."""
+
+CALL_SECONDS = 0.1
+"""About so long a call may take: nothing is told, and Ctrl-C is not heard, before it ends."""
 
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
@@ -183,22 +187,26 @@ class CompiledMerson(RungeKuttaMerson):
 
     def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
         """Yield (time, state) at times that do not decrease, s; the steps are those of the base."""
-        for moments, rows in self._blocks(times):
-            yield from zip(moments, rows.tolist(), strict=True)
+        batch, done = self._batch(times), 0
+        for _ in self._calls(batch):
+            reached = bisect_right(times, self.time)
+            yield from zip(times[done:reached], batch.reports[0, done:reached].tolist(), strict=True)
+            done = reached
 
-    def table(self, times: Sequence[float], progress: Callable[[float], object] | None = None) -> Sequence[Any]:
-        """The states at times that do not decrease (s) as an array."""
-        found = []
-        for moments, rows in self._blocks(times):
-            found.append(rows)
-            if progress is not None:
-                for moment in moments:
-                    progress(moment)
-        table: Any = found[0] if len(found) == 1 else np.concatenate(found)
+    def table(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
+        """The same as of the base as an array."""
+        batch = self._batch(times)
+        try:
+            for step in self._calls(batch):
+                if progress is not None:
+                    progress(self.time, step)
+        except KeyboardInterrupt:
+            self.interrupted = True
+        table: Any = batch.reports[0, : bisect_right(times, self.time)]
         return table  # type: ignore[no-any-return]
 
-    def _blocks(self, times: Sequence[float]) -> Iterator[tuple[Sequence[float], Floats]]:
-        """Times and states, as many as one call of machine code gives."""
+    def _batch(self, times: Sequence[float]) -> Batch:
+        """What goes on from the present state, with reports at these times, s."""
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
         batch = Batch(
@@ -210,22 +218,30 @@ class CompiledMerson(RungeKuttaMerson):
             most_logged=LOGGED_STEPS,
             start_holds=True,
         )
-        (count,), done = batch.counts, 0
-        count[: merson.REPORTED] = self.taken, self.attempted, self.evaluations
-        ending = merson.FULL
+        batch.counts[0, : merson.REPORTED] = self.taken, self.attempted, self.evaluations
+        batch.reports[0, : bisect_right(times, self.time)] = self.state
+        return batch
+
+    def _calls(self, batch: Batch) -> Iterator[float]:
+        """Call machine code until the last report is made; yields the mean length of the steps of each call, s."""
+        (count,) = batch.counts
+        ending, room = merson.FULL, min(FIRST_STEPS, LOGGED_STEPS)
         while ending == merson.FULL:
             count[merson.LOGGED] = 0
+            batch.allow(room)
+            started = perf_counter()
             batch.run()
-            (ending,), logged = batch.endings.tolist(), count[merson.LOGGED]
-            self._put_off.append((batch.log[:logged].copy(), batch.forces[:logged].copy()))
-            self.time, self._next_step = batch.clocks[0].tolist()
-            self.state = batch.states[0].tolist()
-            self.taken, self.attempted, self.evaluations = count[: merson.REPORTED].tolist()
+            room = min(max(1, int(room * min(8.0, CALL_SECONDS / (perf_counter() - started)))), LOGGED_STEPS)
+            (ending,), logged, before = batch.endings.tolist(), int(count[merson.LOGGED]), self.time
+            log = batch.log[:logged].copy(), batch.forces[:logged].copy()
+            clock, state, counts = batch.clocks[0].tolist(), batch.states[0].tolist(), count[: merson.REPORTED].tolist()
+            # Ctrl-C comes between calls of functions: with none here, all of these are set or none is.
+            self._put_off += (log,)
+            (self.time, self._next_step), self.state = clock, state
+            self.taken, self.attempted, self.evaluations = counts
             if ending == merson.FAILED:
                 self._explain()
-            reached = int(count[merson.REPORTED])
-            yield times[done:reached], batch.reports[0, done:reached]
-            done = reached
+            yield (self.time - before) / max(logged, 1)
 
     def catch_up(self) -> None:
         """Call `observe` for all steps that it was not called for."""
