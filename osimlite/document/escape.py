@@ -6,12 +6,13 @@ import re
 
 from osimlite.errors import ModelError
 
-_NO_XML = re.compile("[\\0-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\uffff]")
+NO_XML = re.compile("[\\0-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\uffff]")
+"""Characters that XML cannot hold."""
 
 
 def escape(text: str) -> str:
     """`text` as the content of an element; ModelError if XML cannot hold it."""
-    if not text.isprintable() and (odd := _NO_XML.search(text)):
+    if not text.isprintable() and (odd := NO_XML.search(text)):
         start = odd.start()
         raise ModelError(
             f"no file can hold the last character of '{text[max(0, start - 40) : start + 1]}'; take it out"

@@ -89,6 +89,7 @@ class Simulation:
         paths: of all states, in the order of OpenSim.
     """
 
+    @QUIET
     def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
         self.options = chosen = Options.of(choices)
         # Only Bullet has a window.
@@ -123,6 +124,7 @@ class Simulation:
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._has_inertia = False
 
+    @QUIET
     def run(self, to: float = 2.0, **choices: Any) -> Trajectory:
         """Simulate once.
 

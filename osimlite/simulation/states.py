@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 
 Start = float | Callable[[Sequence[float], Sequence[float]], float]
@@ -45,9 +46,20 @@ def states_of(element: Any) -> tuple[StateVariable, ...]:
 
 
 def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:
-    """Paths of states in the order of their components, as OpenSim names them all; those of one component stay."""
-    rank = {path: number for number, path in enumerate(model.tree().by_path)}
-    return sorted(paths, key=lambda path: rank.get(path.rpartition("/")[0], len(rank)))
+    """Paths of states in the order of their components, as OpenSim names them all.
+
+    Those of one component stay as they are, and so do the coordinates of one joint.
+    """
+    components = model.tree().by_path
+    rank = {path: number for number, path in enumerate(components)}
+
+    def place(path: str) -> int:
+        owner = path.rpartition("/")[0]
+        if isinstance(components.get(owner), Coordinate):
+            owner = owner.rpartition("/")[0]
+        return rank.get(owner, len(rank))
+
+    return sorted(paths, key=place)
 
 
 class StateLayout:

@@ -20,7 +20,8 @@ opensim = pytest.importorskip("opensim")
 
 COMMENT_LINE = re.compile(r"[ \t]*<!--.*?-->\n", re.DOTALL)
 
-COMPONENTS = [tag for tag in tags() if tag != "Model" and issubclass(class_for(tag) or Object, Component)]
+KNOWN = [(tag, class_for(tag) or Object) for tag in tags()]
+COMPONENTS = [tag for tag, cls in KNOWN if tag != "Model" and issubclass(cls, Component) and not cls.since]
 
 
 def filled(cls: type[Object]) -> Object:

@@ -298,5 +298,5 @@ def test_sizes_that_do_not_fit():
         RungeKuttaMerson(lambda t, y: [0.0], 0.0, [1.0, 0.0], 1)
     with pytest.raises(ValueError, match="do not fit"):
         RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, nu=2)
-    with pytest.raises(ValueError, match="qdot"):
-        SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 0, 1e-3)
+    with pytest.raises(ValueError, match="2 coordinates and as many speeds do not fit"):
+        SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 2, 1e-3)
