@@ -27,7 +27,7 @@ from osimlite.simulation.options import Options
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
-from osimlite.simulation.stepper import Stepper
+from osimlite.simulation.stepper import Progress, Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
 from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
@@ -89,7 +89,6 @@ class Simulation:
         paths: of all states, in the order of OpenSim.
     """
 
-    @QUIET
     def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
         self.options = chosen = Options.of(choices)
         # Only Bullet has a window.
@@ -124,7 +123,6 @@ class Simulation:
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._has_inertia = False
 
-    @QUIET
     def run(self, to: float = 2.0, **choices: Any) -> Trajectory:
         """Simulate once.
 
@@ -157,10 +155,7 @@ class Simulation:
         y = self.initial_state(initial, initial_speeds)
         self._require_inertia(y)
         settings = Settings(accuracy=chosen.accuracy, fixed_step=fixed_step, route=self.engine.route, show=chosen.show)
-        recorder = Recorder(self.engine)
-        stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
-        recorder.begin(stepper)
-        states = stepper.table(times, chosen.progress)
+        recorder, stepper, states = self._moved(y, settings, times, chosen.progress)
         times = times[: len(states)]
         if times[-1] < stepper.time:
             # Where Ctrl-C ended it, which somebody may want to go on from.
@@ -199,6 +194,16 @@ class Simulation:
         self.close()
 
     # --------------------------------------------------------------------------------------------- helpers
+    @QUIET
+    def _moved(
+        self, y: list[float], settings: Settings, times: Sequence[float], progress: Progress | None
+    ) -> tuple[Recorder, Stepper, Sequence[Any]]:
+        """What was recorded and integrated from a state, and the states at times (s)."""
+        recorder = Recorder(self.engine)
+        stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
+        recorder.begin(stepper)
+        return recorder, stepper, stepper.table(times, progress)
+
     @QUIET
     def _require_inertia(self, y: Sequence[float]) -> None:
         """SimulationError, the same for all engines, if the first start is one where a motion has no inertia."""

@@ -109,6 +109,8 @@ def test_fixed_step(walker, tmp_path):
     ],
 )
 def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, arguments, code, words):
+    if "--gui" in arguments:
+        pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     found, out, err = run("simulate", walker, *arguments, "-o", "r", folder=tmp_path)
     assert found == code and out == ""
     assert len(err.splitlines()) == 1 and words in err

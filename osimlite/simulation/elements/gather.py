@@ -8,6 +8,8 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
@@ -32,6 +34,7 @@ class Forces:
     skipped: tuple[str, ...] = ()
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def force_elements(
     model: Model,
     mechanism: Mechanism,
