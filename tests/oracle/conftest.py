@@ -11,18 +11,20 @@ from typing import Any
 
 import pytest
 
-PRISTINE: list[Any] = []
-"""One object of each class, as OpenSim makes it before it has read any file."""
+try:
+    import opensim
+except ImportError:
+    PRISTINE: list[Any] = []
+else:
+    _names = opensim.ArrayStr()
+    opensim.OpenSimObject.getRegisteredTypenames(_names)
+    PRISTINE = [opensim.OpenSimObject.newInstanceOfType(_names.get(k)) for k in range(_names.getSize())]
+"""One object of each class, as OpenSim makes it before it has read any file: made while tests are collected."""
 
 
 @pytest.fixture(scope="module", autouse=True)
 def opensims_defaults() -> None:
     """A `<defaults>` block of a file holds for the whole process, in OpenSim: each module starts with its own."""
-    opensim = pytest.importorskip("opensim")
-    if not PRISTINE:
-        names = opensim.ArrayStr()
-        opensim.OpenSimObject.getRegisteredTypenames(names)
-        PRISTINE.extend(opensim.OpenSimObject.newInstanceOfType(names.get(k)) for k in range(names.getSize()))
     for item in PRISTINE:
         opensim.OpenSimObject.registerType(item)
 
