@@ -130,7 +130,8 @@ class ElementBuilder:
         """The element of a force; UnsupportedError, with its path and class for a message, if there is none."""
         from osimlite.simulation.elements.kind import kind_of_class
 
-        kind = kind_of_class(type(force))
+        component: type = type(force)
+        kind = kind_of_class(component)
         if kind is None:
             raise self.unsupported(force)
         element: ForceElement = kind.make(self, force)

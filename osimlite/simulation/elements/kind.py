@@ -14,7 +14,7 @@ from __future__ import annotations
 import linecache
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import iter_modules
@@ -251,10 +251,6 @@ class DeclaredForce:
             return float(kind.stored(self, records[0]))
         return float(records[0][kind.recorded[ENERGY]]) if ENERGY in kind.recorded else 0.0
 
-    def __reduce__(self) -> Any:
-        parts = self.component, self.path, self.name, self.place, self.values, self.optional_states
-        return DeclaredForce, parts
-
 
 def kinds() -> list[Any]:
     """All declarations."""
@@ -267,6 +263,7 @@ def module_name(component: type) -> str:
     return sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", component.__name__).lower()
 
 
+@cache
 def kind_of_class(component: type) -> Any:
     """The declaration of a class of forces, None if there is none."""
     name = f"{__package__}.kinds.{module_name(component)}"

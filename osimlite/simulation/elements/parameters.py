@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -47,7 +48,7 @@ class Tail:
         return self.room - count
 
 
-class Parameter:
+class Parameter(ABC):
     """Something that a law is given of a component.
 
     Attributes:
@@ -58,21 +59,21 @@ class Parameter:
     size: int = 0
     heads: int = 0
 
+    @abstractmethod
     def read(self, builder: ElementBuilder, force: Any) -> Any:
         """Its value, from a component."""
-        raise NotImplementedError
 
+    @abstractmethod
     def arguments(self, head: int, number: int) -> list[str]:
         """What the law is called with; `head` is the place of its integers, `number` that of its numbers."""
-        raise NotImplementedError
 
     def functions(self) -> dict[str, Callable[..., Any]]:
         """What the arguments call, by name."""
         return {}
 
+    @abstractmethod
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Its integers and numbers; what is of variable length goes into the tail."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -43,7 +44,7 @@ def version() -> str:
     return f"Python {platform.python_version()}, without numba"
 
 
-class Code:
+class Code(ABC):
     """What runs the kernels; `COMPILED` and `PYTHON` are the two.
 
     Args:
@@ -53,21 +54,23 @@ class Code:
     def __init__(self, name: str) -> None:
         self.name = name
 
+    @abstractmethod
     def make_ready(self, functions: Sequence[str]) -> None:
         """Compile functions of the kernels together, if that is to be done."""
 
+    @abstractmethod
     def address(self, function: str) -> int:
         """What stands for the address of a function of the kernels."""
-        raise NotImplementedError
 
+    @abstractmethod
     def entry(self, function: str) -> Callable[..., int]:
         """A function of the kernels, called with contiguous arrays and integers."""
-        raise NotImplementedError
 
+    @abstractmethod
     def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
         """The same with its arrays, which the caller keeps; what is left is one integer."""
-        raise NotImplementedError
 
+    @abstractmethod
     def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
         """What stands for the address of a kernel in Python, and what the caller has to keep for it.
 
@@ -75,7 +78,6 @@ class Code:
             python: takes the five arrays and an integer.
             sizes: of the arrays.
         """
-        raise NotImplementedError
 
 
 class _Compiled(Code):
@@ -114,6 +116,9 @@ class _Compiled(Code):
 
 
 class _Python(Code):
+    def make_ready(self, functions: Sequence[str]) -> None:
+        pass
+
     def address(self, function: str) -> int:
         return pointers.address(law_function(function))
 

@@ -10,10 +10,8 @@ import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
 from importlib.metadata import version
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from osimlite._require import require
 from osimlite.simulation.engines.sources import digest_of
 from osimlite.simulation.kernels.table import law_function
 
@@ -21,19 +19,9 @@ if TYPE_CHECKING:
     from osimlite.simulation.engines.side_by_side import Made
 
 
-def _compiler_version() -> str:
-    """Of numba, which is not loaded for that."""
-    try:
-        if find_spec("numba") is not None:
-            return version("numba")
-    except ValueError:
-        pass
-    return str(require("numba", extra="sim", purpose="the compiled engine").__version__)
-
-
 _log = logging.getLogger(__name__)
 
-VERSION = f"numba {_compiler_version()}"
+VERSION = f"numba {version('numba')}"
 
 
 _addresses: dict[str, int] = {}

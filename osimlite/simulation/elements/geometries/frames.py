@@ -78,6 +78,12 @@ def damped(rate: float, damping: float) -> float:
     return rate if damping != 0.0 else 0.0
 
 
+def damp(loads: Floats, rates: Floats, damping: Floats) -> None:
+    """Turn what resists the deviations into loads, and add the damping."""
+    for k in range(6):
+        loads[k] = -loads[k] - damping[k] * damped(rates[k], damping[k])
+
+
 class Frame(NamedTuple):
     """A frame of a bushing: its name, its body, and where it is in the body."""
 

@@ -87,10 +87,10 @@ class BetweenPoints(Geometry):
             word if isinstance(word, str) and self.as_written else frame.name
             for word, frame in zip(words, frames, strict=True)
         ]
-        recorded = (
+        first_point, second_point = (
             triple(frame[:3, :3] @ point + frame[:3, 3]) for frame, point in zip((first, second), points, strict=True)
         )
-        return Ends((names[0], names[1]), (one, two), points, tuple(recorded))  # type: ignore[arg-type]
+        return Ends((names[0], names[1]), (one, two), points, (first_point, second_point))
 
     def pack(self, place: Ends, places: Places) -> tuple[Sequence[int], Sequence[float]]:
         """The links; points and recorded points in them."""

@@ -1,7 +1,7 @@
 """A bushing whose loads are formulas of all its deviations; its energy is not known."""
 
 from osimlite.schema.springs import ExpressionBasedBushingForce
-from osimlite.simulation.elements.geometries.frames import BetweenFrames, damped
+from osimlite.simulation.elements.geometries.frames import BetweenFrames, damp
 from osimlite.simulation.elements.kind import Kind
 from osimlite.simulation.elements.parameters import Expressions, Vector
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
@@ -24,9 +24,9 @@ def bushing(
         registers[k] = deviations[k]
     for k in range(6):
         # Each formula has its count of steps before it, and the place of its constants.
-        value = compute(at(steps, 2), steps[0], at(constants, steps[1]), registers, 6)
-        loads[k] = -value - damping[k] * damped(rates[k], damping[k])
+        loads[k] = compute(at(steps, 2), steps[0], at(constants, steps[1]), registers, 6)
         steps = at(steps, 2 + 3 * steps[0])
+    damp(loads, rates, damping)
 
 
 KIND = Kind(

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from osimlite.schema.springs import FunctionBasedBushingForce
-from osimlite.simulation.elements.geometries.frames import DEVIATIONS, BetweenFrames, damped
+from osimlite.simulation.elements.geometries.frames import DEVIATIONS, BetweenFrames, damp
 from osimlite.simulation.elements.integral import integral
 from osimlite.simulation.elements.kind import DeclaredForce, Kind
 from osimlite.simulation.elements.parameters import Curve, Vector
@@ -30,8 +30,7 @@ def bushing(
     loads[3], _, _ = value_at(fx, deviations[3])
     loads[4], _, _ = value_at(fy, deviations[4])
     loads[5], _, _ = value_at(fz, deviations[5])
-    for k in range(6):
-        loads[k] = -loads[k] - damping[k] * damped(rates[k], damping[k])
+    damp(loads, rates, damping)
 
 
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
