@@ -6,16 +6,15 @@ two meshes are both taken, each with half its area.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.forces.elastic_foundation import spring_in_half_space, spring_in_sphere, spring_load
+from osimlite.forces.elastic_foundation import spring_load
 from osimlite.multibody.spatial import Array, transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
@@ -118,21 +117,20 @@ def _mesh_surface(builder: ElementBuilder, force: Any, geometry: ContactMesh, ma
 
 
 class Springs:
-    """The springs of a pair of surfaces.
+    """The springs of two meshes, each of which has half the area.
 
     Args:
         one: surface 1.
-        two: surface 2, a mesh.
+        two: surface 2.
         vt: transition velocity, m/s.
     """
 
     def __init__(self, one: ContactSurface, two: ContactSurface, vt: float) -> None:
-        assert two.mesh is not None
-        self.one, self.two, self.mesh, self.vt = one, two, two.mesh, vt
-        meshes = [surface for surface in (one, two) if surface.mesh is not None]
-        # Of two meshes, each has half the area.
+        assert one.mesh is not None and two.mesh is not None
+        self.one, self.two, self.vt = one, two, vt
+        self._first, self._second = one.mesh, two.mesh
         self._stiffness = [
-            surface.material[0] / len(meshes) * surface.mesh.areas for surface in meshes if surface.mesh is not None
+            0.5 * surface.material[0] * mesh.areas for surface, mesh in ((one, one.mesh), (two, two.mesh))
         ]
 
     def load(self, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
@@ -144,35 +142,16 @@ class Springs:
             about: point for the torque, m.
             motion: velocity at that point (m/s) and angular velocity (1/s) of surface 1 relative to surface 2.
         """
-        if self.one.mesh is not None:
-            return self._between_meshes(self.one.mesh, one, two, about, motion)
-        middles = two.points(self.mesh.centroids)
-        place = one.points(np.array(self.one.center))
-        find: Callable[..., tuple[float, float, float, float]]
-        if self.one.is_half_space:
-            normal = one.turn @ self.one.normal
-            inside = (middles - place) @ normal < 0.0
-            find = partial(spring_in_half_space, *triple(place), *triple(normal))
-        else:
-            inside = np.linalg.norm(middles - place, axis=1) <= self.one.radius
-            find = partial(spring_in_sphere, *triple(place), self.one.radius)
-        acting = []
-        for k, x, y, z in np.column_stack((self._stiffness[-1], middles))[inside].tolist():
-            depth, *end = find(x, y, z)
-            if depth > 0.0:
-                acting.append((k, x, y, z, *end))
-        return self._sum(self.two, acting, about, motion)
-
-    def _between_meshes(self, first: TriangleMesh, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
-        own = _inside(self._stiffness[0], first, one, self.mesh, two)
-        others = _inside(self._stiffness[1], self.mesh, two, first, one)
+        first, second = self._first, self._second
+        own = _inside(self._stiffness[0], first, one, second, two)
+        others = _inside(self._stiffness[1], second, two, first, one)
         # As in Simbody, a mesh that is wholly within another does not touch it.
         if not (own or others) or not (
             any(
                 mesh.is_one_piece and 0 < len(found) < len(mesh.triangles)
-                for mesh, found in ((first, own), (self.mesh, others))
+                for mesh, found in ((first, own), (second, others))
             )
-            or first.crosses(self.mesh.moved(one.inverse_times(two)))
+            or first.crosses(second.moved(one.inverse_times(two)))
         ):
             return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         vx, vy, vz, wx, wy, wz = motion
