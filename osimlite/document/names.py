@@ -13,8 +13,8 @@ _COLON = "\u02d0"
 _XMLNS = "xml\u0274s"
 _STAND_INS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
 
-ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?:\"[^\"]*+\"|'[^']*+')")
-"""An attribute in a start tag."""
+ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?P<quoted>\"[^\"]*+\"|'[^']*+')")
+"""An attribute in a start tag, and its value with the quotation marks."""
 _COLONS = re.compile(b":")
 _NAMESPACE = re.compile(rb"(?<=\s)xmlns(?=\s*=)")
 _TAG_SO_FAR = re.compile(

@@ -11,13 +11,21 @@ from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
+from osimlite.document.names import ATTRIBUTE
 from osimlite.document.spans import PlainSpans, Span, spans_of
 from osimlite.files import read_file
 
 _BLOCK = 4096
 """Characters between the places whose line is known at once."""
 
-_ATTRIBUTE = re.compile(r"""\s+([^\s=]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+
+class Attribute(NamedTuple):
+    """An attribute in the text: where the blanks before it begin, where it does, its end, and its value as written."""
+
+    before: int
+    start: int
+    end: int
+    value: str
 
 
 class Position(NamedTuple):
@@ -44,7 +52,7 @@ class Source:
         """Whether there is text beside elements, where that has been looked for in a well-formed text."""
         self.attributes: bool | None = None
         """Whether there are attributes without a meaning, where they have been looked for in a well-formed text."""
-        self._attributes: dict[int, dict[str, tuple[int, int, int]]] = {}
+        self._attributes: dict[int, dict[str, Attribute]] = {}
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
 
@@ -70,12 +78,15 @@ class Source:
         source.data, source.text = text.encode("utf-8", "replace"), text
         return source
 
-    def attributes_of(self, number: int) -> dict[str, tuple[int, int, int]]:
-        """By the name of each attribute of an element: where the blanks before it begin, where it does, its end."""
+    def attributes_of(self, number: int) -> dict[str, Attribute]:
+        """The attributes of an element by name."""
         if number not in self._attributes:
             span = self.spans[number]
-            found = _ATTRIBUTE.finditer(self.text, span.start, span.tag_end)
-            self._attributes[number] = {match[1]: (match.start(), match.start(1), match.end()) for match in found}
+            found = self._attributes[number] = {}
+            for match in ATTRIBUTE.finditer(self.text, span.start, span.tag_end):
+                before = span.start + len(self.text[span.start : match.start()].rstrip())
+                value = match["quoted"][1:-1]
+                found.setdefault(match["name"], Attribute(before, match.start(), match.end(), value))
         return self._attributes[number]
 
     @cached_property
@@ -189,20 +200,10 @@ class Source:
 
     def of_attribute(self, number: int, name: str) -> Position:
         """Where the value of an attribute is; the tag if the element has no such attribute."""
-        match = self._attribute(number, name)
-        if match is None:
+        found = self.attributes_of(number).get(name)
+        if found is None:
             return self.of_tag(number)
-        return self.position(self.spans[number].start + match.start(2), max(1, len(match[2])))
-
-    def attribute(self, number: int, name: str) -> str | None:
-        """The value of an attribute as it is written, None if the element has no such attribute."""
-        match = self._attribute(number, name)
-        return None if match is None else match[2]
-
-    def _attribute(self, number: int, name: str) -> re.Match[str] | None:
-        span = self.spans[number]
-        head = self.text[span.start : span.tag_end]
-        return re.search(rf"\s{re.escape(name)}\s*=\s*([\"'])(.*?)\1", head, re.DOTALL)
+        return self.position(found.end - 1 - len(found.value), max(1, len(found.value)))
 
 
 _MARKS = {

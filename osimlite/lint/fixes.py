@@ -41,7 +41,7 @@ def without_attribute(source: Source | None, number: int, name: str, *, safe: bo
     if source is None:
         return None
     found = source.attributes_of(number).get(name)
-    return Fix((Edit(found[0], found[2], ""),), safe) if found else None
+    return Fix((Edit(found.before, found.end, ""),), safe) if found else None
 
 
 def without_text(source: Source, start: int, end: int) -> Fix:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import chain
@@ -227,15 +226,14 @@ class Subject:
             return True
         if item._index is None:
             return False
-        span = self.source.spans[item._index]
-        return re.search(r"\sname\s*=", self.source.text[span.start : span.tag_end]) is not None
+        return "name" in self.source.attributes_of(item._index)
 
     def attribute_name(self, number: int, name: str) -> Position | None:
         """Where the name of an attribute stands."""
         if self.source is None:
             return None
         found = self.source.attributes_of(number).get(name)
-        return self.source.position(found[1], len(name)) if found else self.source.of_tag(number)
+        return self.source.position(found.start, len(name)) if found else self.source.of_tag(number)
 
     def _given(self, item: Object | None) -> int | None:
         """The element of an object; of one the text does not give, that of the component above it."""

@@ -388,7 +388,8 @@ def _fate(subject: Subject, note: Note) -> str:
         return "refuses to load the file"
     if spec.kind.form != "single":
         return "leaves the object out"
-    if subject.source is None or subject.source.attribute(note.number, "name") == spec.tag:
+    attributes = None if subject.source is None else subject.source.attributes_of(note.number)
+    if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
         return "refuses to load the file"
     return "leaves the object out, and fails where it needs one"
 
