@@ -9,10 +9,9 @@ on the nested tuples that an engine returns.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-
-from osimlite.simulation.script import Script
 
 Solver = Callable[[Sequence[Sequence[float]], Sequence[float], Sequence[float]], list[float]]
 
@@ -41,26 +40,29 @@ def tree_solver(parents: Sequence[int]) -> Solver:
     if size > LARGEST_CODE:
         return _solve_dense
     above = [list(_ancestors(parents, joint)) for joint in range(size)]
-    script = Script("solve", ["M", "h", "t"])
+    lines = ["def solve(M, h, t):"]
     for row in range(size):
-        script.line(f"M{row} = M[{row}]")
+        lines.append(f"M{row} = M[{row}]")
         for column in (*above[row], row):
-            script.line(f"m{row}_{column} = M{row}[{column}]")
-        script.line(f"x{row} = t[{row}] - h[{row}]")
+            lines.append(f"m{row}_{column} = M{row}[{column}]")
+        lines.append(f"x{row} = t[{row}] - h[{row}]")
     for k in reversed(range(size)):
-        script.line(f"if not m{k}_{k} > 0.0: raise SingularMassError({k})")
+        lines.append(f"if not m{k}_{k} > 0.0: raise SingularMassError({k})")
         for place, i in enumerate(above[k]):
-            script.line(f"a = m{k}_{i} / m{k}_{k}")
+            lines.append(f"a = m{k}_{i} / m{k}_{k}")
             for j in (i, *above[k][place + 1 :]):
-                script.line(f"m{i}_{j} -= a*m{k}_{j}")
-            script.line(f"x{i} -= a*x{k}")
-            script.line(f"m{k}_{i} = a")
-        script.line(f"x{k} /= m{k}_{k}")
+                lines.append(f"m{i}_{j} -= a*m{k}_{j}")
+            lines.append(f"x{i} -= a*x{k}")
+            lines.append(f"m{k}_{i} = a")
+        lines.append(f"x{k} /= m{k}_{k}")
     for k in range(size):
         if above[k]:
-            script.line(f"x{k} -= {' + '.join(f'm{k}_{i}*x{i}' for i in above[k])}")
-    script.line(f"return [{', '.join(f'x{joint}' for joint in range(size))}]")
-    return script.function({"SingularMassError": SingularMassError})
+            lines.append(f"x{k} -= {' + '.join(f'm{k}_{i}*x{i}' for i in above[k])}")
+    lines.append(f"return [{', '.join(f'x{joint}' for joint in range(size))}]")
+    scope: dict[str, Any] = {"SingularMassError": SingularMassError}
+    exec("\n    ".join(lines), scope)
+    solve: Solver = scope["solve"]
+    return solve
 
 
 def _solve_dense(M: Sequence[Sequence[float]], h: Sequence[float], t: Sequence[float]) -> list[float]:

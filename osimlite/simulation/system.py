@@ -14,7 +14,9 @@ import numpy as np
 from osimlite.errors import SimulationError
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import massless
+from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.spatial import Array, cross, skew
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.items import ForceElement
@@ -70,6 +72,9 @@ class System:
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
+        self._columns = self._rows(layout.WORK_COLUMN, layout.FREEDOMS, 6)
+        self._coordinates = np.array(packed.order, dtype=int)
+        self._carrying = self._freedoms_of_links()
         self._y, self._f = np.zeros(self.state.size), np.zeros(self.state.size)
         self._evaluate = self.program.code.bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
         self._into, self._from = self._orders(packed.order)
@@ -77,6 +82,16 @@ class System:
     def _rows(self, start: int, count: int, size: int) -> Floats:
         first, rows = self.structure[start], self.structure[count]
         return self._w[first : first + size * rows].reshape(rows, size)
+
+    def _freedoms_of_links(self) -> list[list[int]]:
+        """The degrees of freedom between ground and each link."""
+        found: list[list[int]] = []
+        records = self.structure[self.structure[layout.LINK_AT] :]
+        for number in range(self.structure[layout.LINKS]):
+            record = records[layout.LINK_INTS * number :]
+            own = range(record[layout.FIRST_FREEDOM], record[layout.END_FREEDOM])
+            found.append([*(found[record[layout.PARENT]] if record[layout.PARENT] >= 0 else ()), *own])
+        return found
 
     def _orders(self, packed: Sequence[int]) -> tuple[Any, Any]:
         """Where the numbers of a state come from for the kernels, and for the state; a slice is the quickest."""
@@ -139,6 +154,44 @@ class System:
         elif status == layout.SINGULAR_MASS:
             return massless(self.mechanism.coordinates[self._packed_order[int(self._f[0])]].name)
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
+
+    def bodies(self, wanted: Sequence[int], t: float, q: Array, u: Array) -> Kinematics:
+        """What some bodies do after an evaluation up to the velocities at least; the others are not looked at.
+
+        Args:
+            wanted: indices of the bodies.
+            t: time of the evaluation, s.
+            q: values of all coordinates there (k,).
+            u: generalized speeds of all coordinates there (k,).
+        """
+        count = len(self.placements) + 1
+        rotations, origins, jacobians = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros((count, 6, len(q)))
+        velocities, biases = np.zeros((count, 6)), np.zeros((count, 6))
+        rotations[GROUND] = np.eye(3)
+        gravity = self.mechanism.gravity
+        for body in wanted:
+            link, frame = self.placements[body]
+            if link == GROUND:
+                rotations[body], origins[body] = frame[:3, :3], frame[:3, 3]
+                continue
+            here, freedoms = self._links[link], self._carrying[link]
+            turn = here[:9].reshape(3, 3)
+            rotations[body] = turn @ frame[:3, :3]
+            origins[body] = here[layout.POSITION : layout.POSITION + 3] + turn @ frame[:3, 3]
+            arm = origins[body] - here[layout.ORIGIN : layout.ORIGIN + 3]
+            # Spatial vectors are about the origin of the tree.
+            moving = np.vstack(
+                (
+                    here[layout.VELOCITY : layout.VELOCITY + 6],
+                    here[layout.ACCELERATION : layout.ACCELERATION + 6],
+                    self._columns[freedoms],
+                )
+            )
+            moving[:, 3:] += moving[:, :3] @ skew(arm)
+            velocities[body], biases[body] = moving[0], moving[1]
+            biases[body, 3:] += gravity + cross(velocities[body, :3], velocities[body, 3:])
+            jacobians[body][:, self._coordinates[freedoms]] = moving[2:].T
+        return Kinematics(self.mechanism, q, u, rotations, origins, jacobians, velocities, biases, t)
 
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: Sequence[float]) -> int:

@@ -13,11 +13,7 @@ import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model
 from osimlite.forces.hunt_crossley import contact_forces, half_space_sphere, simbody_pair_order
 from osimlite.multibody import build_mechanism
-from osimlite.robot.build import build_robot
-from osimlite.robot.merge_fixed import merge_fixed
-from osimlite.simulation.chain import Chain
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.script import Script
 from osimlite.simulation.solver import SingularMassError, tree_solver
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
@@ -26,80 +22,6 @@ from osimlite.simulation.engines.bullet import BulletEngine
 
 NUMBERS = st.floats(-3.0, 3.0)
 SCALARS = st.one_of(st.sampled_from(["a", "b", "c"]), st.sampled_from([0.0, 1.0, -1.0]), NUMBERS)
-
-
-@given(st.lists(st.lists(SCALARS, min_size=1, max_size=3), max_size=5), NUMBERS, NUMBERS, NUMBERS)
-def test_sum_of_products(terms, a, b, c):
-    script = Script("f", ["a", "b", "c"])
-    script.line(f"return {script.sum(*terms)}")
-    known = {"a": a, "b": b, "c": c}
-    expected = sum(math.prod(known.get(x, x) for x in term) for term in terms)
-    assert script.function({})(a, b, c) == pytest.approx(expected, rel=1e-12, abs=1e-12)
-
-
-def test_nothing_known_is_computed():
-    script = Script("f", ["a", "b"])
-    assert script.sum((2.0, 3.0), (0.0, "a")) == 6.0
-    assert script.sum(("a",), ("b", 0.0)) == "a"
-    assert script.sum(("a",), (-1.0, "a")) == 0.0
-    assert script.source().count("\n") == 2
-    # What is computed twice is computed once.
-    assert script.sum(("a", "b")) == script.sum(("b", "a"))
-
-
-def test_what_a_branch_computes_is_not_known_after_it():
-    script = Script("f", ["a", "b"])
-    script.line("result = 0.0")
-    with script.block("if a > 0.0:"):
-        inside = script.sum(("a", "b"))
-        script.line(f"result = {inside}")
-    outside = script.sum(("a", "b"))
-    script.line(f"return result + {outside}")
-    assert inside != outside
-    assert script.function({})(-2.0, 3.0) == -6.0
-
-
-def chain_of(model):
-    mechanism = build_mechanism(model)
-    robot = merge_fixed(build_robot(mechanism, body_frames=False))
-    return mechanism, Chain(robot, robot.moving)
-
-
-@given(st.integers(0, 10**6))
-def test_points_and_their_velocities(seed):
-    model = Model(name="m")
-    carrier = model.ground
-    for number, kind in enumerate(("GimbalJoint", "SliderJoint", "WeldJoint", "UniversalJoint")):
-        body = model.add(Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-        joint = getattr(osimlite, kind)(name=f"j{number}")
-        for place, coordinate in enumerate(joint.coordinates):
-            coordinate.name = f"q{number}{place}"
-        model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.3), turned=(1.0, 0.5, -0.2), child_at=(0.0, 0.4, 0.1)))
-        carrier = body
-    mechanism, chain = chain_of(model)
-    rng = np.random.default_rng(seed)
-    count = len(mechanism.coordinates)
-    q, u = rng.uniform(-2, 2, count), rng.uniform(-2, 2, count)
-    station = (0.3, -0.1, 0.2)
-    script = Script("f", ["q", "r"])
-    for letter in "qr":
-        script.line(f"{''.join(f'{letter}{n}, ' for n in range(count))}= {letter}")
-    point = chain.point(script, 3, station)
-    columns = chain.columns(script, 1, 3, point)
-    velocity = chain.velocity(script, columns)
-    turning = chain.velocity(script, columns, turning=True)
-    script.line(f"return {', '.join(map(str, (*point, *velocity, *turning)))}")
-    order = [joint.coordinate for joint in chain.joints]
-    found = script.function({"sin": math.sin, "cos": math.cos})(q[order].tolist(), u[order].tolist())
-    position = mechanism.station_position("b3", station, q)
-    assert found[:3] == pytest.approx(position, abs=1e-12)
-    # As seen from the other body: the difference of the velocities of that point taken as one of either.
-    transform = mechanism.body_transforms(q)["b1"]
-    inner = (np.linalg.inv(transform) @ np.append(position, 1.0))[:3]
-    relative = mechanism.station_velocity("b3", station, q, u) - mechanism.station_velocity("b1", inner, q, u)
-    assert found[3:6] == pytest.approx(relative, abs=1e-12)
-    turns = mechanism.body_velocities(q, u)
-    assert found[6:] == pytest.approx((turns["b3"] - turns["b1"])[:3], abs=1e-12)
 
 
 @given(st.lists(st.integers(-1, 8), min_size=1, max_size=9), st.integers(0, 10**6))

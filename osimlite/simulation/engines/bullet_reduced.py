@@ -15,14 +15,13 @@ from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.robot.robot import Robot
-from osimlite.simulation.body_code import BodyStates
-from osimlite.simulation.chain import Chain
 from osimlite.simulation.constrained import Constrained, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.bullet import ARTICULATED_BODY, MASS_MATRIX, RECURSION, BulletEngine
 from osimlite.simulation.engines.bullet_file import excess
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
+from osimlite.simulation.kernels import layout
 from osimlite.simulation.reduction import Reduction
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
@@ -56,8 +55,7 @@ class ReducedBulletEngine(BulletEngine):
             (indices[next(iter(link.bodies))], excess(link)) for link in robot.links if link.name in body.impossible
         ]
         self._looked_at = bool(self._added or self.constrained.names)
-        looked_at = [*self.constrained.bodies, *(index for index, _ in self._added)]
-        self._states = BodyStates(Chain(robot, body.joints), looked_at, self.order)
+        self._watched_bodies = [*dict.fromkeys([*self.constrained.bodies, *(index for index, _ in self._added)])]
         if route == ARTICULATED_BODY:
             raise UnsupportedError(
                 f"the route {ARTICULATED_BODY} is for models without constraints whose coordinates move one axis each; "
@@ -89,7 +87,7 @@ class ReducedBulletEngine(BulletEngine):
         right = forces - np.array(body.joint_forces(q, rates, joints.bias.tolist())) @ jacobian
         if not self._looked_at:
             return matrix, right, joints.coordinate_rates, None
-        state = self._states.at(t, *self.constrained.spread(x, u), joints)
+        state = self.system.bodies(self._watched_bodies, t, *self.constrained.spread(x, u))
         for index, added in self._added:
             # The same inertia about every axis: no speed alone makes it resist.
             turning = state.jacobians[index][:3, self._places]
@@ -109,7 +107,11 @@ class ReducedBulletEngine(BulletEngine):
 
     def _state(self, t: float, x: Array, u: Array) -> Kinematics:
         """What the bodies do that constraints look at."""
-        return self._states.at(t, *self.constrained.spread(x, u), self.reduction.at(x, u))
+        y = [*x.tolist(), *u.tolist(), *[0.0] * len(self.state.variables)]
+        status = self.system.realize(t, y, layout.VELOCITY_STAGE)
+        if status != layout.OK:
+            raise self.system.refusal(status, t, y)
+        return self.system.bodies(self._watched_bodies, t, *self.constrained.spread(x, u))
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
