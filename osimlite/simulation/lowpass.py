@@ -6,10 +6,11 @@ where it is not.
 
 from __future__ import annotations
 
-from math import isfinite, pi, tan
+from math import isfinite
 
 import numpy as np
 
+from osimlite._require import require
 from osimlite.errors import SettingError
 from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array
@@ -61,18 +62,8 @@ def _continued(values: Array, count: int) -> Array:
 
 def _filtered(values: Array, cutoff: float) -> Array:
     """Values (t, n) after one run; `cutoff` in parts of the sampling frequency. The first three stay as they are."""
-    w = tan(pi * cutoff)
-    scale = (w + 1.0) * (w * w + w + 1.0)
-    gain = w**3 / scale
-    back = np.array(
-        (
-            (w - 1.0) * (w * w - w + 1.0) / scale,
-            (3.0 * w**3 - 2.0 * w**2 - 2.0 * w + 3.0) / scale,
-            (3.0 * w**3 + 2.0 * w**2 - 2.0 * w - 3.0) / scale,
-        )
-    )
-    result = values.copy()
-    result[3:] = gain * (values[3:] + 3.0 * values[2:-1] + 3.0 * values[1:-2] + values[:-3])
-    for place in range(3, len(values)):
-        result[place] -= back @ result[place - 3 : place]
-    return result
+    signal = require("scipy.signal", extra="sim", purpose="a low-pass filter")
+    coefficients = signal.butter(3, 2.0 * cutoff)
+    before = [signal.lfiltic(*coefficients, column, column) for column in values[2::-1].T]
+    rest, _ = signal.lfilter(*coefficients, values[3:], axis=0, zi=np.transpose(before))
+    return np.concatenate([values[:3], rest])
