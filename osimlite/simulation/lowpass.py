@@ -31,10 +31,12 @@ def lowpassed(times: Array, values: Array, cutoff: float) -> tuple[Array, Array]
         Times (s,), evenly spaced, and values (s, n).
 
     Raises:
-        SettingError: the frequency is not positive, or too high for the times.
+        SettingError: the frequency is not positive, or too high for the times, or there is but one.
     """
     if not (isfinite(cutoff) and cutoff > 0.0):
         raise SettingError(f"a low-pass frequency is a positive number of Hz, not {cutoff:g}")
+    if len(times) < 2:
+        raise SettingError("a low-pass filter needs a motion of two rows or more")
     count = len(times) // 2
     times, values = _continued(times, count), _continued(values, count)
     step = float(np.diff(times).min())
