@@ -71,7 +71,9 @@ def expected_default(prop: dict) -> str | None:
     return "" if prop["default"] is None else prop["default"]
 
 
-def printed(kind: Any, value: object) -> str:
+def printed(kind: Any, value: Any) -> str:
+    if kind.legacy and kind.shape == "list" and kind.scalar == "double":  # of these OpenSim prints six digits
+        return " ".join(f"{number:g}" for number in value)
     return formatter(kind, "opensim")(value).removeprefix(" " if kind.legacy else "")
 
 
