@@ -79,6 +79,7 @@ class Tree:
         # By class: what its objects are put into, whether they can name others, and what they can hold.
         self._shelves: dict[type[Object], tuple[list[Object], bool, tuple[Holding, ...]]] = {}
         self._spellings: dict[tuple[str, str], list[str]] = {}
+        self._of_class: dict[str, list[Component]] = {}
         self._names: dict[str, dict[str, Component]] = {}
         self._resolved: dict[tuple[str, str, str], Resolution] = {}
         self._parts: dict[int, tuple[Component, list[Component]]] = {}
@@ -224,13 +225,12 @@ class Tree:
         if key in self._spellings:
             return self._spellings[key]
         names = set()
-        for component in self.components:
+        for component in self._all_of(reference.target):
             if reference.rule == "own-joint-coordinate" and self._parents.get(id(component)) is not use.owner:
                 continue
-            if is_a(component, reference.target):
-                text = self.text_for(use.owner, reference, component)
-                if self.lookup(reference, text, use.owner).target is component:
-                    names.add(text)
+            text = self.text_for(use.owner, reference, component)
+            if self.lookup(reference, text, use.owner).target is component:
+                names.add(text)
         spellings = sorted(names)
         if reference.rule in EVERYWHERE:
             self._spellings[key] = spellings
@@ -347,9 +347,13 @@ class Tree:
 
     def of_class(self, target: str) -> dict[str, Component]:
         """The components of a class by name, of equal names the first."""
-        return self._named(
-            target, lambda: ((last_name(self._paths[id(c)]), c) for c in self.components if is_a(c, target))
-        )
+        return self._named(target, lambda: ((last_name(self._paths[id(c)]), c) for c in self._all_of(target)))
+
+    def _all_of(self, target: str) -> list[Component]:
+        """The components of a class."""
+        if target not in self._of_class:
+            self._of_class[target] = [component for component in self.components if is_a(component, target)]
+        return self._of_class[target]
 
     def members(self, path: str, target: str) -> dict[str, Component]:
         """The components of a class that are right below a path, by name."""

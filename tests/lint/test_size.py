@@ -31,12 +31,24 @@ def frames(count: int, first: str) -> str:
     )
 
 
+def circle(count: int) -> str:
+    links = (
+        f"<StationDefinedFrame name='f{k}'><socket_origin_point>/s{k}</socket_origin_point></StationDefinedFrame>"
+        f"<Station name='s{k}'><socket_parent_frame>/f{(k + 1) % count}</socket_parent_frame></Station>"
+        for k in range(count)
+    )
+    return model(BODY.format("b", "", ""), f"<components>{''.join(links)}</components>")
+
+
+LOST = "<Station name='s{0}'><socket_parent_frame>/bodyset/b{0}</socket_parent_frame></Station>"
 LIMIT = "<CoordinateLimitForce name='s{0}'><coordinate>x{0}</coordinate></CoordinateLimitForce>"
 KINDS = {
     "bodies of one name": lambda n: model(BODY.format("b", "", "") * n),
     "attributes": lambda n: model(BODY.format("b", " ".join(f"a{k}='1'" for k in range(n)), "")),
     "elements": lambda n: model(BODY.format("b", "", "<foo>1</foo>" * n)),
     "classes": lambda n: model("<Foo name='x'/>" * n),
+    "circle of frames": circle,
+    "sockets to nothing": lambda n: model("", f"<components>{''.join(LOST.format(k) for k in range(n))}</components>"),
     "frames of frames": lambda n: frames(n, "/bodyset/b"),
     "frames in a circle": lambda n: frames(n, f"/componentset/f{n - 1}"),
     "names of nothing": lambda n: model(

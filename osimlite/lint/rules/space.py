@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import combinations
 
@@ -20,6 +20,9 @@ from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFram
 from osimlite.schema.markers import Station
 from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.schema.tree import is_a
+
+POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
+"""Sockets of a frame laid through stations."""
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
@@ -83,13 +86,14 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
         circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
         for link in circle:
             found(f"{called(link)} is fixed to itself: OpenSim never comes to an end", link, tag="socket_parent")
-    for frame in subject.each(StationDefinedFrame):
-        if _rests_on_itself(subject, frame):
+    laid = list(subject.each(StationDefinedFrame))
+    circles = _on_circles(subject, laid)
+    for frame in laid:
+        if id(frame) in circles:
             found(f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end", frame)
             continue
-        points = [subject.target_of(frame, f"socket_{word}") for word in ("point_a", "point_b", "point_c")]
-        tags = ["socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"]
-        stations = [point for point in [*points, subject.target_of(frame, tags[3])] if isinstance(point, Station)]
+        points = [subject.target_of(frame, tag) for tag in POINTS]
+        stations = [point for point in points if isinstance(point, Station)]
         places = [on_base(subject, subject.target_of(station, "socket_parent_frame")) for station in stations]
         if len(stations) < 4:
             continue
@@ -100,7 +104,7 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
                 f"{called(stations[stray])} of {called(frame)} is fixed to {called(fixed_to[stray] or frame)}, "
                 f"{called(stations[0])} to {called(fixed_to[0])}: OpenSim refuses the model",
                 frame,
-                tag=tags[stray],
+                tag=POINTS[stray],
             )
             continue
         spots = [
@@ -109,10 +113,10 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
         for one, other in combinations(range(3), 2):
             if spots[one] is not None and spots[one] == spots[other]:
                 found(
-                    f"{tags[one]} and {tags[other]} of {called(frame)} are in the same place: OpenSim refuses "
+                    f"{POINTS[one]} and {POINTS[other]} of {called(frame)} are in the same place: OpenSim refuses "
                     "the model",
                     frame,
-                    tag=tags[other],
+                    tag=POINTS[other],
                 )
                 break
 
@@ -269,22 +273,53 @@ def no_direction(subject: Subject, found: Found) -> None:
                 )
 
 
-def _rests_on_itself(subject: Subject, frame: StationDefinedFrame) -> bool:
-    """Whether one follows the points of a frame, and the frames these are on, back to it."""
-    pending: list[Component] = [frame]
-    seen: set[int] = set()
-    while pending:
-        here = pending.pop()
-        tags = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
-        below = [tag for tag in (*tags, "socket_parent_frame", "socket_parent") if tag in type(here).field_specs()]
-        for tag in below:
-            target = subject.target_of(here, tag)
-            if target is frame:
-                return True
-            if target is not None and id(target) not in seen:
-                seen.add(id(target))
-                pending.append(target)
-    return False
+def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
+    """Ids of what one comes back to from itself, by the points of frames and the frames that these are on.
+
+    R. Tarjan's strongly connected components (1972), each looked at once.
+    """
+    found: set[int] = set()
+    number: dict[int, int] = {}
+    lowest: dict[int, int] = {}
+    path: list[Component] = []
+    open_ids: set[int] = set()
+    for start in frames:
+        pending: list[tuple[Component, Iterator[Component]]] = []
+        entering: Component | None = None if id(start) in number else start
+        while entering is not None or pending:
+            if entering is not None:
+                here = id(entering)
+                number[here] = lowest[here] = len(number)
+                path.append(entering)
+                open_ids.add(here)
+                pending.append((entering, _below(subject, entering)))
+            owner, below = pending[-1]
+            entering = next((item for item in below if id(item) not in number or id(item) in open_ids), None)
+            if entering is not None and id(entering) in open_ids:
+                lowest[id(owner)] = min(lowest[id(owner)], number[id(entering)])
+                found |= {id(owner)} if entering is owner else set()
+                entering = None
+            elif entering is None:
+                pending.pop()
+                if pending:
+                    above = id(pending[-1][0])
+                    lowest[above] = min(lowest[above], lowest[id(owner)])
+                if lowest[id(owner)] == number[id(owner)]:
+                    size = next(k for k in range(1, len(path) + 1) if path[-k] is owner)
+                    circle = {id(item) for item in path[-size:]}
+                    del path[-size:]
+                    open_ids -= circle
+                    found |= circle if size > 1 else set()
+    return found
+
+
+def _below(subject: Subject, item: Component) -> Iterator[Component]:
+    """What a frame or a station rests on."""
+    specs = type(item).field_specs()
+    for tag in (*POINTS, "socket_parent_frame", "socket_parent"):
+        target = subject.target_of(item, tag) if tag in specs else None
+        if target is not None:
+            yield target
 
 
 def _on_body(subject: Subject, item: Object) -> bool:
