@@ -34,6 +34,8 @@ LAW_MODULES = {
     "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",
     "touch_mesh": "meshes",
+    "wrap_cylinder": "wrap_cylinder",
+    "wrap_sphere": "wrap_sphere",
 }
 """The module of each of the engine's own."""
 

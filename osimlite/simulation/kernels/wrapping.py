@@ -9,7 +9,8 @@ the piece are its ends e[0:3] and e[3:6], to which the law adds the tangent poin
 order, and the length e[12] along the surface between them; the rest, up to ENDS, is room of the law's own.
 
 A law returns INSIDE if an end is inside the surface, NONE if the piece goes straight on, WRAPPED if it may wrap, and
-MANDATORY if it must; what it leaves in e counts in the last two cases only.
+MANDATORY if it must; what it leaves in e counts in the last two cases only. Where OpenSim takes a piece to wrap but
+then finds no points, the tangent points are NaN: such a piece goes straight on.
 """
 
 AXIS, SIDE, METHOD, ALONE, SIZES = 0, 1, 2, 3, 4

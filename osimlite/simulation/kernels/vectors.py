@@ -1,0 +1,79 @@
+"""Vectors of three floats, for kernels."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from osimlite.simulation.kernels.pointers import Floats
+
+Vector = tuple[float, float, float]
+
+EPSILON = 2.220446049250313e-16
+
+
+def vector(numbers: Floats, place: int) -> Vector:
+    """The three numbers from a place on."""
+    return numbers[place], numbers[place + 1], numbers[place + 2]
+
+
+def put(numbers: Floats, place: int, a: Vector) -> None:
+    """Put a vector into the three numbers from a place on."""
+    numbers[place], numbers[place + 1], numbers[place + 2] = a
+
+
+def component(a: Vector, axis: int) -> float:
+    """The component on axis 0, 1 or 2."""
+    x, y, z = a
+    return x if axis == 0 else (y if axis == 1 else z)
+
+
+def plus(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return ax + bx, ay + by, az + bz
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return ax - bx, ay - by, az - bz
+
+
+def times(k: float, a: Vector) -> Vector:
+    """k a."""
+    x, y, z = a
+    return k * x, k * y, k * z
+
+
+def along(a: Vector, k: float, b: Vector) -> Vector:
+    """a + k b."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return ax + k * bx, ay + k * by, az + k * bz
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """a . b."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return ax * bx + ay * by + az * bz
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """a x b."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+def norm(a: Vector) -> float:
+    """|a|."""
+    return sqrt(dot(a, a))
+
+
+def unit(a: Vector) -> Vector:
+    """a / |a|, or the zero vector if a is shorter than EPSILON, as OpenSim's wrapping has it."""
+    size = norm(a)
+    return times(1.0 / size, a) if size >= EPSILON else (0.0, 0.0, 0.0)

@@ -1,0 +1,59 @@
+"""How a path bends around one surface, against OpenSim: as Python, with every place checked, and as machine code."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from math import isnan
+
+import numpy as np
+import pytest
+
+from osimlite.multibody.spatial import inverse, offset, transform
+from osimlite.simulation.engines.linking import COMPILED
+from osimlite.simulation.kernels import wrapping
+from tests.conftest import ROOT
+from tests.simulation.test_python_kernels import Checked
+
+SIDES = {"all": (0, 0), "x": (0, 1), "-x": (0, -1), "y": (1, 1), "-y": (1, -1), "z": (2, 1), "-z": (2, -1)}
+METHODS = {"hybrid": wrapping.HYBRID, "midpoint": wrapping.MIDPOINT, "axial": wrapping.AXIAL}
+KINDS = {"Cylinder", "Sphere"}
+
+with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:
+    TABLE = json.load(file)
+SETUPS = {setup["name"]: setup for setup in TABLE if len(setup["objects"]) == 1}
+SETUPS = {name: setup for name, setup in SETUPS.items() if setup["objects"][0]["kind"] in KINDS}
+
+
+def numbers(surface, *, alone):
+    """The numbers of a surface."""
+    axis, side = SIDES[surface["quadrant"]]
+    return np.array([axis, side, METHODS[surface["method"]], alone, *surface["dimensions"]], dtype=float)
+
+
+def bent(law, p, first, second):
+    """What a law says of a piece of a path."""
+    e = np.full(wrapping.ENDS, 7.0)
+    e[wrapping.FIRST_END : wrapping.FIRST_TANGENT] = *first, *second
+    return law(p, e), e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3), e[wrapping.SURFACE_LENGTH]
+
+
+@pytest.mark.parametrize("code", [Checked("Python"), COMPILED], ids=lambda code: code.name)
+@pytest.mark.parametrize("name", SETUPS)
+def test_surface(name, code):
+    (surface,) = SETUPS[name]["objects"]
+    law, p = code.entry(f"wrap_{surface['kind'].lower()}"), numbers(surface, alone=1.0)
+    frame = offset(surface["translation"], surface["xyz_body_rotation"])
+    for case in SETUPS[name]["cases"]:
+        to_surface = inverse(transform(case["R_W"], case["p_W"]) @ frame)
+        ends = [(to_surface @ [*case[end], 1.0])[:3] for end in ("p_A", "p_B")]
+        says, points, length = bent(law, p, *ends)
+        wraps = says > wrapping.NONE and not np.isnan(points).any()
+        assert wraps == (len(case["points"]) == 4)
+        if not wraps:
+            assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(case["length"], abs=1e-15)
+            continue
+        expected = [point[1:4] for point in case["points"][1:3]]
+        assert points @ frame[:3, :3].T + frame[:3, 3] == pytest.approx(np.array(expected), abs=1e-14)
+        whole = length + sum(np.linalg.norm(end - point) for end, point in zip(ends, points, strict=True))
+        assert isnan(whole) if isnan(case["length"]) else whole == pytest.approx(case["length"], abs=2e-15)
