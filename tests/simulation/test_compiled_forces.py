@@ -39,7 +39,7 @@ from osimlite.schema.functions import (
 from osimlite.schema.markers import Station
 from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
-from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -88,6 +88,7 @@ def straight(*more) -> GeometryPath:
     found.path_point_set.objects += (
         PathPoint(name="start", socket_parent_frame="/ground", location=(0.5, 0.1, 0.0)),
         PathPoint(name="over", socket_parent_frame="/bodyset/b0", location=(0.1, 0.3, 0.2)),
+        *more,
         PathPoint(name="end", socket_parent_frame="/bodyset/b2", location=(0.0, -0.3, 0.1)),
     )
     return found
@@ -202,6 +203,28 @@ FORCES = {
         **DAMPED,
     ),
     "path": lambda: PathSpring(name="a", **SPRING, geometry_path=straight()),
+    "path through points that move or come and go": lambda: PathSpring(
+        name="a",
+        **SPRING,
+        geometry_path=straight(
+            ConditionalPathPoint(
+                name="sometimes",
+                socket_parent_frame="/bodyset/b0",
+                location=(0.3, 0.0, 0.1),
+                socket_coordinate="/jointset/j2/q2_0",
+                range=(-0.2, 0.4),
+            ),
+            MovingPathPoint(
+                name="mover",
+                socket_parent_frame="/bodyset/b2",
+                socket_x_coordinate="/jointset/j2/q2_0",
+                socket_y_coordinate="/jointset/j2/q2_0",
+                socket_z_coordinate="/jointset/j2/q2_0",
+                x_location=SimmSpline(x=(-1.0, -0.3, 0.1, 0.6, 1.0), y=(0.1, 0.2, 0.1, -0.1, 0.3)),
+                y_location=Sine(amplitude=0.2, omega=2.0, phase=0.3, offset=0.1),
+            ),
+        ),
+    ),
     "path by a formula": lambda: ExpressionBasedPathForce(
         name="a", resting_length=0.4, clamp_stretch=True, expression="30*s^2 + ldot*s", geometry_path=straight()
     ),

@@ -73,8 +73,12 @@ def prescribed(function: Function, **more) -> PrescribedController:
     return controller
 
 
+def through(*points) -> PathSpring:
+    return PathSpring(name="a", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=straight(*points))
+
+
 def wrapped() -> PathSpring:
-    force = PathSpring(name="a", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=straight())
+    force = through()
     force.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball"))
     return force
 
@@ -91,15 +95,7 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (wrapped, r"'/forceset/a' \(PathSpring that wraps around 'ball'\)"),
-        (
-            lambda: PathSpring(name="a", **SPRING, geometry_path=straight(ConditionalPathPoint(name="c"))),
-            r"'/forceset/a' \(PathSpring with the ConditionalPathPoint 'c'\)",
-        ),
-        (
-            lambda: Ligament(name="a", resting_length=1.0, geometry_path=straight(MovingPathPoint(name="m"))),
-            r"'/forceset/a' \(Ligament with the MovingPathPoint 'm'\)",
-        ),
+        (wrapped, r"'/forceset/a' \(PathSpring that wraps around a surface\)"),
         (
             lambda: ActivationCoordinateActuator(name="a", coordinate="q0"),
             r"'/forceset/a' \(ActivationCoordinateActuator\)",
@@ -129,6 +125,22 @@ def test_what_cannot_be_computed_is_named(make, message):
         (lambda: SpringGeneralizedForce(name="a", coordinate="q0", stiffness=math.nan), "not a finite number"),
         (lambda: PointToPointSpring(name="a", socket_body1="/ground"), "'socket_body2' of '/forceset/a' is empty"),
         (lambda: PathSpring(name="a", **SPRING), "has 0 points"),
+        (
+            lambda: through(ConditionalPathPoint(name="c", socket_parent_frame="/ground")),
+            "'/forceset/a/path/c' names no coordinate",
+        ),
+        (
+            lambda: through(
+                MovingPathPoint(
+                    name="m",
+                    socket_parent_frame="/ground",
+                    socket_x_coordinate="/jointset/j1/q1",
+                    socket_y_coordinate="/jointset/j1/q1",
+                    socket_z_coordinate="/jointset/j2/q2",
+                )
+            ),
+            "three coordinates of '/forceset/a/path/m' differ",
+        ),
         (lambda: PathSpring(name="a", geometry_path=straight()), "not a finite number"),
         (lambda: Ligament(name="a", geometry_path=straight()), "resting_length of '/forceset/a' is not positive"),
         (

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from re import sub
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -195,6 +196,11 @@ class ElementBuilder:
 def kind_of(component: Any) -> str:
     """Name of a component's class."""
     return getattr(component, "class_name", "") or type(component).__name__
+
+
+def module_name(component: type) -> str:
+    """The module that declares what osimlite makes of a class: PathSpring is in path_spring."""
+    return sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", component.__name__).lower()
 
 
 def triple(values: Any) -> Triple:

@@ -18,10 +18,9 @@ from functools import cache, cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import iter_modules
-from re import sub
 from typing import Any
 
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.parameters import CONTROL, Number, Parameter, Tail
@@ -178,9 +177,12 @@ class Kind:
     def _size(self) -> int:
         return sum(term.size for term in self.terms)
 
-    def item(self, force: DeclaredForce, places: Places) -> Item:
-        """What the kernel computes of a force."""
+    def items(self, force: DeclaredForce, places: Places) -> list[Item]:
+        """The parts of the geometry, and after them what the kernel computes of a force."""
+        parts = self.geometry.parts(force.place, places)
         ints, numbers = self.geometry.pack(force.place, places)
+        if parts:
+            ints = (layout.OWN + len(parts[-1].ints), *ints)
         size = len(self.recorded) + self.geometry.room(force.place)
         tail = Tail(layout.OWN + self._heads + len(ints), self._size + len(numbers), size)
         heads: list[int] = []
@@ -191,7 +193,8 @@ class Kind:
             own += plain
         at_states = tuple(len(heads) + k for k, state in enumerate(force.optional_states) if state is not None)
         all_ints = (*heads, *[0] * len(self.states), *ints, *tail.ints)
-        return Item(self.name, all_ints, (*own, *numbers, *tail.numbers), room=tail.room, states=at_states)
+        item = Item(self.name, all_ints, (*own, *numbers, *tail.numbers), room=tail.room, states=at_states)
+        return [*parts, item]
 
 
 @dataclass(frozen=True)
@@ -227,7 +230,7 @@ class DeclaredForce:
 
     def items(self, places: Places) -> list[Item]:
         """What the kernels compute."""
-        return [self.kind.item(self, places)] if self.kind.outputs or self.kind.geometry.after else []
+        return self.kind.items(self, places) if self.kind.outputs or self.kind.geometry.after else []
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -241,26 +244,21 @@ class DeclaredForce:
         """One row of the columns; see :class:`osimlite.simulation.elements.items.ForceElement`."""
         kind = self.kind
         if kind.labels is None:
-            return kind.geometry.report(self, records[0][len(kind.recorded) :] if records else (), origins)
-        return [float(records[0][kind.recorded[output]]) for output in kind.labels.values()]
+            return kind.geometry.report(self, records[-1][len(kind.recorded) :] if records else (), origins)
+        return [float(records[-1][kind.recorded[output]]) for output in kind.labels.values()]
 
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """Potential energy, J."""
         kind = self.kind
         if kind.stored is not None:
-            return float(kind.stored(self, records[0]))
-        return float(records[0][kind.recorded[ENERGY]]) if ENERGY in kind.recorded else 0.0
+            return float(kind.stored(self, records[-1]))
+        return float(records[-1][kind.recorded[ENERGY]]) if ENERGY in kind.recorded else 0.0
 
 
 def kinds() -> list[Any]:
     """All declarations."""
     package = import_module(f"{__package__}.kinds")
     return [import_module(f"{package.__name__}.{item.name}").KIND for item in iter_modules(package.__path__)]
-
-
-def module_name(component: type) -> str:
-    """The module that declares a class of forces: PathSpring is in path_spring."""
-    return sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", component.__name__).lower()
 
 
 @cache

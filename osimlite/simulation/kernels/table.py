@@ -36,6 +36,8 @@ LAW_MODULES = {
     "touch_mesh": "meshes",
     "wrap_cylinder": "wrap_cylinder",
     "wrap_sphere": "wrap_sphere",
+    "straight_path": "paths",
+    "pull_points": "paths",
 }
 """The module of each of the engine's own."""
 

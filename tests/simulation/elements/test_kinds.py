@@ -7,7 +7,8 @@ import re
 
 import pytest
 
-from osimlite.simulation.elements.kind import Kind, kind_of_class, kinds, module_name
+from osimlite.simulation.elements.gather import module_name
+from osimlite.simulation.elements.kind import Kind, kind_of_class, kinds
 
 DECLARED = [kind for kind in kinds() if isinstance(kind, Kind)]
 

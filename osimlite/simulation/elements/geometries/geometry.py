@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.items import Places
+from osimlite.simulation.elements.items import Item, Places
 
 
 class Geometry:
@@ -38,6 +38,10 @@ class Geometry:
             ModelError: it names what does not exist.
             UnsupportedError: it acts where osimlite cannot compute it.
         """
+
+    def parts(self, place: Any, places: Places) -> list[Item]:
+        """Items that the code calls; `item - g[0]` then is the place of the last of them."""
+        return []
 
     def pack(self, place: Any, places: Places) -> tuple[Sequence[int], Sequence[float]]:
         """Its integers and numbers, for what `read` gave."""

@@ -1,0 +1,177 @@
+"""Paths: what the law of any path leaves in its record, and the laws of those that run from point to point.
+
+A path is an item that other items call: its law finds length and speed, and the law of the item that stands PULL places
+before it applies the tension that was put into the record. Paths through points keep the points in the record, in the
+order in which the path runs through them, so that nothing is computed twice.
+"""
+
+from __future__ import annotations
+
+from math import nan, sqrt
+
+from osimlite.simulation.kernels.functions import value_at
+from osimlite.simulation.kernels.layout import FREEDOMS, LAW, NUMBERS, OK, OWN, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
+
+PULL = OWN
+"""The first integer of the item of any path."""
+
+LENGTH, SPEED, TENSION = 0, 1, 2
+"""The record of any path begins with length (m), lengthening speed (m/s) and tension (N)."""
+
+POINTS, WRAPS, NODES_AT = OWN + 1, OWN + 2, OWN + 3
+"""Integers of a path through points: how many points and wraps it has, and the records of its nodes: of the points, and
+then of two tangent points for each wrap."""
+
+NODE_INTS = 8
+LINK, BODY, KIND, OF, AT, TABLES = 0, 1, 2, 3, 4, 5
+"""Of a node: its link and body; the degree of freedom of its coordinate (-1 if that is locked), or the number of the
+surface that a tangent point is on; place of its numbers, and of the tables of its three functions."""
+
+FIXED, CONDITIONAL, MOVING, TANGENT = 0, 1, 2, 3
+"""Kinds of nodes."""
+
+STATION, VALUE, LOW, HIGH, TURN = 0, 3, 4, 5, 6
+"""Numbers of a node: a point of the link (m); value of a locked coordinate, and the range of any; rotation in the link
+of the frame in which the functions give the place, by rows, which then is about that point."""
+
+COUNT, ORDER = 3, 4
+"""The rest of the record: how many nodes the path runs through, which these are, and what is known of each node."""
+
+NODE_WORK = 12
+PLACE, KEPT, ALONG, GRADIENT, SURFACE, IS_KEPT = 0, 3, 6, 9, 9, 10
+"""Of a node: where it is in ground, and where a tangent point counts as for straight lines, once that is known; unit
+vector to the next node; derivative of the place by the coordinate, in ground; length on the surface before it."""
+
+COINCIDENT, SIGNIFICANT = 2.0**-52, 2.0 ** (-52.0 * 7.0 / 8.0)
+"""Distances (m) below which two points have no line, for speeds and for forces, in Simbody."""
+
+
+def path_length(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
+    """Length and lengthening speed of the path of an item."""
+    call(s[path + LAW], s, x, w, y, f, path)
+    found = at(w, s[path + RECORD])
+    return found[LENGTH], found[SPEED]
+
+
+def pull_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int, tension: float) -> None:
+    """Apply a tension along the path of an item, after its length was found."""
+    w[s[path + RECORD] + TENSION] = tension
+    call(s[path - s[path + PULL] + LAW], s, x, w, y, f, path)
+
+
+def straight_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Length and speed of a path without wraps."""
+    place_points(s, x, w, y, item)
+    measure_points(s, w, y, item)
+    return OK
+
+
+def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
+    """Where the points are, and which of them the path runs through."""
+    i, p = at(s, item), at(x, s[item + NUMBERS])
+    found = at(w, i[RECORD])
+    order, work = at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
+    count = 0
+    for number in range(i[POINTS]):
+        node, here = at(i, NODES_AT + NODE_INTS * number), at(work, NODE_WORK * number)
+        n = at(p, node[AT])
+        px, py, pz = n[STATION], n[STATION + 1], n[STATION + 2]
+        if node[KIND] != FIXED:
+            value = y[node[OF]] if node[OF] >= 0 else n[VALUE]
+            if node[KIND] == CONDITIONAL:
+                if not n[LOW] <= value <= n[HIGH]:
+                    continue
+            else:
+                # As in OpenSim, the place is that of the clamped coordinate, its derivative that of the coordinate.
+                clamped, t = min(max(value, n[LOW]), n[HIGH]), at(n, TURN)
+                qx, dx, _ = value_at(at(p, node[TABLES]), clamped)
+                qy, dy, _ = value_at(at(p, node[TABLES + 1]), clamped)
+                qz, dz, _ = value_at(at(p, node[TABLES + 2]), clamped)
+                if clamped != value:
+                    _, dx, _ = value_at(at(p, node[TABLES]), value)
+                    _, dy, _ = value_at(at(p, node[TABLES + 1]), value)
+                    _, dz, _ = value_at(at(p, node[TABLES + 2]), value)
+                px += t[0] * qx + t[1] * qy + t[2] * qz
+                py += t[3] * qx + t[4] * qy + t[5] * qz
+                pz += t[6] * qx + t[7] * qy + t[8] * qz
+                here[GRADIENT], here[GRADIENT + 1], here[GRADIENT + 2] = direction(
+                    s,
+                    w,
+                    node[LINK],
+                    t[0] * dx + t[1] * dy + t[2] * dz,
+                    t[3] * dx + t[4] * dy + t[5] * dz,
+                    t[6] * dx + t[7] * dy + t[8] * dz,
+                )
+        here[PLACE], here[PLACE + 1], here[PLACE + 2] = station(s, w, node[LINK], px, py, pz)
+        order[count] = number
+        count += 1
+    found[COUNT] = count
+
+
+def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> None:
+    """Length, speed and directions, from the places of the nodes that the path runs through."""
+    i, found = at(s, item), at(w, s[item + RECORD])
+    nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
+    length = speed = 0.0
+    for k in range(1, int(found[COUNT])):
+        one, two = int(order[k - 1]), int(order[k])
+        m, n = at(nodes, NODE_INTS * one), at(nodes, NODE_INTS * two)
+        a, b = at(work, NODE_WORK * one), at(work, NODE_WORK * two)
+        dx, dy, dz, distance = between(m, a, n, b)
+        if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
+            length += b[SURFACE]
+        else:
+            length += distance
+        if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
+            ux, uy, uz = node_velocity(s, w, y, m, a)
+            vx, vy, vz = node_velocity(s, w, y, n, b)
+            vx, vy, vz = vx - ux, vy - uy, vz - uz
+            if distance < COINCIDENT:
+                speed += sqrt(vx * vx + vy * vy + vz * vz)
+            else:
+                speed += (vx * dx + vy * dy + vz * dz) / distance
+        inverse = nan if distance < SIGNIFICANT else 1.0 / distance
+        a[ALONG], a[ALONG + 1], a[ALONG + 2] = inverse * dx, inverse * dy, inverse * dz
+    found[LENGTH], found[SPEED] = length, speed
+
+
+def between(m: Ints, a: Floats, n: Ints, b: Floats) -> tuple[float, float, float, float]:
+    """The straight line from one node to another, and its length."""
+    a = at(a, KEPT if m[KIND] == TANGENT else PLACE)
+    b = at(b, KEPT if n[KIND] == TANGENT else PLACE)
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    return dx, dy, dz, sqrt(dx * dx + dy * dy + dz * dz)
+
+
+def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> tuple[float, float, float]:
+    """Velocity of a node; tangent points move with the body of their surface."""
+    vx, vy, vz = velocity(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2])
+    if node[KIND] == MOVING and node[OF] >= 0:
+        u = y[s[FREEDOMS] + node[OF]]
+        return vx + u * here[GRADIENT], vy + u * here[GRADIENT + 1], vz + u * here[GRADIENT + 2]
+    return vx, vy, vz
+
+
+def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Pull at the nodes of a path, along every line between two bodies.
+
+    A moving point works on its coordinate too.
+    """
+    i, found = at(s, item), at(w, s[item + RECORD])
+    nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
+    tension, last = found[TENSION], int(found[COUNT]) - 1
+    bx = by = bz = 0.0
+    for k in range(last + 1):
+        number = int(order[k])
+        node, here = at(nodes, NODE_INTS * number), at(work, NODE_WORK * number)
+        fx, fy, fz = -bx, -by, -bz
+        bx = by = bz = 0.0
+        if k < last and nodes[NODE_INTS * int(order[k + 1]) + BODY] != node[BODY]:
+            bx, by, bz = tension * here[ALONG], tension * here[ALONG + 1], tension * here[ALONG + 2]
+        fx, fy, fz = fx + bx, fy + by, fz + bz
+        apply_force(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2], fx, fy, fz)
+        if node[KIND] == MOVING and node[OF] >= 0:
+            f[s[FREEDOMS] + node[OF]] += fx * here[GRADIENT] + fy * here[GRADIENT + 1] + fz * here[GRADIENT + 2]
+    return OK
