@@ -119,11 +119,12 @@ def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, argument
 
 def test_unsupported_force(walker, tmp_path):
     text = Path(walker).read_text()
-    motor = '<ActivationCoordinateActuator name="motor"><coordinate>RHip_rz</coordinate></ActivationCoordinateActuator>'
+    station = "<Station><socket_parent_frame>/ground</socket_parent_frame></Station>"
+    sole = f'<ExponentialContactForce name="sole">{station}</ExponentialContactForce>'
     place = text.index("<objects>", text.index("<ForceSet")) + len("<objects>")
-    (tmp_path / "m.osim").write_text(text[:place] + motor + text[place:])
+    (tmp_path / "m.osim").write_text(text[:place] + sole + text[place:])
     code, _, err = run("simulate", "m.osim", folder=tmp_path)
-    assert code == 1 and "/forceset/motor" in err and "--skip-unsupported" in err
+    assert code == 1 and "/forceset/sole" in err and "--skip-unsupported" in err
     code, out, _ = run("simulate", "m.osim", "--skip-unsupported", "--to", "0.1", folder=tmp_path)
     assert code == 0 and "left out" in out
 

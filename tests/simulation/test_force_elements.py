@@ -21,8 +21,9 @@ from osimlite import (
 )
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody import build_mechanism
-from osimlite.schema.actuators import ActivationCoordinateActuator, BodyActuator, CoordinateActuator
+from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.contact import ContactEllipsoid
+from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.schema.controller_types import ControlSetController, PrescribedController
 from osimlite.schema.functions import Constant, Function, LinearFunction, PolynomialFunction, SimmSpline, Sine
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
@@ -97,8 +98,8 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
     [
         (wrapped, r"'/forceset/a' \(PathSpring that wraps around a surface\)"),
         (
-            lambda: ActivationCoordinateActuator(name="a", coordinate="q0"),
-            r"'/forceset/a' \(ActivationCoordinateActuator\)",
+            lambda: ExponentialContactForce(name="a", station=osimlite.Station(socket_parent_frame="/ground")),
+            r"'/forceset/a' \(ExponentialContactForce\)",
         ),
         (
             lambda: controlled(ControlSetController(name="c")),

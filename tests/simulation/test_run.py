@@ -20,6 +20,7 @@ from osimlite.errors import (
     SimulationError,
     UnsupportedError,
 )
+from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.simulation import Interrupted, Simulation, read_sto
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.run import report_times
@@ -217,13 +218,13 @@ def test_spinning_top_keeps_its_momentum():
 # ------------------------------------------------------------------------------------------------ failures
 def test_unsupported_force_is_named(walker, fixtures):
     model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
-    model.add(osimlite.ActivationCoordinateActuator(name="motor", coordinate="RHip_rz"))
-    with pytest.raises(UnsupportedError, match=r"'/forceset/motor' \(ActivationCoordinateActuator\)"):
+    model.add(ExponentialContactForce(name="sole", station=osimlite.Station(socket_parent_frame="/ground")))
+    with pytest.raises(UnsupportedError, match=r"'/forceset/sole' \(ExponentialContactForce\)"):
         osimlite.simulate(model)
     without = osimlite.simulate(model, to=0.1, skip_unsupported=True)
-    assert without.summary["skipped_forces"] == ["'/forceset/motor' (ActivationCoordinateActuator)"]
+    assert without.summary["skipped_forces"] == ["'/forceset/sole' (ExponentialContactForce)"]
     assert np.array_equal(without.values, osimlite.simulate(walker, to=0.1).values)
-    model.find("/forceset/motor").appliesForce = False
+    model.find("/forceset/sole").appliesForce = False
     assert osimlite.simulate(model, to=0.1).summary["skipped_forces"] == []
 
 
