@@ -36,6 +36,7 @@ LAW_MODULES = {
     "touch_mesh": "meshes",
     "wrap_cylinder": "wrap_cylinder",
     "wrap_sphere": "wrap_sphere",
+    "wrap_torus": "wrap_torus",
     "straight_path": "paths",
     "pull_points": "paths",
 }
