@@ -1,7 +1,7 @@
 """Actuators: forces that a control sets."""
 
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from osimlite.schema.fields import Flag, Number, Vec3, real, vec3
 from osimlite.schema.forces import ForceProducer
@@ -10,6 +10,8 @@ from osimlite.schema.references import BodySocket, MaybeBodyName, MaybeCoordinat
 
 class Actuator(ForceProducer, abstract=True):
     """A force with one or several controls."""
+
+    control_count: ClassVar[int] = 1
 
 
 class ScalarActuator(Actuator, abstract=True):
@@ -90,6 +92,8 @@ class TorqueActuator(ScalarActuator):
 
 class BodyActuator(Actuator):
     """Pushes a body with six controls: a torque, then a force at `point`."""
+
+    control_count: ClassVar[int] = 6
 
     socket_body: BodySocket = ""
     """The body that is pushed."""

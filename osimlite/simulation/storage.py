@@ -121,9 +121,14 @@ def read_sto(path: str | Path) -> StoTable:
 
 
 def read_beside(folder: Path, name: str) -> StoTable:
-    """Read a table that a document names: looked for in the document's folder, then from where the program runs."""
-    beside = folder / name
-    return read_sto(beside if beside.is_file() or not Path(name).is_file() else name)
+    """Read a table that a document names; see :func:`beside`."""
+    return read_sto(beside(folder, name))
+
+
+def beside(folder: Path, name: str) -> Path:
+    """Where a file is that a document names: looked for in the document's folder, then from where the program runs."""
+    there, here = folder / name, Path(name)
+    return there if there.is_file() or not here.is_file() else here
 
 
 def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str) -> Iterator[str]:

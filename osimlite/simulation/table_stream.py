@@ -53,6 +53,8 @@ class TableStream:
         labels: of the columns as they are in the file, without the time.
         columns: labels of the numbers; of a Vec3 ``p`` these are ``p_x``, ``p_y`` and ``p_z``.
         in_degrees: whether rotational values are in degrees.
+        line: number of the line of the file that was read last.
+        text: of the row that was read last.
         header: every ``key=value`` line of the header.
 
     Raises:
@@ -62,7 +64,7 @@ class TableStream:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.file = str(path)
+        self.file, self.line, self.text = str(path), 0, ""
         self._stream = TextIOWrapper(open_file(path), encoding="utf-8", errors="replace")
         try:
             self._read_header()
@@ -83,7 +85,8 @@ class TableStream:
     def __iter__(self) -> Iterator[tuple[float, list[float]]]:
         place, size = self._time, len(self.columns) + 1
         vectors = self.kind != "double"
-        for number, line in enumerate(self._stream, start=self._line + 1):
+        for number, line in enumerate(self._stream, start=self.line + 1):
+            self.line, self.text = number, line
             text = line.replace(",", " ") if vectors else line
             words = text.split()
             if not words:
@@ -97,7 +100,7 @@ class TableStream:
                     f"the row has {len(row)} numbers and needs {size}",
                     file=self.file,
                     line=number,
-                    column=len(line.rstrip()) + 1 if len(row) < size else _start(text, size),
+                    column=len(line.rstrip()) + 1 if len(row) < size else start_of_word(text, size),
                 )
             time = row.pop(place)
             yield time, row
@@ -125,7 +128,7 @@ class TableStream:
         for number, line in enumerate(self._stream, start=1):
             text = line.strip()
             if text.lower() == "endheader":
-                self._line = number
+                self.line = number
                 break
             key, equals, value = (part.strip() for part in text.partition("="))
             word, _, rest = text.partition(" ")
@@ -160,12 +163,12 @@ class TableStream:
     def _read_labels(self) -> tuple[str, ...]:
         line = ""
         for line in self._stream:
-            self._line += 1
+            self.line += 1
             if line.strip():
                 break
         text = line.strip()
         if not text:
-            raise DocumentError("the table ends before its column labels", file=self.file, line=self._line)
+            raise DocumentError("the table ends before its column labels", file=self.file, line=self.line)
         labels = [label.strip() for label in text.split("\t")] if "\t" in text else text.split()
         said = next((self.header[key] for key in ("nColumns", "nc", "datacolumns") if key in self.header), "")
         if said.isdecimal() and len(labels) != int(said) == len(text.split()):
@@ -174,7 +177,7 @@ class TableStream:
         at = next((place for place, label in enumerate(labels) if label.lower() == "time"), None)
         if at is None or (at > 0 and self.kind != "double"):
             raise DocumentError(
-                f"the first column is '{labels[0]}'; it must be 'time'", file=self.file, line=self._line, column=1
+                f"the first column is '{labels[0]}'; it must be 'time'", file=self.file, line=self.line, column=1
             )
         self._time = at
         return (*labels[:at], *labels[at + 1 :])
@@ -192,8 +195,8 @@ def _no_storage(beginning: str) -> str:
     return "this is no storage file (.sto, .mot): it has no line 'endheader'"
 
 
-def _start(text: str, word: int) -> int:
-    """Column at which a word starts, counted from 0."""
+def start_of_word(text: str, word: int) -> int:
+    """Column (from 1) at which a word (from 0) of a line starts."""
     return [match.start() for match in re.finditer(r"\S+", text)][word] + 1
 
 

@@ -105,7 +105,10 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
             lambda: controlled(ControlSetController(name="c")),
             r"'/forceset/a' \(CoordinateActuator driven by the ControlSetController '/controllerset/c'\)",
         ),
-        (by_body, r"'/forceset/a' \(BodyActuator driven by '/controllerset/c'\)"),
+        (
+            by_body,
+            r"'/forceset/a' \(BodyActuator driven by the one control of '/controllerset/c', and it has several\)",
+        ),
     ],
 )
 def test_what_cannot_be_computed_is_named(make, message):

@@ -1,144 +1,164 @@
-"""What sets the controls of actuators: functions of time, and columns of a file.
+"""The controls of a model's actuators: what its controllers, and the user, make of each.
 
-A control that nothing sets is 0. OpenSim keeps it within no limits.
+A control that nothing drives is 0; what several want of one is added up. OpenSim keeps it within no limits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from osimlite.errors import ModelError
-from osimlite.multibody.functions import Function, PiecewiseConstant
-from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.errors import UnsupportedError
+from osimlite.multibody.functions import Function
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
-from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.controller_types import TrackingController
 from osimlite.schema.controllers import Controller
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of
-from osimlite.simulation.storage import StoTable, read_beside
-from osimlite.text import did_you_mean
+from osimlite.simulation.elements.integral import value_of
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.functions import table_of_one
+
+if TYPE_CHECKING:
+    from osimlite.simulation.elements.gather import ElementBuilder
 
 
-def control_functions(builder: ElementBuilder, actuator: Any) -> tuple[Function, ...]:
-    """What the controllers of the model do to an actuator: functions of time whose sum is its control.
+@dataclass(frozen=True, eq=False)
+class Controls:
+    """All controls: for each of them the functions of time whose sum it is.
+
+    Attributes:
+        names: paths of the actuators in the order of the model; of one with several controls with `_0`, `_1` ...
+            behind it, as OpenSim's tools call them.
+        functions: of each.
+    """
+
+    names: tuple[str, ...] = ()
+    functions: tuple[tuple[Function, ...], ...] = ()
+
+    def driven(self, more: Mapping[str, Function]) -> Controls:
+        """With a function added to some of them, by name."""
+        pairs = zip(self.names, self.functions, strict=True)
+        return replace(self, functions=tuple((*own, more[name]) if name in more else own for name, own in pairs))
+
+    def record(self) -> tuple[list[int], list[float], str | Callable[..., None]]:
+        """Integers and numbers for the kernel that computes them, and this; in Python if a function has no table."""
+        ends: list[int] = []
+        tables: list[int] = []
+        numbers: list[float] = []
+        kernel: str | Callable[..., None] = "set_controls"
+        for name, functions in zip(self.names, self.functions, strict=True):
+            for function in functions:
+                tables.append(len(numbers))
+                try:
+                    numbers += table_of_one(function, f"the control of '{name}'")
+                except UnsupportedError:
+                    kernel = self._computed
+            ends.append(len(tables))
+        return [len(ends), *ends, *tables], numbers, kernel
+
+    def _computed(self, s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> None:
+        first, time = s[item + layout.RECORD], w[layout.TIME]
+        for number, functions in enumerate(self.functions):
+            w[first + number] = sum(value_of(function, time) for function in functions)
+
+
+NO_CONTROLS = Controls()
+
+
+class Reflex(NamedTuple):
+    """A control in proportion to how fast a muscle lengthens, s/m."""
+
+    gain: float
+
+
+class Drive(NamedTuple):
+    """What a controller does to an actuator.
+
+    Attributes:
+        actuator: the component.
+        signal: what it adds to a control, or the error that says why that cannot be computed.
+        number: of the control among those of the actuator.
+    """
+
+    actuator: Any
+    signal: Function | Reflex | UnsupportedError
+    number: int = 0
+
+
+class ModelControls:
+    """What the controllers of a model do.
+
+    Args:
+        builder: of the model's elements.
+
+    Attributes:
+        controls: the functions of time.
 
     Raises:
-        UnsupportedError: it is driven by a controller that is no PrescribedController.
-        ModelError: a controller has not one function for each actuator, or a file that does not fit.
-    """
-    functions: list[Function] = []
-    for source in _sources(builder):
-        functions += [
-            _function(builder, source.controller, place, actuator)
-            for place, target in enumerate(source.named)
-            if target is actuator
-        ]
-        functions += _from_file(builder, source, actuator)
-    return tuple(functions)
-
-
-def controllers(builder: ElementBuilder) -> Iterator[Controller]:
-    """The controllers that are enabled."""
-    for component in builder.tree.components:
-        if not isinstance(component, Unknown) and isinstance(component, Controller) and component.enabled:
-            yield component
-
-
-def _function(builder: ElementBuilder, controller: Controller, place: int, actuator: Any) -> Function:
-    if not isinstance(controller, PrescribedController):
-        raise builder.unsupported(actuator, f" driven by the {kind_of(controller)} '{builder.path(controller)}'")
-    given = controller.ControlFunctions.objects
-    if len(given) != len(controller.socket_actuators):
-        raise ModelError(
-            f"'{builder.path(controller)}' has {len(given)} functions for {len(controller.socket_actuators)} "
-            "actuators; give it one for each"
-        )
-    return builder.function(actuator, given[place], f"control by {builder.path(controller)}")
-
-
-class _Source(NamedTuple):
-    """A controller, the actuators that it names, its file if it has one, and the actuator of each column there.
-
-    As in OpenSim, a column whose actuator the controller names by the same words is passed over: it has none.
+        ModelError: a controller has no meaning, or a file that it names does not fit the model.
     """
 
-    controller: Controller
-    named: list[Any]
-    table: StoTable | None
-    columns: list[Any]
+    def __init__(self, builder: ElementBuilder) -> None:
+        actuators = [item for item in builder.tree.components if isinstance(item, Actuator)]
+        names: list[str] = []
+        self._first: dict[str, int] = {}
+        for actuator in actuators:
+            path, count = builder.path(actuator), actuator.control_count
+            self._first[path] = len(names)
+            names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
+        functions: list[list[Function]] = [[] for _ in names]
+        self._gains = dict.fromkeys(self._first, 0.0)
+        self._refused: dict[str, UnsupportedError] = {}
+        for actuator, signal, number in _drives(builder):
+            path = builder.path(actuator)
+            if isinstance(signal, UnsupportedError):
+                self._refused[path] = signal
+            elif isinstance(signal, Reflex):
+                self._gains[path] += signal.gain
+            else:
+                functions[self._first[path] + number].append(signal)
+        self.controls = Controls(tuple(names), tuple(map(tuple, functions)))
+
+    def first_of(self, builder: ElementBuilder, actuator: Any) -> int:
+        """Number of the first control of an actuator.
+
+        Raises:
+            UnsupportedError: something drives it that cannot be computed.
+        """
+        path = builder.path(actuator)
+        if path in self._refused:
+            raise self._refused[path]
+        return self._first[path]
+
+    def gain(self, builder: ElementBuilder, actuator: Any) -> float:
+        """What reflexes add to the control of a muscle, for how fast it lengthens, s/m."""
+        return self._gains[builder.path(actuator)]
 
 
-_known: WeakKeyDictionary[ElementBuilder, list[_Source]] = WeakKeyDictionary()
-"""What was found for the actuators of a model: each file is read once."""
+def _drives(builder: ElementBuilder) -> Iterator[Drive]:
+    """What all enabled controllers do.
 
+    A class of controllers is declared in the module of its name in `controllers/`, by a function `drives`.
+    """
+    from osimlite.simulation.elements.gather import module_name
 
-def _sources(builder: ElementBuilder) -> list[_Source]:
-    """All enabled controllers."""
-    if builder not in _known:
-        _known[builder] = [_source(builder, controller) for controller in controllers(builder)]
-    return _known[builder]
-
-
-def _source(builder: ElementBuilder, controller: Controller) -> _Source:
-    words = controller.socket_actuators
-    named = [builder.target(controller, "socket_actuators", word) for word in words]
-    if not (isinstance(controller, PrescribedController) and controller.controls_file):
-        return _Source(controller, named, None, [])
-    actuators: dict[str, Any] = {}
-    for component in builder.tree.components:
-        if isinstance(component, Actuator):
-            actuators.setdefault(component.name, component)
-            actuators.setdefault(builder.path(component), component)
-    table = read_beside(builder.folder, str(controller.controls_file))
-    passed_over = {word if isinstance(word, str) else builder.path(word) for word in words}
-    columns: list[Any] = []
-    for label in table.columns:
-        if label not in passed_over and label not in actuators:
-            names = [item.name for item in builder.tree.components if isinstance(item, Actuator)]
-            raise ModelError(
-                f"the column '{label}' of the file of '{builder.path(controller)}' is no actuator of the model"
-                f"{did_you_mean(label, names)}",
-                file=table.file,
-            )
-        columns.append(None if label in passed_over else actuators[label])
-    return _Source(controller, named, table, columns)
-
-
-def _from_file(builder: ElementBuilder, source: _Source, actuator: Any) -> Iterator[Function]:
-    """The column of a controller's file for an actuator, if there is one."""
-    controller, table = source.controller, source.table
-    if table is None or not isinstance(controller, PrescribedController):
-        return
-    path = builder.path(controller)
-    for place, target in enumerate(source.columns):
-        if target is not actuator:
+    for controller in builder.tree.components:
+        if isinstance(controller, Unknown) or not isinstance(controller, Controller) or not controller.enabled:
             continue
-        if actuator in source.named:
-            raise ModelError(
-                f"'{path}' sets '{builder.path(actuator)}' by a function and by the column '{table.columns[place]}'; "
-                "leave one out",
-                file=table.file,
-            )
-        yield _column(table, place, controller, path)
+        module = f"{__package__}.controllers.{module_name(type(controller))}"
+        if find_spec(module) is not None:
+            yield from import_module(module).drives(builder, controller)
+            continue
+        why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"
+        if isinstance(controller, TrackingController):
+            why += ", whose desired motion is known to its tool only"
+        for actuator in named(builder, controller):
+            yield Drive(actuator, builder.unsupported(actuator, why))
 
 
-def _column(table: StoTable, place: int, controller: PrescribedController, path: str) -> Function:
-    """A column as the function that the controller asks for: steps, or a spline of some degree (1 if not said)."""
-    degree = 1 if controller.interpolation_method is None else controller.interpolation_method
-    times, values = table.times, table.rows[:, place]
-    label = table.columns[place]
-    if not (np.isfinite(values).all() and (np.diff(times) > 0.0).all()):
-        raise ModelError(f"'{label}' has gaps, or times that do not increase; mend the file", file=table.file)
-    if degree == 0 and len(times):
-        return PiecewiseConstant(tuple(times.tolist()), tuple(values.tolist()))
-    if degree not in (1, 3, 5, 7) or len(times) < degree + 1:
-        raise ModelError(
-            f"the interpolation_method of '{path}' is {degree}, which {len(times)} rows do not allow; take 0 for steps "
-            "or 1 for straight lines",
-            file=table.file,
-        )
-    return smoothing_spline(times, values, (degree + 1) // 2, 0.0)
+def named(builder: ElementBuilder, controller: Controller) -> list[Any]:
+    """The actuators that a controller names."""
+    return [builder.target(controller, "socket_actuators", word) for word in controller.socket_actuators]

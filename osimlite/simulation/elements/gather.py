@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from re import sub
@@ -18,6 +19,7 @@ from osimlite.multibody.schema_functions import numeric
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
+from osimlite.simulation.elements.controls import NO_CONTROLS, Controls, ModelControls
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -29,10 +31,11 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Forces:
-    """The force elements of a model in its order, and the forces that were left out, as ``path (class)``."""
+    """The force elements of a model in its order, those left out, as ``path (class)``, and the controls of all."""
 
     elements: tuple[ForceElement, ...]
     skipped: tuple[str, ...] = ()
+    controls: Controls = NO_CONTROLS
 
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -79,7 +82,7 @@ def force_elements(
         from osimlite.simulation.elements.external_loads import read_external_loads
 
         elements += read_external_loads(mechanism, external_loads)
-    return Forces(tuple(elements), tuple(skipped))
+    return Forces(tuple(elements), tuple(skipped), builder.controls.controls)
 
 
 FEW = 4
@@ -137,6 +140,11 @@ class ElementBuilder:
             raise self.unsupported(force)
         element: ForceElement = kind.make(self, force)
         return element
+
+    @cached_property
+    def controls(self) -> ModelControls:
+        """What the controllers of the model do."""
+        return ModelControls(self)
 
     # ---------------------------------------------------------------------------------- what kinds ask for
     def coordinate(self, force: Any, field: str = "coordinate") -> int:

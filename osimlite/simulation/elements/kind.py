@@ -20,10 +20,12 @@ from importlib.util import find_spec
 from pkgutil import iter_modules
 from typing import Any
 
+from osimlite.schema.actuators import Actuator
+from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.elements.parameters import CONTROL, Number, Parameter, Tail
+from osimlite.simulation.elements.parameters import Control, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels import layout, pointers
 from osimlite.simulation.states import StateVariable
 
@@ -66,7 +68,7 @@ class Kind:
         outputs: names of the results of the law: what the geometry applies, rates of states, what is recorded.
         parameters: what the law is given of a component; a name stands for a property that is a number.
         inputs: which of the geometry's inputs the law is given; all if None.
-        controlled: whether the law is given the control.
+        controlled: whether the law is given the control, or the controls if there are several.
         states: of each force.
         labels: of the record, in which {name} stands for that of the force, each with its output; the geometry's own if
             None.
@@ -89,7 +91,10 @@ class Kind:
 
     def __post_init__(self) -> None:
         named = [Number(item) if isinstance(item, str) else item for item in self.parameters]
-        object.__setattr__(self, "terms", (*((CONTROL,) if self.controlled else ()), *named))
+        if self.controlled and issubclass(self.component, Actuator):
+            is_muscle = issubclass(self.component, Muscle)
+            named.insert(0, ReflexControl() if is_muscle else Control(self.component.control_count))
+        object.__setattr__(self, "terms", tuple(named))
 
     @property
     def name(self) -> str:
@@ -127,7 +132,7 @@ class Kind:
         scope: dict[str, Any] = {
             **self.geometry.functions(),
             **{name: value for term in self.terms for name, value in term.functions().items()},
-            **{name: getattr(layout, name) for name in ("NUMBERS", "RECORD", "FREEDOMS", "TIME", "OK")},
+            **{name: getattr(layout, name) for name in ("NUMBERS", "RECORD", "FREEDOMS", "TIME", "WORK_CONTROL", "OK")},
             "at": pointers.at,
             "law": self.law,
             "__name__": f"{__package__}.kinds.{self.name}",

@@ -9,11 +9,10 @@ from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function
-from osimlite.simulation.elements.controls import control_functions
 from osimlite.simulation.elements.formula import Formula
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.kernels.functions import table_of_one, value_at
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.controls import with_reflex
+from osimlite.simulation.kernels.functions import table_of_one
 from osimlite.simulation.kernels.programs import program
 
 
@@ -240,36 +239,44 @@ class Expressions(Parameter):
 
 
 @dataclass(frozen=True)
-class _Control(Parameter):
-    """What the controllers of the model set: the sum of some functions of time."""
+class Control(Parameter):
+    """What the controllers set: the controls of an actuator, as many as it has."""
 
+    count: int
     heads = 1
 
-    def read(self, builder: ElementBuilder, force: Any) -> tuple[Function, ...]:
-        """The functions."""
-        return control_functions(builder, force)
+    def read(self, builder: ElementBuilder, force: Any) -> Any:
+        """Number of the first of them among those of the model."""
+        return builder.controls.first_of(builder, force)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """They, one by one."""
+        return [f"w[s[WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
+
+    def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """The number."""
+        return (value,), ()
+
+
+@dataclass(frozen=True)
+class ReflexControl(Control):
+    """The control of a muscle, to which its own lengthening may add."""
+
+    count: int = 1
+    size = 1
+
+    def read(self, builder: ElementBuilder, force: Any) -> Any:
+        """Its number, and the gain of the reflex, s/m."""
+        return super().read(builder, force), builder.controls.gain(builder, force)
 
     def arguments(self, head: int, number: int) -> list[str]:
         """The control."""
-        return [f"control(at(i, i[{head}]), p, w[TIME])"]
+        return [f"with_reflex(w, s[WORK_CONTROL] + i[{head}], p[{number}], rate)"]
 
     def functions(self) -> dict[str, Callable[..., Any]]:
-        """What sums up."""
-        return {"control": control}
+        """What adds."""
+        return {"with_reflex": with_reflex}
 
-    def pack(self, value: Sequence[Function], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Place of the count of the functions, which the places of their tables follow."""
-        tables = [tail.put_numbers(table_of_one(function, f"a control of {where}")) for function in value]
-        return (tail.put_ints((len(tables), *tables)),), ()
-
-
-CONTROL = _Control()
-
-
-def control(tables: Ints, p: Floats, t: float) -> float:
-    """The sum of some functions of time, whose count stands before the places of their tables."""
-    total = 0.0
-    for k in range(tables[0]):
-        value, _, _ = value_at(at(p, tables[1 + k]), t)
-        total += value
-    return total
+    def pack(self, value: tuple[int, float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Number and gain."""
+        return value[:1], value[1:]

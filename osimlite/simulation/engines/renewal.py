@@ -18,6 +18,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 
@@ -57,8 +58,10 @@ class NumbersOnly:
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
-        # The numbers of all items are the last ones, in their order.
-        self._first, place = {}, len(engine.numbers) - sum(_length(items) for items in self._items.values())
+        # The numbers of all items are the last ones before those of the controls, in their order.
+        controls = engine.structure[layout.CONTROLS]
+        end = engine.structure[controls + layout.NUMBERS] if controls > 0 else len(engine.numbers)
+        self._first, place = {}, end - sum(_length(items) for items in self._items.values())
         for path, items in self._items.items():
             self._first[path] = place
             place += _length(items)

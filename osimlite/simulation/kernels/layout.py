@@ -35,7 +35,9 @@ CONSTRAINED = 19
 """Place of the record of all constraints, 0 if there are none."""
 STATE_SIZE = 20
 """Length of a state: values, speeds, and auxiliary states."""
-LAWS = 21
+CONTROLS, WORK_CONTROL = 21, 22
+"""Place of the record of the controls, 0 if there are none; place in w of the controls."""
+LAWS = 23
 """From here on the addresses of the laws, by their number."""
 
 LINK_INTS = 5
@@ -59,7 +61,7 @@ many there are on the way."""
 
 LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
 """Of an item: address of its kernel, places in x and w of what it owns there, number of the first contact of its
-element, and from OWN on integers of its own."""
+element, and from OWN on integers of its own. The record of the controls is like one."""
 
 CONSTRAINED_DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = 0, 1, 2, 3
 EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 4, 5, 6, 7, 8, 9

@@ -11,6 +11,7 @@ from osimlite.simulation.kernels.layout import (
     AXIS,
     BALL,
     BEFORE,
+    CONTROLS,
     CURVATURE,
     END_OPERATION,
     FIRST_OPERATION,
@@ -21,6 +22,7 @@ from osimlite.simulation.kernels.layout import (
     FUNCTION,
     GRADIENT,
     GRAVITY_AT,
+    LAW,
     LAWS,
     LINK_AT,
     LINK_INTS,
@@ -137,8 +139,10 @@ def set_frame(
 
 
 def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
-    """After `place`: velocities, accelerations without udot, columns of the speeds, rates of the coordinates."""
-    status, size = OK, s[FREEDOMS]
+    """After `place`: velocities, accelerations without udot, columns of the speeds, rates of coordinates, controls."""
+    status, size, controls = OK, s[FREEDOMS], s[CONTROLS]
+    if controls > 0:
+        status = call(s[controls + LAW], s, x, w, y, f, controls)
     for freedom in range(size):
         f[freedom] = y[size + freedom]
     for k in range(s[SUMMED]):

@@ -102,9 +102,7 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         order += sorted(own & free)
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
-    return _Packer(places, links, ends, forces.elements, StateLayout(mechanism, order, forces.elements)).packed(
-        tuple(order)
-    )
+    return _Packer(places, links, ends, forces, StateLayout(mechanism, order, forces.elements)).packed(tuple(order))
 
 
 def _operations(
@@ -200,13 +198,14 @@ class _Packer:
         places: Places,
         links: list[_Link],
         ends: list[int],
-        elements: Sequence[ForceElement],
+        forces: Forces,
         state: StateLayout,
     ) -> None:
         self.places = places
         self.links = links
         self.ends = ends
-        self.elements = elements
+        self.elements: Sequence[ForceElement] = forces.elements
+        self.controls = forces.controls
         self.state = state
         self.operations = [operation for link in links for operation in link.operations]
         self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
@@ -235,6 +234,7 @@ class _Packer:
         self.operation_records()
         self.constraint_records(Constrained(self.places.mechanism, order))
         found = self.item_records()
+        self.control_record()
         ints[at.STATE_SIZE] = self.state.size
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
         ints[at.WORK_SIZE] = self.work
@@ -381,6 +381,16 @@ class _Packer:
         self.ints[at.CONTACT_AT] = len(self.ints)
         self.ints += pairs
         return found
+
+    def control_record(self) -> None:
+        """Write the controls, if there are any, behind all else: some motions have others there."""
+        count = len(self.controls.names)
+        if not count:
+            return
+        self.ints[at.CONTROLS], self.ints[at.WORK_CONTROL] = len(self.ints), self.room(count)
+        own, numbers, self.kernels[len(self.ints)] = self.controls.record()
+        self.ints += [0, len(self.numbers), self.ints[at.WORK_CONTROL], 0, *own]
+        self.numbers += numbers
 
 
 def _kind_of(matrix: Array) -> int:

@@ -13,6 +13,7 @@ from typing import Any
 LAW_MODULES = {
     "evaluate": "dynamics",
     "run_several": "merson",
+    "set_controls": "controls",
     "contact_places": "places",
     "place_ball": "ball_joint",
     "move_ball": "ball_joint",

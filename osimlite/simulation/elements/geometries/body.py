@@ -42,6 +42,19 @@ def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     apply_force(s, w, g[1], ax, ay, az, -size * dx, -size * dy, -size * dz)
 
 
+def push_body(
+    s: Ints, w: Floats, g: Ints, gp: Floats, tx: float, ty: float, tz: float, fx: float, fy: float, fz: float
+) -> None:
+    """Turn a body, and push it at a point; torque and force are along three axes."""
+    px, py, pz = station(s, w, g[1], gp[0], gp[1], gp[2])
+    ax, ay, az = direction(s, w, g[2], gp[3], gp[4], gp[5])
+    bx, by, bz = direction(s, w, g[2], gp[6], gp[7], gp[8])
+    cx, cy, cz = direction(s, w, g[2], gp[9], gp[10], gp[11])
+    apply_torque(s, w, g[0], tx * ax + ty * bx + tz * cx, tx * ay + ty * by + tz * cy, tx * az + ty * bz + tz * cz)
+    fx, fy, fz = fx * ax + fy * bx + fz * cx, fx * ay + fy * by + fz * cy, fx * az + fy * bz + fz * cz
+    apply_force(s, w, g[0], px, py, pz, fx, fy, fz)
+
+
 def station_motion(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
     """Height of a station in ground, and its velocity; its place goes into the record."""
     room[0], room[1], room[2] = station(s, w, g[0], gp[0], gp[1], gp[2])
@@ -133,6 +146,21 @@ class ApartPoints(OnBodies):
         return Anchors((one, two), ((first, triple(force.pointA)), (second, triple(force.pointB))))
 
 
+class OnBody(OnBodies):
+    """A body: the outputs tx, ty, tz (N.m) turn it, and fx, fy, fz (N) push it at a point."""
+
+    after = ("push_body(s, w, g, gp, tx, ty, tz, fx, fy, fz)",)
+    calls = (push_body,)
+
+    def read(self, builder: ElementBuilder, force: Any) -> Anchors:
+        """The body of an actuator, the point, and the axes along which torque and force are."""
+        body = builder.placement(builder.target(force, "socket_body", force.socket_body)).body
+        builder.check(force, force.point)
+        axes = GROUND if force.spatial_force_is_global else body
+        point = GROUND if force.point_is_global else body, triple(force.point)
+        return Anchors((body,), (point,), tuple((axes, triple(axis)) for axis in np.eye(3)))
+
+
 class NamedStation(NamedTuple):
     """A station of the model: its name, its body, and where it is there (m)."""
 
@@ -175,7 +203,7 @@ class AtStation(Geometry):
         return list(record[:3])
 
 
-AXIS, POINT, POINTS, STATION = AboutAxis(), AtPoint(), ApartPoints(), AtStation()
+AXIS, POINT, POINTS, BODY, STATION = AboutAxis(), AtPoint(), ApartPoints(), OnBody(), AtStation()
 
 
 def _unit(builder: ElementBuilder, force: Any, along: Sequence[float]) -> Triple:

@@ -1,0 +1,1 @@
+"""What each class of controllers does, in the module of its name: `drives(builder, controller)` yields it."""
