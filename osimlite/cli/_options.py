@@ -57,6 +57,7 @@ Foot = Annotated[
         show_default="the ends of the legs",
     ),
 ]
+Equilibrate = Annotated[bool, typer.Option("--equilibrate", help="Start muscles in equilibrium of fibers and tendon.")]
 Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
 Folder = Annotated[
     Path | None,

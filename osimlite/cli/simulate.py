@@ -31,6 +31,7 @@ def simulate(
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
+    equilibrate: options.Equilibrate = False,
     states: Annotated[
         Path | None,
         typer.Option(
@@ -105,6 +106,7 @@ def simulate(
                     report_interval=report_interval,
                     initial=initial,
                     initial_speeds=speeds,
+                    equilibrate=equilibrate,
                     progress=progress,
                 )
         except Interrupted as stopped:

@@ -12,7 +12,7 @@ from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.stepper import Progress
 from osimlite.text import or_known
 
-PER_RUN = "accuracy", "fixed_step", "report_interval", "initial", "initial_speeds", "progress"
+PER_RUN = "accuracy", "fixed_step", "report_interval", "initial", "initial_speeds", "equilibrate", "progress"
 """The options of a run; the others are chosen when a model is made ready."""
 
 
@@ -31,6 +31,8 @@ class Options:
             for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of
             states stands for its last row.
         initial_speeds: generalized speeds that do not start at their default, likewise.
+        equilibrate: start muscles where fiber and tendon are in equilibrium, as OpenSim's `equilibrateMuscles` does;
+            states that `initial` names stay as it says.
         progress: called with the simulated time reached and the length of the steps there (both in s), after every
             step, or after several that are quick.
         route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
@@ -52,6 +54,7 @@ class Options:
     report_interval: float = 0.01
     initial: Mapping[str, float | str] | str | Path | None = None
     initial_speeds: Mapping[str, float | str] | None = None
+    equilibrate: bool = False
     progress: Progress | None = None
     route: str = "auto"
     skip_unsupported: bool = False

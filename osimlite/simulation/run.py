@@ -152,7 +152,7 @@ class Simulation:
             }
             for given in (initial, chosen.initial_speeds)
         )
-        y = self.initial_state(initial, initial_speeds)
+        y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         settings = Settings(accuracy=chosen.accuracy, fixed_step=fixed_step, route=self.engine.route, show=chosen.show)
         recorder, stepper, states = self._moved(y, settings, times, chosen.progress)
@@ -169,6 +169,7 @@ class Simulation:
             "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,
+            **({"equilibrate": True} if chosen.equilibrate else {}),
             **{name: getattr(chosen, name) for name in TOLD},
             **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }
@@ -212,17 +213,20 @@ class Simulation:
             self._has_inertia = True
 
     @QUIET
-    def initial_state(self, initial: Mapping[str, float], speeds: Mapping[str, float]) -> list[float]:
+    def initial_state(
+        self, initial: Mapping[str, float], speeds: Mapping[str, float], *, equilibrate: bool = False
+    ) -> list[float]:
         """State in the engine's order (y,): default values and speeds, and what follows from them, but for those given.
 
         Args:
             initial: values (rad, m) of coordinates by name or path, and any states by their paths in ``states.sto``.
             speeds: generalized speeds of coordinates by name or path.
+            equilibrate: whether states that are not given start in equilibrium where they have one.
 
         Raises:
             ModelError: there is no such coordinate.
-            SimulationError: a coordinate is locked or prescribed, a number is not finite, or no pose or speeds fulfil
-                the constraints.
+            SimulationError: a coordinate is locked or prescribed, a number is not finite, no pose or speeds fulfil the
+                constraints, or a muscle has no equilibrium.
         """
         own = {path: initial[path] for path in self.state.paths if path in initial}
         q, u, places = starting(self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds)
@@ -234,10 +238,15 @@ class Simulation:
                 self._start = start, (values.tolist(), rates.tolist())
             q, u = self._start[1]
         y = self.state.pack(q, u)
-        for number, path in enumerate(self.state.paths, 2 * len(self.state.order)):
+        numbers = {path: number for number, path in enumerate(self.state.paths, 2 * len(self.state.order))}
+        for path, number in numbers.items():
             y[number] = float(own.get(path, y[number]))
             if not isfinite(y[number]):
                 raise SettingError(f"the state '{path}' starts at {y[number]}; give a number")
+        if equilibrate:
+            y = self.engine.equilibrated(0.0, y)
+            for path, value in own.items():
+                y[numbers[path]] = float(value)
         return y
 
     def state_in(self, path: str | Path, time: float | None = None) -> dict[str, float]:

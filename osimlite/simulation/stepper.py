@@ -41,6 +41,10 @@ class Projection(Protocol):
         """
 
 
+class NoSolution(SimulationError, ArithmeticError):
+    """The law of a force has no solution at a state; within a step, a smaller one is tried, as in Simbody."""
+
+
 class IntegrationError(SimulationError):
     """The integrator cannot go on.
 

@@ -25,6 +25,7 @@ from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
+from osimlite.simulation.stepper import NoSolution
 
 
 class System:
@@ -68,7 +69,7 @@ class System:
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.program = Program(packed, best() if code is None else code, self.entries)
-        self._items, self._packed_order = packed.items, packed.order
+        self._items, self._owners, self._packed_order = packed.items, packed.owners, packed.order
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
@@ -109,14 +110,17 @@ class System:
         Raises:
             OsimliteError: the state has a wrong length, or a part in Python has raised.
         """
-        if len(y) != len(self._y):
-            raise self.state.wrong_length(len(y))
-        self._w[layout.TIME] = t
-        self._y[:] = y if type(self._into) is slice else np.array(y)[self._into]
+        self._set(t, y)
         status = self._evaluate(stage)
         if status == layout.FAILED:
             raise self.program.failures.pop()
         return status
+
+    def _set(self, t: float, y: Sequence[float]) -> None:
+        if len(y) != len(self._y):
+            raise self.state.wrong_length(len(y))
+        self._w[layout.TIME] = t
+        self._y[:] = y if type(self._into) is slice else np.array(y)[self._into]
 
     def found(self) -> list[float]:
         """The derivative (y,) of the state; after the stage of forces, generalized forces in the place of udot."""
@@ -137,10 +141,46 @@ class System:
         self.note_loads(self._pairs[:, :3])
         return self.found()
 
+    def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
+        """A state (y,) with the auxiliary states that have an equilibrium in it, as Model::equilibrateMuscles gives it.
+
+        Args:
+            t: time, s.
+            y: the state.
+            numbers: of a model of the same structure; the system's own by default.
+
+        Raises:
+            SimulationError: a force has no equilibrium, or the rates of coordinates are not defined there.
+        """
+        count = self.structure[layout.EQUILIBRIA]
+        if not count:
+            return list(y)
+        equilibrate = self.program.equilibrate()
+        self._set(t, y)
+        x = self.numbers if numbers is None else numbers
+        status = equilibrate(self.program.ints, x, self._w, self._y, self._f, layout.VELOCITY_STAGE)
+        if status != layout.OK:
+            raise self.refusal(status, t, y)
+        for number in np.flatnonzero(self._f[:count]).tolist():
+            place = self.structure[self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * number + 1]
+            raise SimulationError(f"no equilibrium was found of {self._told(place)}")
+        row: list[float] = self._y[self._from].tolist()
+        return row
+
+    def _told(self, item: int) -> str:
+        """What an item is that has no solution."""
+        owner = self._owners[item]
+        element: Any = self.forces.elements[owner]
+        place, room = self._items[owner][-1]
+        return f"'{element.path}' ({element.told(self._w[place : place + room].tolist())})"
+
     def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         """The error for what the kernels say of a state."""
         if not np.isfinite(np.array(y)).all():
             return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
+        if status == layout.UNSOLVED:
+            item = self.structure[self.structure[layout.ITEM_AT] + int(self._f[0])]
+            return NoSolution(f"the equations of {self._told(item)} have no solution")
         if status == layout.SINGULAR_RATES:
             try:
                 self.mechanism.rate_matrix(self.state.values(y))

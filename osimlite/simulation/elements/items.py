@@ -32,6 +32,7 @@ class Item:
         is_contact: whether its record is that of a contact.
         is_part: whether another item of the element calls its kernel.
         states: places among its integers where those of its element's states in y are put, in their order.
+        equilibrium: name of the kernel that brings its states into equilibrium, if they have one.
         python: what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays.
     """
 
@@ -42,6 +43,7 @@ class Item:
     is_contact: bool = False
     is_part: bool = False
     states: tuple[int, ...] = ()
+    equilibrium: str = ""
     python: Callable[..., None] | None = None
 
 

@@ -2,17 +2,18 @@
 
 A kind says where its forces act (a geometry), what a law is given, and what the law's results mean. The law is a scalar
 function of floats. It is given, one after the other: the inputs of the geometry, the control if there is one, the
-states, the parameters. The kernel of a kind is written from this once, and compiled as every other kernel is.
+states, the parameters. The kernel of a kind is written from this once, and compiled as every other kernel is. A second
+law, given the same, may find states in equilibrium; its kernel is written likewise.
 
 The integers of an item are the places of what varies in length (curves, formulas, controls) and of its states, and
 after these the geometry's; its numbers the parameters, the geometry's, and the tables; its record the outputs that are
-no rates of states, what the geometry keeps, and the registers of formulas.
+no rates of states, inputs that are kept, what the geometry keeps, and the registers of formulas.
 """
 
 from __future__ import annotations
 
 import linecache
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
@@ -25,23 +26,30 @@ from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.elements.parameters import Control, Number, Parameter, ReflexControl, Tail
+from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels import layout, pointers
+from osimlite.simulation.kernels.table import EQUILIBRIUM
 from osimlite.simulation.states import StateVariable
 
-ENERGY = "energy"
-"""The output that is the potential energy (J) of a force; a kind without it stores none that is known."""
+ENERGY, SOLVED = "energy", "solved"
+"""The output that is the potential energy (J) of a force, and the one that tells whether the law has a solution; a kind
+without the first stores none that is known, the law of one without the other has always a solution."""
+
+
+NAMES = "NUMBERS", "RECORD", "FREEDOMS", "TIME", "WORK_CONTROL", "OK", "UNSOLVED"
+"""What the code of kernels uses of the layout."""
 
 
 @dataclass(frozen=True)
 class State:
-    """A state of a kind: the law is given its value, and gives `<name>_rate`.
+    """A state of a kind: the law is given its value, and gives its derivative.
 
     Attributes:
         name: as OpenSim has it.
         start: value at the beginning, from the component.
         exists: whether a component has it; the law is given 0 for one that it has not.
         given: whether the law is given its value at all.
+        output: name of the output that is its derivative; `<name>_rate` if left out.
         is_simbody: whether Simbody keeps it, in OpenSim.
     """
 
@@ -49,12 +57,13 @@ class State:
     start: Callable[[Any], float] = lambda component: 0.0
     exists: Callable[[Any], bool] = lambda component: True
     given: bool = True
+    output: str = ""
     is_simbody: bool = False
 
     @property
     def rate(self) -> str:
         """Name of the output that is its derivative."""
-        return f"{self.name}_rate"
+        return self.output or f"{self.name}_rate"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +77,14 @@ class Kind:
         outputs: names of the results of the law: what the geometry applies, rates of states, what is recorded.
         parameters: what the law is given of a component; a name stands for a property that is a number.
         inputs: which of the geometry's inputs the law is given; all if None.
+        kept: which of them, and of the derivatives of states, are recorded too.
         controlled: whether the law is given the control, or the controls if there are several.
         states: of each force.
+        equilibrium: computes states in equilibrium from what the law is given: whether it found them, and those that
+            `settled` names.
+        settled: names of the states that it finds.
+        told: what is said of a force whose law, or equilibrium, has no solution: names of parameters that are numbers
+            and of what is recorded.
         labels: of the record, in which {name} stands for that of the force, each with its output; the geometry's own if
             None.
         stored: energy (J) of a force from its record, where it is no output of the law.
@@ -82,8 +97,12 @@ class Kind:
     outputs: tuple[str, ...] = ()
     parameters: Sequence[str | Parameter] = ()
     inputs: tuple[str, ...] | None = None
+    kept: tuple[str, ...] = ()
     controlled: bool = False
     states: tuple[State, ...] = ()
+    equilibrium: Callable[..., Any] | None = None
+    settled: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
     labels: Mapping[str, str] | None = None
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
     check: Callable[[ElementBuilder, Any], None] | None = None
@@ -120,34 +139,86 @@ class Kind:
 
     @cached_property
     def recorded(self) -> dict[str, int]:
-        """Place in the record of each output that is kept there."""
-        rates = {state.rate for state in self.states}
-        return {name: place for place, name in enumerate(name for name in self.outputs if name not in rates)}
+        """Place in the record of all that is kept there."""
+        others = {SOLVED, *(state.rate for state in self.states)}
+        names = *(name for name in self.outputs if name not in others), *self.kept
+        return {name: place for place, name in enumerate(names)}
 
-    # ------------------------------------------------------------------------------------------- the kernel
+    # ------------------------------------------------------------------------------------------ the kernels
     @cached_property
     def kernel(self) -> Callable[..., int]:
         """The function that computes and applies one force, written from the declaration."""
-        source = self.source
+        return self._written(self.name, self.law, self.source)
+
+    @cached_property
+    def equilibrium_kernel(self) -> Callable[..., int]:
+        """The function that brings the states of one force into equilibrium."""
+        return self._written(self.name + EQUILIBRIUM, self.equilibrium, self.equilibrium_source)
+
+    def _written(self, name: str, law: Callable[..., Any] | None, source: str) -> Callable[..., int]:
         scope: dict[str, Any] = {
             **self.geometry.functions(),
             **{name: value for term in self.terms for name, value in term.functions().items()},
-            **{name: getattr(layout, name) for name in ("NUMBERS", "RECORD", "FREEDOMS", "TIME", "WORK_CONTROL", "OK")},
+            **{name: getattr(layout, name) for name in NAMES},
             "at": pointers.at,
-            "law": self.law,
+            "law": law,
             "__name__": f"{__package__}.kinds.{self.name}",
         }
-        file = f"<kernel of {self.component.__name__}>"
+        file = f"<kernel {name}>"
         exec(compile(source, file, "exec", dont_inherit=True), scope)
         # Tracebacks and `inspect.getsource` show it as they show a file.
         linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-        kernel: Callable[..., int] = scope[self.name]
+        kernel: Callable[..., int] = scope[name]
         return kernel
 
     @property
     def source(self) -> str:
         """The text of the kernel."""
-        head = self._heads
+        lines = self._before(self.name)
+        if self.law is not None:
+            results = f"{', '.join(self.outputs)} = " if self.outputs else ""
+            lines.append(f"{results}law({', '.join(self._arguments)})")
+        lines += self._noted(self.recorded)
+        if SOLVED in self.outputs:
+            lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
+        for place, state in self._places.items():
+            lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
+        return _function([*lines, *self.geometry.after])
+
+    @property
+    def equilibrium_source(self) -> str:
+        """The text of the kernel that brings the states into equilibrium."""
+        lines = self._before(self.name + EQUILIBRIUM)
+        lines.append(f"{', '.join((SOLVED, *self.settled))} = law({', '.join(self._arguments)})")
+        lines += self._noted((*self.geometry.inputs, *self.settled))
+        lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
+        for place, state in self._places.items():
+            if state.name in self.settled:
+                lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
+        return _function(lines)
+
+    def _before(self, name: str) -> list[str]:
+        """What both kernels begin with."""
+        return [
+            f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
+            "i = at(s, item)",
+            "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
+            f"g, gp, room = at(i, {layout.OWN + self._heads}), at(p, {self._size}), at(found, {len(self.recorded)})",
+            *self.geometry.before,
+        ]
+
+    def _noted(self, names: Iterable[str]) -> list[str]:
+        return [f"found[{self.recorded[name]}] = {name}" for name in names if name in self.recorded]
+
+    @property
+    def _places(self) -> dict[int, State]:
+        """Each state, by the integer of an item that says where it is, -1 if it has none."""
+        first = layout.OWN + sum(term.heads for term in self.terms)
+        return {first + number: state for number, state in enumerate(self.states)}
+
+    @property
+    def _arguments(self) -> list[str]:
+        """What a law is called with."""
         arguments = list(self.geometry.inputs if self.inputs is None else self.inputs)
         places = layout.OWN
         number = 0
@@ -155,24 +226,10 @@ class Kind:
         for term in self.terms:
             terms += term.arguments(places, number)
             places, number = places + term.heads, number + term.size
-        of_states = {state: places + k for k, state in enumerate(self.states)}
-        values = [f"y[i[{place}]]" for state, place in of_states.items() if state.given]
+        given = [place for place, state in self._places.items() if state.given]
+        values = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
         count = 1 if self.controlled else 0
-        arguments += [*terms[:count], *values, *terms[count:]]
-        lines = [
-            f'def {self.name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
-            "i = at(s, item)",
-            "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
-            f"g, gp, room = at(i, {layout.OWN + head}), at(p, {self._size}), at(found, {len(self.recorded)})",
-            *self.geometry.before,
-        ]
-        if self.law is not None:
-            results = f"{', '.join(self.outputs)} = " if self.outputs else ""
-            lines.append(f"{results}law({', '.join(arguments)})")
-        lines += [f"found[{place}] = {name}" for name, place in self.recorded.items()]
-        for state, place in of_states.items():
-            lines += [f"if i[{place}] > 0:", f"    f[i[{place}]] = {state.rate}"]
-        return "\n    ".join([*lines, *self.geometry.after, "return OK"]) + "\n"
+        return [*arguments, *terms[:count], *values, *terms[count:]]
 
     @property
     def _heads(self) -> int:
@@ -197,8 +254,16 @@ class Kind:
             heads += more
             own += plain
         at_states = tuple(len(heads) + k for k, state in enumerate(force.optional_states) if state is not None)
-        all_ints = (*heads, *[0] * len(self.states), *ints, *tail.ints)
-        item = Item(self.name, all_ints, (*own, *numbers, *tail.numbers), room=tail.room, states=at_states)
+        all_ints = (*heads, *[-1] * len(self.states), *ints, *tail.ints)
+        there = {state.name for state, own in zip(self.states, force.optional_states, strict=True) if own is not None}
+        item = Item(
+            self.name,
+            all_ints,
+            (*own, *numbers, *tail.numbers),
+            room=tail.room,
+            states=at_states,
+            equilibrium=self.name + EQUILIBRIUM if there & set(self.settled) else "",
+        )
         return [*parts, item]
 
 
@@ -252,12 +317,33 @@ class DeclaredForce:
             return kind.geometry.report(self, records[-1][len(kind.recorded) :] if records else (), origins)
         return [float(records[-1][kind.recorded[output]]) for output in kind.labels.values()]
 
+    def known(self, record: Sequence[float]) -> dict[str, float]:
+        """Its parameters that are numbers, and its record, by name."""
+        kind = self.kind
+        numbers: dict[str, float] = {}
+        for term, value in zip(kind.terms, self.values, strict=True):
+            if isinstance(term, Number):
+                numbers[term.name] = value
+            elif isinstance(term, Fields):
+                numbers |= zip(term.names, value, strict=True)
+        return numbers | {name: record[place] for name, place in kind.recorded.items()}
+
+    def told(self, record: Sequence[float]) -> str:
+        """What is said of it where a law has no solution."""
+        known = self.known(record)
+        return ", ".join(f"{name} {known[name]:.6g}" for name in self.kind.told)
+
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """Potential energy, J."""
         kind = self.kind
         if kind.stored is not None:
             return float(kind.stored(self, records[-1]))
         return float(records[-1][kind.recorded[ENERGY]]) if ENERGY in kind.recorded else 0.0
+
+
+def _function(lines: Sequence[str]) -> str:
+    """Its text, from the head on."""
+    return "\n    ".join([*lines, "return OK"]) + "\n"
 
 
 def kinds() -> list[Any]:

@@ -145,6 +145,50 @@ class Numbers(Parameter):
 
 
 @dataclass(frozen=True)
+class Fields(Parameter):
+    """Numbers that the law is given as one named tuple.
+
+    Attributes:
+        type: the tuple; its first fields are the properties.
+        properties: that are numbers.
+        others: the rest of its fields, from a component whose properties will do.
+    """
+
+    type: type[Any]
+    properties: tuple[Number, ...]
+    others: Callable[[ElementBuilder, Any], Sequence[float]]
+
+    @property
+    def size(self) -> int:  # type: ignore[override]
+        """How many."""
+        return len(self.type._fields)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the properties, and of the fields that are none."""
+        return (*(item.name for item in self.properties), *self.type._fields[len(self.properties) :])
+
+    def read(self, builder: ElementBuilder, force: Any) -> Any:
+        """The tuple."""
+        values = [item.read(builder, force) for item in self.properties]
+        values += map(float, self.others(builder, force))
+        builder.check(force, values)
+        return self.type(*values)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """It."""
+        return [f"{self.type.__name__}({', '.join(f'p[{number + k}]' for k in range(self.size))})"]
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """What makes it."""
+        return {self.type.__name__: self.type}
+
+    def pack(self, value: Sequence[float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Its numbers."""
+        return (), value
+
+
+@dataclass(frozen=True)
 class Vector(Numbers):
     """Several numbers, of which the law is given the place."""
 

@@ -28,6 +28,7 @@ from osimlite.simulation.engines.bullet_stepper import BulletStepper
 from osimlite.simulation.engines.bullet_world import World, bullet
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.integrators import RungeKuttaMerson
+from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.solver import SingularMassError, tree_solver
 from osimlite.simulation.speeds import Speeds
 from osimlite.simulation.stepper import Observer, Projection, Stepper
@@ -221,6 +222,10 @@ class BulletEngine:
         return massless(self.mechanism.coordinates[self.order[error.joint]].name)
 
     # ---------------------------------------------------------------------------------------------- reports
+    def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
+        """A state with the auxiliary states that have an equilibrium in it."""
+        return self.system.equilibrated(t, y, numbers)
+
     def touching(self, t: float, y: list[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
         return self.system.touching(t, y)

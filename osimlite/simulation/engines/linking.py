@@ -166,6 +166,7 @@ class Program:
     def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
         self.code = code
+        self._equilibria = packed.equilibria
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
         kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
@@ -180,6 +181,13 @@ class Program:
             else:
                 self.ints[place], kept = code.callback(self._guarded(kernel), sizes)
                 self._kept.append(kept)
+
+    def equilibrate(self) -> Callable[..., int]:
+        """What brings states into equilibrium, which is made ready when it is first asked for."""
+        self.code.make_ready(("equilibrate", *dict.fromkeys(self._equilibria.values())))
+        for place, kernel in self._equilibria.items():
+            self.ints[place] = self.code.address(kernel)
+        return self.code.entry("equilibrate")
 
     def _guarded(self, python: Callable[..., None]) -> Callable[..., int]:
         """A part in Python whose errors do not pass through machine code: who asked for an evaluation raises them."""

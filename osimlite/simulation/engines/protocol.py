@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
@@ -76,6 +77,18 @@ class Engine(Protocol):
         """Derivatives of the speeds of all coordinates of the mechanism, in its order; zero if locked.
 
         The auxiliary states are where they start.
+        """
+
+    def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
+        """A state with the auxiliary states that have an equilibrium in it.
+
+        Args:
+            t: time, s.
+            y: the state.
+            numbers: of a model of the same structure; the engine's own by default.
+
+        Raises:
+            SimulationError: a force has no equilibrium there.
         """
 
     def touching(self, t: float, y: list[float]) -> int:

@@ -18,6 +18,9 @@ from osimlite.simulation.kernels.layout import (
     DEPTH,
     DEPTH_OF,
     END_FREEDOM,
+    EQUILIBRIA,
+    EQUILIBRIUM_AT,
+    EQUILIBRIUM_INTS,
     FIRST_FREEDOM,
     FORCE_STAGE,
     FREEDOM_AT,
@@ -86,6 +89,17 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) ->
     if singular >= 0:
         f[0] = singular
         return SINGULAR_MASS
+    return OK
+
+
+def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
+    """Bring what can be into equilibrium: changes auxiliary states in y, and f[k] says how it went with the k-th."""
+    status = call(s[LAWS], s, x, w, y, f, stage)
+    if status != OK:
+        return status
+    for k in range(s[EQUILIBRIA]):
+        j = at(s, s[EQUILIBRIUM_AT] + EQUILIBRIUM_INTS * k)
+        f[k] = call(j[0], s, x, w, y, f, j[1])
     return OK
 
 

@@ -37,7 +37,11 @@ STATE_SIZE = 20
 """Length of a state: values, speeds, and auxiliary states."""
 CONTROLS, WORK_CONTROL = 21, 22
 """Place of the record of the controls, 0 if there are none; place in w of the controls."""
-LAWS = 23
+EQUILIBRIA, EQUILIBRIUM_AT = 23, 24
+"""Count and place of what can be brought into equilibrium: for each the address of the kernel that does it, and the
+place of its item."""
+EQUILIBRIUM_INTS = 2
+LAWS = 25
 """From here on the addresses of the laws, by their number."""
 
 LINK_INTS = 5
@@ -110,9 +114,10 @@ TURN, SLIDE, BALL, BALL_BACK, DRIFT = 0, 1, 2, 3, 4
 start, a SimbodyAccelerationError."""
 NOTHING, SHIFT, MOVE = 0, 1, 2
 """Fixed transforms: none, a translation, any."""
-OK, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED = 0, 1, 2, 3, 4
+OK, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED, UNSOLVED = 0, 1, 2, 3, 4, 5
 """What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined; of a
-projection: too far from where the constraints hold; of a kernel in Python: it raised an error."""
+projection: too far from where the constraints hold; of a kernel in Python: it raised an error; of an item: its law has
+no solution."""
 ACCELERATION_STAGE, POSITION_STAGE, FORCE_STAGE, VELOCITY_STAGE = 0, 1, 2, 3
 """How far an evaluation goes: to the accelerations, to the places of the links, to the forces (those that items apply
 are then in the place of the accelerations), to the velocities."""

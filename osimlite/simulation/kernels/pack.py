@@ -42,6 +42,8 @@ class Packed:
         numbers: the numbers.
         laws: names of the engine's own functions that must be there.
         kernels: by place in the structure what computes an item: a name, or a function of Python.
+        equilibria: by place in the structure the name of what brings an item into equilibrium.
+        owners: by place in the structure of an item the number of its force element.
         order: place in the mechanism of the coordinate of each degree of freedom.
         placements: of every body its link (-1 for ground) and its frame in that.
         items: of every force element the records of its items in the work vector, as place and length.
@@ -51,6 +53,8 @@ class Packed:
     numbers: Floats
     laws: tuple[str, ...]
     kernels: dict[int, str | Callable[..., None]]
+    equilibria: dict[int, str]
+    owners: dict[int, int]
     order: tuple[int, ...]
     placements: list[Placement]
     items: list[list[tuple[int, int]]]
@@ -215,6 +219,8 @@ class _Packer:
         self.balls: dict[tuple[int, ...], int] = {}
         self.laws: list[str] = ["evaluate"]
         self.kernels: dict[int, str | Callable[..., None]] = {}
+        self.equilibria: dict[int, str] = {}
+        self.owners: dict[int, int] = {}
 
     def packed(self, order: tuple[int, ...]) -> Packed:
         """Everything."""
@@ -240,7 +246,8 @@ class _Packer:
         ints[at.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
-        return Packed(structure, numbers, laws, self.kernels, order, self.places.placements, found)
+        kernels, equilibria, owners = self.kernels, self.equilibria, self.owners
+        return Packed(structure, numbers, laws, kernels, equilibria, owners, order, self.places.placements, found)
 
     def room(self, count: int) -> int:
         """Place of some more numbers in the work vector."""
@@ -359,8 +366,9 @@ class _Packer:
         contact = self.ints[at.WORK_CONTACT] = self.room(at.CONTACT_WORK * self.ints[at.CONTACTS])
         records: list[int] = []
         pairs: list[int] = []
+        settling: dict[int, str] = {}
         found: list[list[tuple[int, int]]] = []
-        for element, group in zip(self.elements, groups, strict=True):
+        for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
             found.append([])
             first = len(pairs)
             for item in group:
@@ -371,6 +379,9 @@ class _Packer:
                 if not item.is_part:
                     records.append(len(self.ints))
                 self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
+                self.owners[len(self.ints)] = owner
+                if item.equilibrium:
+                    settling[len(self.ints)] = item.equilibrium
                 own = list(item.ints)
                 for number, at_state in enumerate(item.states):
                     own[at_state] = self.state.first_of(element) + number
@@ -380,6 +391,10 @@ class _Packer:
         self.ints += records
         self.ints[at.CONTACT_AT] = len(self.ints)
         self.ints += pairs
+        self.ints[at.EQUILIBRIA], self.ints[at.EQUILIBRIUM_AT] = len(settling), len(self.ints)
+        for place, kernel in settling.items():
+            self.equilibria[len(self.ints)] = kernel
+            self.ints += [0, place]
         return found
 
     def control_record(self) -> None:

@@ -1,7 +1,8 @@
 """Which functions are compiled by themselves and called by their address, by name.
 
 Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; the kernel of
-a kind of force is written from its declaration, and has the name of the module that declares it.
+a kind of force is written from its declaration, and has the name of the module that declares it; so is the one that
+brings such a force into equilibrium, with EQUILIBRIUM behind the name.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 
 LAW_MODULES = {
     "evaluate": "dynamics",
+    "equilibrate": "dynamics",
     "run_several": "merson",
     "set_controls": "controls",
     "contact_places": "places",
@@ -43,6 +45,8 @@ LAW_MODULES = {
 }
 """The module of each of the engine's own."""
 
+EQUILIBRIUM = "_equilibrium"
+
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Place of a law's address after `layout.LAWS`."""
 
@@ -53,5 +57,6 @@ def law_function(name: str) -> Callable[..., Any]:
     if name in LAW_MODULES:
         function = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
     else:
-        function = import_module(f"osimlite.simulation.elements.kinds.{name}").KIND.kernel
+        kind = import_module(f"osimlite.simulation.elements.kinds.{name.removesuffix(EQUILIBRIUM)}").KIND
+        function = kind.equilibrium_kernel if name.endswith(EQUILIBRIUM) else kind.kernel
     return function

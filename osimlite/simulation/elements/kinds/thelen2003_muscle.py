@@ -1,0 +1,72 @@
+"""The muscle by Thelen."""
+
+from collections.abc import Sequence
+from math import exp
+
+from osimlite.forces.muscles import pennation
+from osimlite.forces.thelen2003 import Thelen2003, tendon_shape, thelen2003, thelen2003_energy, thelen2003_equilibrium
+from osimlite.schema.muscles import Thelen2003Muscle
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.kind import DeclaredForce, State
+from osimlite.simulation.elements.muscle import muscle, require
+from osimlite.simulation.elements.parameters import Fields, Number, positive
+
+
+def _check(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
+    flags = "ignore_tendon_compliance", "ignore_activation_dynamics"
+    require(
+        builder,
+        force,
+        *(Number(flag, lambda x: x == 0.0, "is true, which a Thelen2003Muscle cannot do") for flag in flags),
+        Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),
+        *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain", "KshapePassive")),
+        Number("fv_linear_extrap_threshold", lambda x: x > 1.0 / force.Flen, "is not above 1 / Flen"),
+    )
+
+
+def _others(builder: ElementBuilder, force: Thelen2003Muscle) -> tuple[float, ...]:
+    angles = force.pennation_angle_at_optimal, force.maximum_pennation_angle
+    shape = force.KshapePassive
+    return (
+        *pennation(force.optimal_fiber_length, *angles),
+        *tendon_shape(force.FmaxTendonStrain),
+        shape / force.FmaxMuscleStrain,
+        1.0 / (exp(shape) - 1.0),
+    )
+
+
+def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    known = force.known(record)
+    return thelen2003_energy(force.values[1], known["length"], known["fiber_length"], known["cos_pennation"])
+
+
+KIND = muscle(
+    Thelen2003Muscle,
+    thelen2003,
+    ("activation_rate", "fiber_velocity"),
+    Fields(
+        Thelen2003,
+        (
+            Number("max_isometric_force"),
+            positive("optimal_fiber_length"),
+            positive("tendon_slack_length"),
+            positive("max_contraction_velocity"),
+            positive("activation_time_constant"),
+            positive("deactivation_time_constant"),
+            Number("minimum_activation"),
+            positive("KshapeActive"),
+            positive("Af"),
+            Number("Flen", lambda x: x > 1.0, "is not above 1"),
+            Number("fv_linear_extrap_threshold"),
+        ),
+        _others,
+    ),
+    states=(
+        State("activation", lambda force: force.default_activation),
+        State("fiber_length", lambda force: force.default_fiber_length, output="fiber_velocity"),
+    ),
+    equilibrium=thelen2003_equilibrium,
+    settled=("fiber_length",),
+    stored=_energy,
+    check=_check,
+)

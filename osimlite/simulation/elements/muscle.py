@@ -1,0 +1,72 @@
+"""What muscles have in common: one tension along a path by an excitation, and what is recorded of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+from osimlite.forces.muscles import SIGNIFICANT
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.geometries.path import PATH
+from osimlite.simulation.elements.kind import Kind
+from osimlite.simulation.elements.parameters import Number, Parameter
+
+RECORDED = (
+    "tension",
+    "activation",
+    "fiber_length",
+    "cos_pennation",
+    "active_force_length",
+    "force_velocity",
+    "active_fiber_force",
+    "passive_fiber_force",
+)
+"""What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of the path, and the
+velocity of the fibers."""
+
+
+STRAIGHT = 0.5 * pi - SIGNIFICANT
+
+
+def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
+    """Refuse a muscle that OpenSim refuses for its activation or its pennation, or for what `numbers` do not accept.
+
+    Raises:
+        ModelError: a property has no meaning; it is named.
+    """
+    least = force.minimum_activation
+    usual = (
+        Number("pennation_angle_at_optimal", lambda x: 0.0 <= x <= STRAIGHT, "is not from 0 to less than pi/2"),
+        Number("maximum_pennation_angle", lambda x: 0.0 <= x <= 0.5 * pi, "is not from 0 to pi/2"),
+        Number("minimum_activation", lambda x: 0.0 <= x < 1.0 - SIGNIFICANT, "is not from 0 to less than 1"),
+        Number("min_control", lambda x: not x < least, f"is below its minimum_activation, {least:g}; raise it"),
+    )
+    for number in (*usual, *numbers):
+        number.read(builder, force)
+
+
+def muscle(
+    component: type, law: Callable[..., Any], rates: tuple[str, ...], *parameters: Parameter, **more: Any
+) -> Kind:
+    """The kind of a muscle.
+
+    Args:
+        component: its class.
+        law: gives what is recorded, and then rates.
+        rates: of states; "fiber_velocity" is one.
+        parameters: that the law is given.
+        more: attributes of the kind.
+    """
+    return Kind(
+        component,
+        PATH,
+        law,
+        outputs=(*RECORDED, *rates),
+        parameters=parameters,
+        kept=("length", "rate", "fiber_velocity"),
+        controlled=True,
+        labels={"{name}": "tension"},
+        told=("length", "fiber_length", "tendon_slack_length", "optimal_fiber_length"),
+        **more,
+    )

@@ -1,0 +1,61 @@
+"""One muscle between ground and a block on a slider, and what OpenSim 4.6 computes for it."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from osimlite import Body, Model, SliderJoint
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.functions import PiecewiseLinearFunction
+from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.schema.registry import class_for
+
+FOLDER = Path(__file__).resolve().parents[3] / "fixtures" / "muscles"
+CONFIGURATIONS: dict[str, Any] = json.loads((FOLDER / "configurations.json").read_text())
+USUAL = {"F": 546.0, "lo": 0.0535, "lt": 0.272, "pen": 0.1, "v": 10.0}
+NAMES = {
+    "F": "max_isometric_force",
+    "lo": "optimal_fiber_length",
+    "lt": "tendon_slack_length",
+    "pen": "pennation_angle_at_optimal",
+    "v": "max_contraction_velocity",
+}
+MASS = 20.0
+
+
+def table(name: str, case: str) -> list[dict[str, str]]:
+    """The rows of a case."""
+    with gzip.open(FOLDER / f"{name}.csv.gz", "rt") as file:
+        return [row for row in csv.DictReader(file) if row["case"] == case]
+
+
+def muscle(case: str, **more: Any) -> Any:
+    """The muscle of a case, along a path from the origin of ground to that of the block."""
+    settings = CONFIGURATIONS[case]
+    base = {NAMES[name]: value for name, value in {**USUAL, **settings["base"]}.items()}
+    own = {name: value for name, value in settings.items() if name not in ("cls", "base")}
+    path = GeometryPath(name="path")
+    for name, frame in (("a", "/ground"), ("b", "/bodyset/block")):
+        path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
+    component: Any = class_for(settings["cls"])
+    return component(name="mu", geometry_path=path, **{**base, **own, **more})
+
+
+def hung(force: Any, excitations: Sequence[float] = (0.0,), gravity: float = 0.0) -> Model:
+    """The model with a muscle, excited so much at the time 0, 1, 2 ..."""
+    model = Model(name="one", gravity=(gravity, 0, 0))
+    block = model.add(Body(name="block", mass=MASS, inertia=(1, 1, 1, 0, 0, 0)))
+    slide = SliderJoint(name="slide")
+    slide.coordinates[0].name = "x"
+    model.add(slide.between(model.ground, block))
+    model.add(force)
+    brain = PrescribedController(name="brain", socket_actuators=(f"/forceset/{force.name}",))
+    times = tuple(map(float, range(len(excitations) + 1)))
+    brain.ControlFunctions.objects.append(PiecewiseLinearFunction(x=times, y=(*excitations, 0.0)))
+    model.add(brain)
+    return model

@@ -1,0 +1,120 @@
+"""The muscles against OpenSim's own numbers: derivatives, forces, energy, equilibrium."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from osimlite.errors import ModelError, SimulationError
+from osimlite.multibody import build_mechanism
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.simulation import Simulation
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.system import System
+from tests.simulation.elements.muscle_rows import CONFIGURATIONS, FOLDER, hung, muscle, table
+
+CASES = [name for name, settings in CONFIGURATIONS.items() if (FOLDER / f"{settings['cls']}.csv.gz").exists()]
+RECORDED = {
+    "tension": "Actuation",
+    "activation": "Activation",
+    "fiber_length": "FiberLength",
+    "cos_pennation": "CosPennationAngle",
+    "active_force_length": "ActiveForceLengthMultiplier",
+    "force_velocity": "ForceVelocityMultiplier",
+    "fiber_velocity": "FiberVelocity",
+    "active_fiber_force": "ActiveFiberForce",
+    "passive_fiber_force": "PassiveFiberForce",
+}
+"""What of a record is what of the table."""
+
+
+def system(model):
+    mechanism = build_mechanism(model)
+    return System(mechanism, force_elements(model, mechanism))
+
+
+def states(ready):
+    return [path.rpartition("/")[2] for path in ready.state.paths]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives_forces_and_energy(case):
+    rows = table(CONFIGURATIONS[case]["cls"], case)
+    ready = system(hung(muscle(case), [float(row["excitation"]) for row in rows]))
+    (element,) = ready.forces.elements
+    for number, row in enumerate(rows):
+        y = [float(row[name]) for name in ("path_length", "path_speed", *states(ready))]
+        _, force, *rates = ready.applied(float(number), y)
+        ((_, records),) = ready._records()
+        known = element.known(records[-1])
+        ours = dict(zip([f"d_{name}" for name in states(ready)], rates, strict=True))
+        ours |= {theirs: known[own] for own, theirs in RECORDED.items() if row[theirs] != "n/a"}
+        for name, value in ours.items():
+            expected = float(row[name])
+            # What is a difference of forces has the digits of these.
+            scale = 1e-15 * known["max_isometric_force"] if "Force" in name or name == "Actuation" else 0.0
+            assert value == pytest.approx(expected, rel=2e-12, abs=1e-14 + scale, nan_ok=True), (number, name)
+        assert force == pytest.approx(-known["tension"], rel=1e-15)
+        assert ready.force_records(float(number), y) == [known["tension"]]
+        stored = float(row["FiberPotentialEnergy"]) + float(row["TendonPotentialEnergy"])
+        assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=1e-8, abs=1e-10)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_equilibrium(case):
+    rows = table("equilibrium", case)
+    ready = system(hung(muscle(case), [float(row["activation"]) for row in rows]))
+    for number, row in enumerate(rows):
+        start = [float(row["activation"]) if name == "activation" else 0.1 for name in states(ready)]
+        y = [float(row["path_length"]), float(row["path_speed"]), *start]
+        if row["error"]:
+            with pytest.raises(SimulationError, match=r"no equilibrium was found of '/forceset/mu' \(length 0\.\d+, "):
+                ready.equilibrated(float(number), y)
+            continue
+        found = ready.equilibrated(float(number), y)
+        expected = [float(row[f"eq_{name}"]) for name in states(ready)]
+        assert found[:2] == y[:2] and found[2:] == pytest.approx(expected, rel=1e-12, abs=1e-14), number
+
+
+def test_a_motion_may_start_in_equilibrium():
+    with Simulation(hung(muscle("thelen_default", default_activation=0.3), [0.5])) as simulation:
+        resting, path = {"x": 0.325, "/forceset/mu/activation": 0.4}, "/forceset/mu/fiber_length"
+        trajectory = simulation.run(0.01, initial=resting, equilibrate=True)
+        assert trajectory.summary["settings"]["equilibrate"]
+        assert trajectory.auxiliary["/forceset/mu/activation"][0] == 0.4
+        fiber = trajectory.auxiliary[path][0]
+        engine, rest = simulation.engine, simulation.initial_state(resting, {}, equilibrate=True)
+        assert rest[-1] == fiber and abs(engine.derivative(0.0, rest)[-1]) < 1e-6
+        # What is given stays, and without the option nothing is found.
+        assert simulation.run(0.01, initial={"x": 0.3, path: 0.05}, equilibrate=True).auxiliary[path][0] == 0.05
+        assert simulation.run(0.01, initial={"x": 0.3}).auxiliary[path][0] == 0.1
+
+
+def test_numbers_of_another_model_of_the_structure():
+    ready, other = (system(hung(muscle("thelen_default", tendon_slack_length=x))) for x in (0.27, 0.28))
+    y = [0.325, 0.1, 0.3, 0.1]
+    assert ready.equilibrated(0.0, y, other.numbers) == other.equilibrated(0.0, y) != ready.equilibrated(0.0, y)
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "value", "words"),
+    [
+        ("thelen_default", "optimal_fiber_length", 0.0, "is not positive"),
+        ("thelen_default", "tendon_slack_length", -1.0, "is not positive"),
+        ("thelen_default", "Flen", 1.0, "is not above 1"),
+        ("thelen_default", "max_isometric_force", math.nan, "is not a finite number"),
+        ("thelen_default", "ignore_tendon_compliance", True, "is true, which a Thelen2003Muscle cannot do"),
+        ("thelen_default", "fv_linear_extrap_threshold", 0.7, "is not above 1 / Flen"),
+        ("thelen_default", "min_control", 0.0, "is below its minimum_activation, 0.01"),
+        ("thelen_default", "maximum_pennation_angle", 2.0, "is not from 0 to pi/2"),
+    ],
+)
+def test_what_makes_a_muscle_impossible(case, name, value, words):
+    with pytest.raises(ModelError, match=f"mu'.*{words}"):
+        system(hung(muscle(case, **{name: value})))
+
+
+def test_no_muscle_is_in_equilibrium_where_there_is_none():
+    ready = system(hung(PathActuator(name="mu", geometry_path=muscle("thelen_default").geometry_path)))
+    assert ready.equilibrated(0.0, [0.3, 0.0]) == [0.3, 0.0]
