@@ -134,6 +134,7 @@ class _Builder:
             frames,
             tuple(self.constraints),
             stations,
+            self.model.assembly_accuracy,
         )
 
     def _refuse(self, component: Component) -> None:

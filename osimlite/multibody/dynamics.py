@@ -8,14 +8,16 @@ projected on the speeds (Kane's form); nothing is factored out of the tree, whic
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import NEGLIGIBLE, solutions, stacked
+from osimlite.multibody.linear import shortest, solutions, stacked
 from osimlite.multibody.spatial import Array
 
 if TYPE_CHECKING:
@@ -25,6 +27,11 @@ if TYPE_CHECKING:
 
 LARGEST = 1e100
 """Numbers beyond this, in SI units, are not computed with, nor inertias below its inverse: their squares overflow."""
+SAFE_MASS = 1e-10
+"""What each speed must move, as part of its inertia, for the mass matrix to be divided by."""
+SLIGHT = 2.0**-19.5
+"""Times the root of their number: equations whose forces move this part of what the strongest one's do are left out, as
+in Simbody: its complete orthogonal factorization of G M⁻¹ Gᵀ has the square of it as tolerance."""
 
 
 class Wrench(NamedTuple):
@@ -107,8 +114,7 @@ class MassCentres:
 def accelerations(state: Kinematics, applied: Array, constraints: Sequence[Constraint]) -> Array:
     """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and constraints.
 
-    With constraint equations G udot = b the motion is solved for in the null space of G, so an acceleration that
-    the constraints leave no choice for is exact.
+    See :func:`constrained_accelerations`.
 
     Raises:
         SimulationError: a motion that nothing forbids moves no mass.
@@ -127,6 +133,9 @@ def constrained_accelerations(
 ) -> Array:
     """Udot (k,) with M udot = f but for forces that make G udot = b.
 
+    Equations that follow from others or contradict them are fulfilled in the sense of least squares. Where M cannot be
+    divided by, the motion is solved for in the null space of G: constraints may drive what has no mass.
+
     Args:
         mechanism: whose motion.
         matrix: M (k, k).
@@ -140,10 +149,21 @@ def constrained_accelerations(
     require_numbers(mechanism, matrix, right, *(equations or ()))
     if equations is None:
         return _solve(mechanism, matrix, right, None, order)
-    particular, free = solutions(*equations, NEGLIGIBLE)
+    rows, values = equations
+    with suppress(np.linalg.LinAlgError):
+        factor = np.linalg.cholesky(matrix)
+        if np.min(factor.diagonal() ** 2 / matrix.diagonal()) > SAFE_MASS:
+            udot = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+            weighted = np.linalg.solve(factor, rows.T).T
+            # The second time mends the rounding of the first.
+            for _ in range(2):
+                push = shortest(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
+                udot = udot + np.linalg.solve(factor.T, push)
+            return udot
+    particular, free = solutions(rows, values)
     reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free, order)
-    udot: Array = particular + free @ reduced
-    return udot
+    exact: Array = particular + free @ reduced
+    return exact
 
 
 def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:

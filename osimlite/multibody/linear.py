@@ -12,8 +12,6 @@ REDUNDANT = 1e-9
 """An equation that differs from what others say by less than this part of itself says nothing new."""
 ROUNDING = 1e-13
 """What is shorter than this part of the longest equation, or than this at all, is rounding error: in m and rad."""
-NEGLIGIBLE = 1e-7
-"""In an assembled pose, an equation shorter than this part of the longest comes from the errors of the pose."""
 
 
 def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
@@ -21,18 +19,17 @@ def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
 
 
-def solutions(rows: Array, values: Array, negligible: float = ROUNDING) -> tuple[Array, Array]:
+def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
 
     Where equations contradict each other, the solution has the least squares of their errors, each equation counted
-    with a left side of unit length; those shorter than `negligible` times the longest are left out. The directions are
-    orthonormal.
+    with a left side of unit length; those that are rounding errors are left out. The directions are orthonormal.
     """
     count, size = rows.shape
     if not (count and size):
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths <= max(negligible * lengths.max(), ROUNDING)] = max(1.0, lengths.max())
+    lengths[lengths <= ROUNDING * max(lengths.max(), 1.0)] = max(1.0, lengths.max())
     rows, values = rows / lengths[:, None], values / lengths
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")

@@ -65,6 +65,7 @@ class Mechanism:
         frames: every frame fixed to a body or to ground, by absolute path.
         constraints: what holds besides the joints; what locked and prescribed coordinates need is put before them.
         stations: every marker and other station, by absolute path.
+        assembly_accuracy: ten times what position errors of constraints may be in an assembled pose (m or rad).
     """
 
     name: str
@@ -74,6 +75,7 @@ class Mechanism:
     frames: Mapping[str, FramePlacement] = field(default_factory=dict)
     constraints: tuple[Constraint, ...] = ()
     stations: Mapping[str, StationPlacement] = field(default_factory=dict)
+    assembly_accuracy: float = 1e-9
 
     def __post_init__(self) -> None:
         for index, body in enumerate(self.bodies):

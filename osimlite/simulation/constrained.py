@@ -19,7 +19,7 @@ from osimlite.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.multibody.dynamics import constrained_accelerations
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.kinematics import Kinematics, kinematics
-from osimlite.multibody.linear import NEGLIGIBLE, ROUNDING, shortest, stacked
+from osimlite.multibody.linear import shortest, stacked
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
 
@@ -31,9 +31,6 @@ REDUNDANT = 2.0**-26
 """Times the number of equations: how nearly one must follow from others to be dropped."""
 ITERATIONS = 20
 """Newton's steps of a projection."""
-SAFE_MASS, SAFE_COUPLING = 1e-10, 1e-4
-"""What each speed must move, as part of its inertia, for multipliers to be safe, and how far each equation must be from
-following from others."""
 
 
 def free_coordinates(mechanism: Mechanism) -> list[int]:
@@ -120,11 +117,7 @@ class Constrained:
             return constrained_accelerations(self.mechanism, matrix, right, None, self.order)
         state = self._state(t, x, u) if state is None else state
         rows, values = stacked([item.acceleration_equations(state) for item in self.constraints])
-        rows = rows[:, self._order]
-        udot = by_multipliers(matrix, right, rows, values)
-        if udot is None:
-            return constrained_accelerations(self.mechanism, matrix, right, (rows, values), self.order)
-        return udot
+        return constrained_accelerations(self.mechanism, matrix, right, (rows[:, self._order], values), self.order)
 
     # -------------------------------------------------------------------------------------------- projection
     def project(
@@ -227,35 +220,6 @@ class Constrained:
     def _norm(self, errors: Array) -> float:
         """Root mean square over all equations, those of locked coordinates included."""
         return sqrt(float(errors @ errors) / max(len(errors) + self.locks, 1))
-
-
-def by_multipliers(matrix: Array, right: Array, rows: Array, values: Array) -> Array | None:
-    """Udot with M udot + Gᵀ λ = f and G udot = b by elimination of udot; None where that is not safe.
-
-    It is safe where M alone is well conditioned, and no equation all but follows from others.
-    """
-    try:
-        if not np.min(np.abs(rows).max(axis=1)) > ROUNDING:
-            return None
-        pivots = np.linalg.cholesky(matrix).diagonal() ** 2
-        if not np.min(pivots / matrix.diagonal()) > SAFE_MASS:
-            return None
-        solved = np.linalg.solve(matrix, np.column_stack((right, rows.T)))
-        coupling = rows @ solved[:, 1:]
-        if not np.min(coupling.diagonal()) > NEGLIGIBLE**2 * np.max(coupling.diagonal()):
-            return None
-        scales = 1.0 / np.sqrt(coupling.diagonal())
-        scaled = coupling * np.outer(scales, scales)
-        if not np.min(np.linalg.cholesky(scaled).diagonal()) > SAFE_COUPLING:
-            return None
-        udot: Array = np.asarray(solved[:, 0], dtype=np.float64)
-        # The second time mends the rounding of the first.
-        for _ in range(2):
-            multipliers = scales * np.linalg.solve(scaled, scales * (rows @ udot - values))
-            udot = udot - solved[:, 1:] @ multipliers
-    except np.linalg.LinAlgError:
-        return None
-    return udot
 
 
 def kept_state(

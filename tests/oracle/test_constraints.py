@@ -331,3 +331,18 @@ def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
     _unbroken(model, state)
     assert len(state.getUErr().to_numpy()) == 4
     assert len(mechanism.constraints[0].velocity_equations(mechanism.at(q, u))[1]) == 4
+
+
+@pytest.mark.parametrize(("accuracy", "off"), [(1e-9, 5e-11), (1e-9, 1e-3), (1e-3, 5e-5)])
+def test_a_motion_starts_at_opensims_pose(accuracy: float, off: float, tmp_path: Path) -> None:
+    """A pose within a tenth of the assembly accuracy is assembled: only the integrator mends it, evenly."""
+    model, bodies = _chain(np.random.default_rng(14))
+    _coupler(("ball_0",), "pin_0", _linear((1.0, 0.0)))(model, bodies)
+    model.set_assembly_accuracy(accuracy)
+    model.updJointSet().get("pin").upd_coordinates(0).set_default_value(0.2 + off)
+    mechanism = _built(model, tmp_path)
+    model, state, coordinates = _loaded(tmp_path, mechanism)
+    manager = opensim.Manager(model)
+    manager.initialize(state)
+    theirs = _numbers("", manager.getState(), coordinates)
+    assert mechanism.default_state()[0] == pytest.approx(theirs, abs=1e-13)

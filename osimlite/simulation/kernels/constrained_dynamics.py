@@ -1,14 +1,16 @@
 """Accelerations under constraints: M udot + Gᵀ λ = f and G udot = b.
 
-Where that is safe, udot is eliminated: the tree's own factor of M gives what each equation's force does. It is safe
-where M alone is well conditioned and no equation all but follows from others. Otherwise the motion is solved for along
-the directions that the equations leave free, and equations that contradict each other are fulfilled as well as can be.
+Where M alone is well conditioned, udot is eliminated: the tree's own factor of M gives what each equation's force does.
+Otherwise the motion is solved for along the directions that the equations leave free. Equations that contradict each
+other are fulfilled as well as can be.
 """
 
 from __future__ import annotations
 
-from osimlite.multibody.linear import NEGLIGIBLE, REDUNDANT, ROUNDING
-from osimlite.simulation.constrained import SAFE_COUPLING, SAFE_MASS
+from math import sqrt
+
+from osimlite.multibody.dynamics import SAFE_MASS, SLIGHT
+from osimlite.multibody.linear import REDUNDANT, ROUNDING
 from osimlite.simulation.kernels.dynamics import SMALLEST_PIVOT, solve
 from osimlite.simulation.kernels.layout import (
     ABOVE,
@@ -28,7 +30,6 @@ from osimlite.simulation.kernels.layout import (
     SINGULAR_MASS,
     WORK_DRIFTS,
     WORK_FACTOR,
-    WORK_KEPT,
     WORK_PIVOT,
     WORK_RATES,
     WORK_ROWS,
@@ -69,51 +70,47 @@ def bind(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
 
 
 def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
-    """From the accelerations without constraints to those with them, if that is safe; room for (m + 1) m numbers."""
+    """From the accelerations without constraints to those with them, if M is well conditioned; room for 2 (n + m).
+
+    With M = Uᵀ D U the equations of what U and D make of udot have as their shortest solution the multipliers' push.
+    """
     h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
     count, freedoms, pivots = h[EQUATIONS], at(s, s[FREEDOM_AT]), at(w, s[WORK_PIVOT])
+    scales, push, values, spare = room, at(room, size), at(room, 2 * size), at(room, 2 * size + count)
     for k in range(size):
-        if not w[freedoms[FREEDOM_INTS * k + ROW]] > SAFE_MASS * pivots[k]:
+        pivot = w[freedoms[FREEDOM_INTS * k + ROW]]
+        if not pivot > SAFE_MASS * pivots[k]:
             return False
-    rows, drifts, columns = at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_KEPT])
-    coupling, multipliers = room, at(room, count * count)
-    least = most = 0.0
+        scales[k] = 1.0 / sqrt(pivot)
+    rows, drifts, weighted = at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_FACTOR])
     for i in range(count):
-        row, column, longest = at(rows, size * i), at(columns, size * i), 0.0
+        row, turned = at(rows, size * i), at(weighted, size * i)
         for k in range(size):
-            column[k] = row[k]
-            longest = max(longest, abs(row[k]))
-        if not longest > ROUNDING:
-            return False
-        solve_again(s, w, column)
-        for j in range(i + 1):
-            other, total = at(rows, size * j), 0.0
-            for k in range(size):
-                total += other[k] * column[k]
-            coupling[count * i + j] = total
-        own = coupling[count * i + i]
-        least, most = own if i == 0 else min(least, own), max(most, own)
-    if not least > NEGLIGIBLE * NEGLIGIBLE * most or not cholesky(count, coupling, SAFE_COUPLING * SAFE_COUPLING):
-        return False
+            turned[k] = row[k]
+        toward_ground(s, w, turned)
+        for k in range(size):
+            turned[k] *= scales[k]
+    factored(s, w, count, weighted, SLIGHT * sqrt(count))
     # The second time mends the rounding of the first.
     for _ in range(2):
         for i in range(count):
-            row, missing = at(rows, size * i), -drifts[i]
+            row, missing = at(rows, size * i), drifts[i]
             for k in range(size):
-                missing += row[k] * right[k]
-            multipliers[i] = missing
-        substitute(count, coupling, multipliers)
-        for i in range(count):
-            column, factor = at(columns, size * i), multipliers[i]
-            for k in range(size):
-                right[k] -= factor * column[k]
+                missing -= row[k] * right[k]
+            values[i] = missing
+        solved(s, count, weighted, values, spare, push)
+        for k in range(size):
+            push[k] *= scales[k]
+        away_from_ground(s, w, push)
+        for k in range(size):
+            right[k] += push[k]
     return True
 
 
-def solve_again(s: Ints, w: Floats, right: Floats) -> None:
-    """Solve with the factor that `solve` left, in place."""
-    size, freedoms = s[FREEDOMS], at(s, s[FREEDOM_AT])
-    for k in range(size - 1, -1, -1):
+def toward_ground(s: Ints, w: Floats, right: Floats) -> None:
+    """Solve with Uᵀ of the factor that `solve` left, in place."""
+    freedoms = at(s, s[FREEDOM_AT])
+    for k in range(s[FREEDOMS] - 1, -1, -1):
         j, load = at(freedoms, FREEDOM_INTS * k), right[k]
         if load == 0.0:
             continue
@@ -121,8 +118,12 @@ def solve_again(s: Ints, w: Floats, right: Floats) -> None:
         for m in range(1, j[DEPTH] + 1):
             right[i] -= row[m] * load
             i = freedoms[FREEDOM_INTS * i + ABOVE]
-        right[k] = load / row[0]
-    for k in range(size):
+
+
+def away_from_ground(s: Ints, w: Floats, right: Floats) -> None:
+    """Solve with U of the factor that `solve` left, in place."""
+    freedoms = at(s, s[FREEDOM_AT])
+    for k in range(s[FREEDOMS]):
         j, total = at(freedoms, FREEDOM_INTS * k), right[k]
         row, i = at(w, j[ROW]), j[ABOVE]
         for m in range(1, j[DEPTH] + 1):
@@ -135,17 +136,17 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
     """The accelerations by the null space of the equations; room for 2 n (n + 1) numbers, or 2 m more than that."""
     h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
     count, rows, drifts, equations = h[EQUATIONS], at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_FACTOR])
-    # All equations spatial_inertias_and_bias the same, but those that are rounding errors.
+    # All equations weigh the same, but those that are rounding errors.
     values, spare = room, at(room, count)
     longest = 0.0
     for i in range(count):
         square = 0.0
         for k in range(size):
             square += rows[size * i + k] * rows[size * i + k]
-        values[i] = square**0.5
+        values[i] = sqrt(square)
         longest = max(longest, values[i])
     for i in range(count):
-        scale = 1.0 / values[i] if values[i] > max(NEGLIGIBLE * longest, ROUNDING) else 0.0
+        scale = 1.0 / values[i] if values[i] > ROUNDING * max(longest, 1.0) else 0.0
         values[i] = scale * drifts[i]
         for k in range(size):
             equations[size * i + k] = scale * rows[size * i + k]

@@ -95,7 +95,7 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
 def room_for(equations: int, size: int, entries: int) -> dict[int, int]:
     """Lengths of the parts of the work vector, by their places in the record of all constraints."""
     rows = equations * size
-    by_multipliers, by_directions = equations * (equations + 1), 2 * (equations + size + size * size)
+    by_multipliers, by_directions = 2 * (equations + size), 2 * (equations + size + size * size)
     return {
         at.WORK_ROWS: rows,
         at.WORK_ERRORS: equations,
