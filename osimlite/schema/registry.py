@@ -30,6 +30,7 @@ _AREAS = {
         "ElasticFoundationContactParameters ElasticFoundationContactParametersSet ElasticFoundationForce "
         "ExponentialContactForce MeyerFregly2016Force SmoothSphereHalfSpaceForce"
     ),
+    "control_sets": "Control ControlConstant ControlLinear ControlLinearNode ControlSet",
     "controller_types": (
         "CMC ControlDistributor ControlSetController CorrectionController InputController PrescribedController "
         "SynergyController SynergyVector TrackingController"

@@ -7,9 +7,15 @@ import pytest
 
 from osimlite.errors import ModelError
 from osimlite.multibody import build_mechanism
-from osimlite.schema.actuators import CoordinateActuator
-from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.functions import Constant
+from osimlite.schema.actuators import BodyActuator, CoordinateActuator
+from osimlite.schema.controller_types import (
+    ControlSetController,
+    PrescribedController,
+    SynergyController,
+    SynergyVector,
+)
+from osimlite.schema.functions import Constant, Sine
+from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
 
@@ -17,7 +23,7 @@ pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle'
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
-from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402
+from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare, drive  # noqa: E402
 
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
@@ -59,6 +65,83 @@ def test_a_column_beside_a_function_of_the_same_name(model, tmp_path):
     brain = PrescribedController(name="brain", controls_file="controls.sto", socket_actuators=("/forceset/motor",))
     brain.ControlFunctions.objects.append(Constant(value=5.0))
     model.add(brain)
+    assert compare(model, tmp_path) > 0
+
+
+def nodes(*points) -> str:
+    return "".join(f"<ControlLinearNode><t>{t}</t><value>{x}</value></ControlLinearNode>" for t, x in points)
+
+
+POINTS = {
+    "around": nodes((-0.1, 1.0), (0.37, 2.0), (0.5, -1.0)),
+    "within": nodes((-0.1, 1.0), (0.2, 2.0), (0.2, 4.0), (0.5, -1.0)),
+    "later": nodes((0.5, 1.0), (0.7, 3.0)),
+    "earlier": nodes((-0.1, 2.0), (0.3, -1.0)),
+    "one": nodes((0.2, 5.0)),
+}
+
+
+@pytest.mark.parametrize("points", POINTS.values(), ids=POINTS)
+@pytest.mark.parametrize("more", ["", "<extrapolate>false</extrapolate>", "<use_steps>true</use_steps>"])
+@pytest.mark.parametrize("enabled", [True, False])
+def test_control_sets(model, enabled, more, points, tmp_path):
+    """A set enables its controller; limits and controls of other than the model do nothing."""
+    motors(model, "q0_0", "q1_0", "q2_0")
+    curve = f"<default_max>0.5</default_max>{more}<x_nodes>{points}</x_nodes>"
+    controls = (
+        f'<ControlLinear name="on_q0_0">{curve}</ControlLinear>'
+        f'<ControlLinear name="on_q1_0.excitation">{curve}</ControlLinear>'
+        f'<ControlLinear name="on_q1_0"><x_nodes>{nodes((0.0, 100.0))}</x_nodes></ControlLinear>'
+        '<ControlConstant name="on_q2_0"><value>9</value></ControlConstant>'
+        '<ControlConstant name="on_q2_0"><is_model_control>true</is_model_control><value>3</value></ControlConstant>'
+    )
+    (tmp_path / "controls.xml").write_text(
+        f'<OpenSimDocument Version="40600"><ControlSet name="set"><objects>{controls}</objects></ControlSet>'
+        "</OpenSimDocument>"
+    )
+    brain = ControlSetController(
+        name="brain", controls_file="controls.xml", socket_actuators=("/forceset/on_q0_0",), enabled=enabled
+    )
+    model.add(brain)
+    assert compare(model, tmp_path) == 3 * STATES
+
+
+def test_a_control_set_in_a_table(model, tmp_path):
+    motors(model, "q0_0", "q1_0")
+    rows = [[1.0, 2.0], [3.0, 5.0]]
+    write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2], ["on_q0_0", "on_q1_0.excitation"], rows)
+    model.add(ControlSetController(name="brain", controls_file="controls.sto"))
+    assert compare(model, tmp_path) == 2 * STATES
+
+
+@pytest.mark.parametrize("frames", [(False, False), (True, False), (False, True)])
+def test_synergies(model, frames, tmp_path):
+    """Of signals and columns of tables, some controls being those of a body; they add to what others do."""
+    motors(model, "q0_0", "q1_0")
+    here, there = frames
+    body = BodyActuator(name="push", socket_body="/bodyset/b1", point=(0.1, 0.2, 0.3))
+    body.point_is_global, body.spatial_force_is_global = here, there
+    model.add(body)
+    drive(model, "on_q0_0", "on_q1_0")
+    write_sto(tmp_path / "signals.sto", "signals", [0.0, 0.3, 0.5], ["a", "b"], [[0.0, 1.0], [2.0, -1.0], [1.0, 5.0]])
+    model.subcomponents += [
+        SignalGenerator(name="wave", function=Sine(amplitude=2.0, omega=3.0, phase=0.1)),
+        TableSource__double_(name="table", filename="signals.sto"),
+    ]
+    weights = [np.linspace(-1.0, 2.0, 8), np.linspace(3.0, 1.0, 8)]
+    model.add(
+        SynergyController(
+            name="brain",
+            socket_actuators=("/forceset/on_q1_0", "/forceset/push", "/forceset/on_q0_0"),
+            input_controls=("/wave|signal", "/table|column:b(some)"),
+            synergy_vectors=[SynergyVector(synergy_weights=tuple(row.tolist())) for row in weights],
+        ),
+        SynergyController(
+            name="idle",
+            socket_actuators=("/forceset/on_q0_0",),
+            synergy_vectors=[SynergyVector(synergy_weights=(1.0,))],
+        ),
+    )
     assert compare(model, tmp_path) > 0
 
 

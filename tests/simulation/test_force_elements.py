@@ -24,7 +24,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.contact_forces import ExponentialContactForce
-from osimlite.schema.controller_types import ControlSetController, PrescribedController
+from osimlite.schema.controller_types import CMC, PrescribedController
 from osimlite.schema.functions import Constant, Function, LinearFunction, PolynomialFunction, SimmSpline, Sine
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
@@ -102,12 +102,12 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
             r"'/forceset/a' \(ExponentialContactForce\)",
         ),
         (
-            lambda: controlled(ControlSetController(name="c")),
-            r"'/forceset/a' \(CoordinateActuator driven by the ControlSetController '/controllerset/c'\)",
+            lambda: controlled(CMC(name="c")),
+            r"'/forceset/a' \(CoordinateActuator driven by the CMC '/controllerset/c', whose desired motion is known",
         ),
         (
             by_body,
-            r"'/forceset/a' \(BodyActuator driven by the one control of '/controllerset/c', and it has several\)",
+            r"'/forceset/a' \(BodyActuator driven by '/controllerset/c', which has one control for its 6\)",
         ),
     ],
 )

@@ -15,7 +15,7 @@ from osimlite.errors import UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
-from osimlite.schema.controller_types import TrackingController
+from osimlite.schema.controller_types import ControlSetController, TrackingController
 from osimlite.schema.controllers import Controller
 from osimlite.simulation.elements.integral import value_of
 from osimlite.simulation.kernels import layout
@@ -80,12 +80,12 @@ class Drive(NamedTuple):
     Attributes:
         actuator: the component.
         signal: what it adds to a control, or the error that says why that cannot be computed.
-        number: of the control among those of the actuator.
+        number: of the control among those of the actuator; of the only one if left out.
     """
 
     actuator: Any
     signal: Function | Reflex | UnsupportedError
-    number: int = 0
+    number: int | None = None
 
 
 class ModelControls:
@@ -112,14 +112,18 @@ class ModelControls:
         functions: list[list[Function]] = [[] for _ in names]
         self._gains = dict.fromkeys(self._first, 0.0)
         self._refused: dict[str, UnsupportedError] = {}
-        for actuator, signal, number in _drives(builder):
+        for controller, (actuator, signal, number) in _drives(builder):
             path = builder.path(actuator)
+            if number is None and actuator.control_count > 1:
+                # OpenSim 4.6 takes the others from the memory behind the first.
+                why = f" driven by '{builder.path(controller)}', which has one control for its {actuator.control_count}"
+                signal = builder.unsupported(actuator, why)
             if isinstance(signal, UnsupportedError):
                 self._refused[path] = signal
             elif isinstance(signal, Reflex):
                 self._gains[path] += signal.gain
             else:
-                functions[self._first[path] + number].append(signal)
+                functions[self._first[path] + (number or 0)].append(signal)
         self.controls = Controls(tuple(names), tuple(map(tuple, functions)))
 
     def first_of(self, builder: ElementBuilder, actuator: Any) -> int:
@@ -138,27 +142,40 @@ class ModelControls:
         return self._gains[builder.path(actuator)]
 
 
-def _drives(builder: ElementBuilder) -> Iterator[Drive]:
-    """What all enabled controllers do.
+def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
+    """What each enabled controller does.
 
     A class of controllers is declared in the module of its name in `controllers/`, by a function `drives`.
     """
     from osimlite.simulation.elements.gather import module_name
 
     for controller in builder.tree.components:
-        if isinstance(controller, Unknown) or not isinstance(controller, Controller) or not controller.enabled:
+        if isinstance(controller, Unknown) or not isinstance(controller, Controller):
+            continue
+        # OpenSim 4.6 enables a ControlSetController that has read its file.
+        if not (controller.enabled or isinstance(controller, ControlSetController)):
             continue
         module = f"{__package__}.controllers.{module_name(type(controller))}"
         if find_spec(module) is not None:
-            yield from import_module(module).drives(builder, controller)
+            drives = import_module(module).drives(builder, controller)
+            yield from ((controller, drive) for drive in drives)
             continue
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"
         if isinstance(controller, TrackingController):
             why += ", whose desired motion is known to its tool only"
         for actuator in named(builder, controller):
-            yield Drive(actuator, builder.unsupported(actuator, why))
+            yield controller, Drive(actuator, builder.unsupported(actuator, why))
 
 
 def named(builder: ElementBuilder, controller: Controller) -> list[Any]:
     """The actuators that a controller names."""
     return [builder.target(controller, "socket_actuators", word) for word in controller.socket_actuators]
+
+
+def actuators_by_name(builder: ElementBuilder) -> dict[str, Actuator]:
+    """The first actuator of each name."""
+    found: dict[str, Actuator] = {}
+    for component in builder.tree.components:
+        if isinstance(component, Actuator):
+            found.setdefault(component.name, component)
+    return found

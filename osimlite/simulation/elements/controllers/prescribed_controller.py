@@ -9,7 +9,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.simulation.elements.control_tables import column_function, read_controls
-from osimlite.simulation.elements.controls import Drive, named
+from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.storage import beside
 from osimlite.text import did_you_mean
@@ -30,7 +30,7 @@ def drives(builder: ElementBuilder, controller: PrescribedController) -> Iterato
             signal: Any = builder.function(actuator, function, f"control by {path}")
         except UnsupportedError as error:
             signal = error
-        yield _drive(builder, actuator, signal, path)
+        yield Drive(actuator, signal)
     if controller.controls_file:
         yield from _from_file(builder, controller, actuators)
 
@@ -42,11 +42,8 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
     the same label.
     """
     path = builder.path(controller)
-    actuators: dict[str, Any] = {}
-    for component in builder.tree.components:
-        if isinstance(component, Actuator):
-            actuators.setdefault(component.name, component)
-            actuators.setdefault(builder.path(component), component)
+    actuators = actuators_by_name(builder)
+    actuators |= {builder.path(item): item for item in builder.tree.components if isinstance(item, Actuator)}
     table = read_controls(beside(builder.folder, str(controller.controls_file)))
     known = {word if isinstance(word, str) else builder.path(word) for word in controller.socket_actuators}
     taken = list(taken)
@@ -68,13 +65,4 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
         known.add(label)
         taken.append(actuator)
         degree = 1 if controller.interpolation_method is None else controller.interpolation_method
-        yield _drive(
-            builder, actuator, column_function(table, place, degree, f"the interpolation_method of '{path}'"), path
-        )
-
-
-def _drive(builder: ElementBuilder, actuator: Actuator, signal: Any, path: str) -> Drive:
-    if actuator.control_count > 1:
-        # OpenSim 4.6 takes the other controls from the memory behind the one that it has.
-        signal = builder.unsupported(actuator, f" driven by the one control of '{path}', and it has several")
-    return Drive(actuator, signal)
+        yield Drive(actuator, column_function(table, place, degree, f"the interpolation_method of '{path}'"))

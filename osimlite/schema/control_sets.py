@@ -1,0 +1,68 @@
+"""Documents of control curves, which a ControlSetController reads."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, none
+from osimlite.schema.fields import LegacyMany, Value, real
+from osimlite.schema.sets import ObjectGroup
+
+LegacyFlag = Annotated[bool, Value("bool", legacy=True)]
+LegacyNumber = Annotated[float, real(legacy=True)]
+
+
+class Control(Object, abstract=True):
+    """A control over time; its name is that of an actuator, which `.excitation` may follow."""
+
+    is_model_control: LegacyFlag = True
+    """Whether the model has such a control; the others do nothing."""
+    extrapolate: LegacyFlag = True
+    """Whether straight lines go on before the first node and after the last."""
+    default_min: LegacyNumber = 0.02
+    """Least value that tools choose where there are no `min_nodes`; a simulation does not clip to it."""
+    default_max: LegacyNumber = 1.0
+    """Greatest value that tools choose where there are no `max_nodes`; a simulation does not clip to it."""
+    filter_on: LegacyFlag = False
+    """Whether CMC smooths the control while it computes it."""
+
+
+class ControlConstant(Control):
+    """A control that stays the same."""
+
+    is_model_control: LegacyFlag = False
+    value: LegacyNumber = 0.0
+    """Of the control."""
+
+
+class ControlLinearNode(Object):
+    """A point of a control curve."""
+
+    t: Annotated[float, real(legacy=True)] = 0.0
+    """Time."""
+    value: LegacyNumber = 0.0
+    """Of the control at that time."""
+
+
+class ControlLinear(Control):
+    """Straight lines between nodes, or steps."""
+
+    use_steps: LegacyFlag = False
+    """Whether each value holds from after the time of the node before it up to its own."""
+    x_nodes: LegacyMany[ControlLinearNode] = none()
+    """The nodes of the control."""
+    min_nodes: LegacyMany[ControlLinearNode] = none()
+    """The nodes of the least value that tools choose."""
+    max_nodes: LegacyMany[ControlLinearNode] = none()
+    """The nodes of the greatest value that tools choose."""
+    kp: LegacyNumber = 100.0
+    """How strongly CMC's smoothing follows the value."""
+    kv: LegacyNumber = 20.0
+    """How strongly CMC's smoothing damps changes."""
+
+
+class ControlSet(Object):
+    """The controls of a model over time."""
+
+    objects: LegacyMany[Control] = none()
+    """The controls, each with the name of an actuator."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the controls; the mechanics ignore them."""

@@ -1,0 +1,92 @@
+"""Control curves: the lines and steps of OpenSim's ControlSet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, nextafter
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.document.part import read_object
+from osimlite.errors import ModelError
+from osimlite.multibody.functions import Constant, Function, PiecewiseConstant, PiecewiseLinear
+from osimlite.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.schema.control_sets import Control, ControlConstant, ControlLinear, ControlSet
+from osimlite.simulation.elements.control_tables import read_controls
+
+
+@dataclass(frozen=True)
+class ControlCurves:
+    """The controls of a file.
+
+    Attributes:
+        curves: functions of time by the names of the controls; of several controls of a name the first.
+        of_model: the names of those that the model is to have.
+    """
+
+    curves: Mapping[str, Function]
+    of_model: Sequence[str]
+
+    @classmethod
+    def read(cls, path: Path) -> ControlCurves:
+        """From a document, or from a table (``.sto``), which is one of lines between its rows.
+
+        Raises:
+            DocumentError: it holds something else.
+            ModelError: a control has no nodes, or their times do not increase.
+        """
+        curves: dict[str, Function] = {}
+        if ".sto" in path.name:
+            table = read_controls(path)
+            for label, values in zip(table.columns, table.rows.T.tolist(), strict=True):
+                curves.setdefault(label, _lines(table.times.tolist(), values, goes_on=True))
+            return cls(curves, table.columns)
+        controls = read_object(path, ControlSet).objects
+        for control in controls:
+            curves.setdefault(control.name, _curve(control, str(path)))
+        return cls(curves, [control.name for control in controls if control.is_model_control])
+
+    @property
+    def actuators(self) -> list[str]:
+        """Names of the actuators that the model is to have."""
+        return [name.removesuffix(EXCITATION) for name in self.of_model]
+
+    def of(self, actuator: str) -> Function | None:
+        """The control that is called after an actuator, or else with ``.excitation`` behind its name."""
+        return self.curves.get(actuator) or self.curves.get(actuator + EXCITATION)
+
+
+EXCITATION = ".excitation"
+
+
+def _curve(control: Control, file: str) -> Function:
+    if isinstance(control, ControlConstant):
+        return Constant(control.value)
+    assert isinstance(control, ControlLinear)
+    if not control.x_nodes:
+        raise ModelError(f"the control '{control.name}' has no x_nodes; give it some", file=file)
+    nodes = {node.t: node.value for node in control.x_nodes}
+    times, values = list(nodes), list(nodes.values())
+    if not np.isfinite([*times, *values]).all() or (np.diff(times) <= 0.0).any():
+        raise ModelError(
+            f"the x_nodes of the control '{control.name}' do not go on in time, or have no numbers; sort them",
+            file=file,
+        )
+    if control.use_steps:
+        # A value holds up to its own time, that included.
+        return PiecewiseConstant((times[0], *(nextafter(time, inf) for time in times[:-1])), tuple(values))
+    return _lines(times, values, goes_on=control.extrapolate)
+
+
+def _lines(times: list[float], values: list[float], *, goes_on: bool) -> Function:
+    """Straight lines between points; outside they go on, or the end values hold."""
+    if len(times) == 1:
+        return Constant(values[0])
+    if goes_on:
+        return PiecewiseLinear(tuple(times), tuple(values))
+    slopes = np.diff(values) / np.diff(times)
+    return PiecewisePolynomial(
+        np.array((times[0], *times)), np.column_stack(((values[0], *values), (0.0, *slopes, 0.0)))
+    )
