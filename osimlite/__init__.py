@@ -1,8 +1,8 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
-Everything public is here: ``read``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``to_urdf``, ``simulate``,
-the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first
-used, so that importing osimlite costs nothing.
+Everything public is here: ``read``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``paths``, ``to_urdf``,
+``simulate``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported
+when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from osimlite.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
+    from osimlite.simulation.paths import paths as paths
     from osimlite.translate import to_urdf as to_urdf
 
     # When the program runs, `__getattr__` makes the list, of the component classes too.
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
         "Model",
         "OsimliteError",
         "mechanism",
+        "paths",
         "read",
         "read_text",
         "simulate",
@@ -46,6 +48,7 @@ _FUNCTIONS = {
     "validate": "osimlite.lint",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_urdf": "osimlite.translate",
+    "paths": "osimlite.simulation.paths",
     "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",
 }

@@ -39,7 +39,7 @@ from osimlite.schema.functions import (
 from osimlite.schema.markers import Station
 from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
-from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -50,6 +50,7 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
+from osimlite.schema.wrapping import WrapCylinder, WrapSphere
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.kind import kinds as declared_kinds
 
@@ -78,6 +79,11 @@ def chain() -> Model:
             coordinate.name = f"q{number}_{place}"
         model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
         carrier = body
+    b1 = next(item for item in model.components(Body) if item.name == "b1")
+    b1.wrap_object_set.objects += (
+        WrapCylinder(name="bar", radius=0.2, length=2.0, translation=(0.2, 0.0, 0.1)),
+        WrapSphere(name="ball", radius=0.3, quadrant="x", translation=(0.1, 0.0, 0.1)),
+    )
     still = next(item for item in model.components(Coordinate) if item.name == "q3_0")
     still.locked, still.default_value = True, 0.2
     return model
@@ -92,6 +98,12 @@ def straight(*more) -> GeometryPath:
         PathPoint(name="end", socket_parent_frame="/bodyset/b2", location=(0.0, -0.3, 0.1)),
     )
     return found
+
+
+def around(path, *surfaces) -> GeometryPath:
+    wraps = path.path_wrap_set.objects
+    wraps += (PathWrap(name=f"around_{surface}", wrap_object=surface) for surface in surfaces)
+    return path
 
 
 def between(kind, one="/bodyset/b0", two="/bodyset/b3", **more):
@@ -225,6 +237,7 @@ FORCES = {
             ),
         ),
     ),
+    "path around surfaces": lambda: PathSpring(name="a", **SPRING, geometry_path=around(straight(), "bar", "ball")),
     "path by a formula": lambda: ExpressionBasedPathForce(
         name="a", resting_length=0.4, clamp_stretch=True, expression="30*s^2 + ldot*s", geometry_path=straight()
     ),

@@ -35,6 +35,7 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
+from osimlite.schema.wrapping import WrapSphere
 from osimlite.simulation.elements import force_elements
 
 
@@ -48,6 +49,7 @@ def arm() -> Model:
         joint = kind(name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)])
         model.add(joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0, 0, 0.2)))
         below = body
+    below.wrap_object_set.objects.append(WrapSphere(name="ball", radius=0.05))
     return model
 
 
@@ -78,9 +80,9 @@ def through(*points) -> PathSpring:
     return PathSpring(name="a", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=straight(*points))
 
 
-def wrapped() -> PathSpring:
+def around(**more) -> PathSpring:
     force = through()
-    force.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball"))
+    force.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball", **more))
     return force
 
 
@@ -96,7 +98,6 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (wrapped, r"'/forceset/a' \(PathSpring that wraps around a surface\)"),
         (
             lambda: ExponentialContactForce(name="a", station=osimlite.Station(socket_parent_frame="/ground")),
             r"'/forceset/a' \(ExponentialContactForce\)",
@@ -145,6 +146,8 @@ def test_what_cannot_be_computed_is_named(make, message):
             ),
             "three coordinates of '/forceset/a/path/m' differ",
         ),
+        (lambda: around(range=(1, 3)), "range of '/forceset/a/path/wrap' ends at point 3; the path has 2"),
+        (lambda: around(method="spiral"), "method of '/forceset/a/path/wrap' is 'spiral'; take hybrid"),
         (lambda: PathSpring(name="a", geometry_path=straight()), "not a finite number"),
         (lambda: Ligament(name="a", geometry_path=straight()), "resting_length of '/forceset/a' is not positive"),
         (

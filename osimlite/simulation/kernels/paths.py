@@ -7,12 +7,14 @@ order in which the path runs through them, so that nothing is computed twice.
 
 from __future__ import annotations
 
-from math import nan, sqrt
+from math import nan
 
+from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.layout import FREEDOMS, LAW, NUMBERS, OK, OWN, RECORD
+from osimlite.simulation.kernels.layout import FREEDOMS, ITEM_AT, ITEMS, LAW, NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
+from osimlite.simulation.kernels.vectors import Vector, along, dot, minus, norm, plus, put, times, turned, vector
 
 PULL = OWN
 """The first integer of the item of any path."""
@@ -93,25 +95,17 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
                     _, dx, _ = value_at(at(p, node[TABLES]), value)
                     _, dy, _ = value_at(at(p, node[TABLES + 1]), value)
                     _, dz, _ = value_at(at(p, node[TABLES + 2]), value)
-                px += t[0] * qx + t[1] * qy + t[2] * qz
-                py += t[3] * qx + t[4] * qy + t[5] * qz
-                pz += t[6] * qx + t[7] * qy + t[8] * qz
-                here[GRADIENT], here[GRADIENT + 1], here[GRADIENT + 2] = direction(
-                    s,
-                    w,
-                    node[LINK],
-                    t[0] * dx + t[1] * dy + t[2] * dz,
-                    t[3] * dx + t[4] * dy + t[5] * dz,
-                    t[6] * dx + t[7] * dy + t[8] * dz,
-                )
-        here[PLACE], here[PLACE + 1], here[PLACE + 2] = station(s, w, node[LINK], px, py, pz)
+                px, py, pz = plus((px, py, pz), turned(t, (qx, qy, qz)))
+                gx, gy, gz = turned(t, (dx, dy, dz))
+                put(here, GRADIENT, direction(s, w, node[LINK], gx, gy, gz))
+        put(here, PLACE, station(s, w, node[LINK], px, py, pz))
         order[count] = number
         count += 1
     found[COUNT] = count
 
 
-def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> None:
-    """Length, speed and directions, from the places of the nodes that the path runs through."""
+def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
+    """Length, speed and directions, from the places of the nodes that the path runs through; returns the length."""
     i, found = at(s, item), at(w, s[item + RECORD])
     nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
     length = speed = 0.0
@@ -119,39 +113,36 @@ def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> None:
         one, two = int(order[k - 1]), int(order[k])
         m, n = at(nodes, NODE_INTS * one), at(nodes, NODE_INTS * two)
         a, b = at(work, NODE_WORK * one), at(work, NODE_WORK * two)
-        dx, dy, dz, distance = between(m, a, n, b)
+        way = minus(spot(n, b), spot(m, a))
+        distance = norm(way)
         if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
             length += b[SURFACE]
         else:
             length += distance
         if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
-            ux, uy, uz = node_velocity(s, w, y, m, a)
-            vx, vy, vz = node_velocity(s, w, y, n, b)
-            vx, vy, vz = vx - ux, vy - uy, vz - uz
-            if distance < COINCIDENT:
-                speed += sqrt(vx * vx + vy * vy + vz * vz)
-            else:
-                speed += (vx * dx + vy * dy + vz * dz) / distance
-        inverse = nan if distance < SIGNIFICANT else 1.0 / distance
-        a[ALONG], a[ALONG + 1], a[ALONG + 2] = inverse * dx, inverse * dy, inverse * dz
+            moves = minus(node_velocity(s, w, y, n, b), node_velocity(s, w, y, m, a))
+            speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
+        put(a, ALONG, times(nan if distance < SIGNIFICANT else 1.0 / distance, way))
     found[LENGTH], found[SPEED] = length, speed
+    return length
 
 
-def between(m: Ints, a: Floats, n: Ints, b: Floats) -> tuple[float, float, float, float]:
-    """The straight line from one node to another, and its length."""
-    a = at(a, KEPT if m[KIND] == TANGENT else PLACE)
-    b = at(b, KEPT if n[KIND] == TANGENT else PLACE)
-    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    return dx, dy, dz, sqrt(dx * dx + dy * dy + dz * dz)
+def spot(node: Ints, here: Floats) -> Vector:
+    """Where a node counts as for straight lines: a tangent point where it is when that is first asked for."""
+    if node[KIND] != TANGENT:
+        return vector(here, PLACE)
+    if here[IS_KEPT] == 0.0:
+        put(here, KEPT, vector(here, PLACE))
+        here[IS_KEPT] = 1.0
+    return vector(here, KEPT)
 
 
-def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> tuple[float, float, float]:
+def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
     """Velocity of a node; tangent points move with the body of their surface."""
-    vx, vy, vz = velocity(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2])
+    v = velocity(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2])
     if node[KIND] == MOVING and node[OF] >= 0:
-        u = y[s[FREEDOMS] + node[OF]]
-        return vx + u * here[GRADIENT], vy + u * here[GRADIENT + 1], vz + u * here[GRADIENT + 2]
-    return vx, vy, vz
+        return along(v, y[s[FREEDOMS] + node[OF]], vector(here, GRADIENT))
+    return v
 
 
 def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -162,16 +153,30 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
     i, found = at(s, item), at(w, s[item + RECORD])
     nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
     tension, last = found[TENSION], int(found[COUNT]) - 1
-    bx = by = bz = 0.0
+    pull = 0.0, 0.0, 0.0
     for k in range(last + 1):
         number = int(order[k])
         node, here = at(nodes, NODE_INTS * number), at(work, NODE_WORK * number)
-        fx, fy, fz = -bx, -by, -bz
-        bx = by = bz = 0.0
+        back, pull = pull, (0.0, 0.0, 0.0)
         if k < last and nodes[NODE_INTS * int(order[k + 1]) + BODY] != node[BODY]:
-            bx, by, bz = tension * here[ALONG], tension * here[ALONG + 1], tension * here[ALONG + 2]
-        fx, fy, fz = fx + bx, fy + by, fz + bz
+            pull = times(tension, vector(here, ALONG))
+        fx, fy, fz = force = minus(pull, back)
         apply_force(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2], fx, fy, fz)
         if node[KIND] == MOVING and node[OF] >= 0:
-            f[s[FREEDOMS] + node[OF]] += fx * here[GRADIENT] + fy * here[GRADIENT + 1] + fz * here[GRADIENT + 2]
+            f[s[FREEDOMS] + node[OF]] += dot(force, vector(here, GRADIENT))
+    return OK
+
+
+def pull_each(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, forces: Floats) -> int:
+    """The generalized forces of 1 N along each item, all of which are paths that were measured, in a row each."""
+    size = s[FREEDOMS]
+    applied = at(f, size)
+    for number in range(s[ITEMS]):
+        clear_wrenches(s, w)
+        for k in range(size):
+            applied[k] = 0.0
+        pull_path(s, x, w, y, f, s[s[ITEM_AT] + number], 1.0)
+        generalized_forces(s, w, applied)
+        for k in range(size):
+            forces[size * number + k] = applied[k]
     return OK

@@ -42,6 +42,11 @@ LAW_MODULES = {
     "wrap_torus": "wrap_torus",
     "straight_path": "paths",
     "pull_points": "paths",
+    "pull_each": "paths",
+    "wrapped_path": "path_wraps",
+    "cylinder_law": "wrap_laws",
+    "sphere_law": "wrap_laws",
+    "torus_law": "wrap_laws",
 }
 """The module of each of the engine's own."""
 

@@ -77,3 +77,23 @@ def unit(a: Vector) -> Vector:
     """a / |a|, or the zero vector if a is shorter than EPSILON, as OpenSim's wrapping has it."""
     size = norm(a)
     return times(1.0 / size, a) if size >= EPSILON else (0.0, 0.0, 0.0)
+
+
+def turned(rows: Floats, a: Vector) -> Vector:
+    """R a for a rotation R by rows."""
+    x, y, z = a
+    return (
+        rows[0] * x + rows[1] * y + rows[2] * z,
+        rows[3] * x + rows[4] * y + rows[5] * z,
+        rows[6] * x + rows[7] * y + rows[8] * z,
+    )
+
+
+def turned_back(rows: Floats, a: Vector) -> Vector:
+    """The transpose of R times a."""
+    x, y, z = a
+    return (
+        rows[0] * x + rows[3] * y + rows[6] * z,
+        rows[1] * x + rows[4] * y + rows[7] * z,
+        rows[2] * x + rows[5] * y + rows[8] * z,
+    )

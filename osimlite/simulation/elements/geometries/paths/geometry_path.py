@@ -1,4 +1,7 @@
-"""A path through points in bodies: fixed ones, ones that move along a coordinate, ones that come and go with it."""
+"""A path through points in bodies, around surfaces.
+
+The points are fixed, move along a coordinate, or come and go with one.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,17 @@ import numpy as np
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function
-from osimlite.multibody.spatial import Array
+from osimlite.multibody.spatial import Array, offset
+from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, MovingPathPoint, PathPoint
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.schema.wrapping import WrapCylinder, WrapObject, WrapSphere, WrapTorus
+from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels.functions import table_of_one
 from osimlite.simulation.kernels.layout import OWN
-from osimlite.simulation.kernels.paths import CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER
+from osimlite.simulation.kernels.path_wraps import SURFACE_WORK
+from osimlite.simulation.kernels.paths import CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
+from osimlite.simulation.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 
 TOLERANCE = 1e-5
 """A conditional point counts so far outside its range, in OpenSim."""
@@ -45,66 +52,127 @@ class Node:
     range: tuple[float, float] = (-inf, inf)
     functions: tuple[Function, ...] = ()
 
-    def packed(self, places: Places, first: int, path: str) -> tuple[list[int], list[float]]:
-        """Its integers and numbers; these begin at `first`."""
+    def packed(self, places: Places, of: int, first: int, path: str) -> tuple[list[int], list[float]]:
+        """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to."""
         link, frame = places.placement(self.body)
         frame = frame @ self.frame
-        numbers = (frame[:3, :3] @ self.location + frame[:3, 3]).tolist()
-        if self.kind == FIXED:
-            return [link, self.body, FIXED, -1, first, 0, 0, 0], numbers
-        numbers += [places.locked_value(self.coordinate), *self.range, *frame[:3, :3].ravel().tolist()]
+        value = places.locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
+        station = frame[:3, :3] @ self.location + frame[:3, 3]
+        numbers = [*station.tolist(), value, *self.range, *frame[:3, :3].ravel().tolist()]
         tables = []
         for function in self.functions:
             tables.append(first + len(numbers))
             numbers += table_of_one(function, f"the place of a point of '{path}'")
-        freedom = places.freedom(self.coordinate)
-        return [link, self.body, self.kind, freedom, first, *(tables or (0, 0, 0))], numbers
+        return [link, self.body, self.kind, of, first, *(tables or (0, 0, 0))], numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What a path wraps around.
+
+    Attributes:
+        number: tells it from other surfaces of the path.
+        tangent: a node at its middle, with its axes.
+        law: name of the law of the surface; empty if the surface is not active.
+        numbers: what the law is given.
+        first: number of the first point between which and the last one the path may wrap.
+        last: number of the last one.
+    """
+
+    number: int
+    tangent: Node
+    law: str
+    numbers: tuple[float, ...]
+    first: int
+    last: int
 
 
 @dataclass(frozen=True)
 class ThroughPoints:
-    """A path from point to point.
+    """A path from point to point, around surfaces.
 
     Attributes:
         path: of its owner.
-        nodes: the points.
+        points: that it runs through.
+        surfaces: that it wraps around.
     """
 
     path: str
-    nodes: tuple[Node, ...]
+    points: tuple[Node, ...]
+    surfaces: tuple[Surface, ...] = ()
 
     def items(self, places: Places) -> list[Item]:
-        """What pulls, and the path."""
-        ints, numbers = [len(self.nodes), 0], list[float]()
-        for node in self.nodes:
-            own, more = node.packed(places, len(numbers), self.path)
+        """What pulls, the surfaces, and the path."""
+        parts = [Item("pull_points", is_part=True)]
+        wraps: list[int] = []
+        behind = sum(bool(surface.law) for surface in self.surfaces)
+        for surface in self.surfaces:
+            if surface.law:
+                parts.append(Item(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True))
+                wraps.append(OWN * (behind + 2 - len(parts)))
+            else:
+                wraps.append(0)
+            wraps += surface.first, surface.last
+        nodes = [(point, places.freedom(point.coordinate)) for point in self.points]
+        nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
+        ints, numbers = [OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
+        for node, of in nodes:
+            own, more = node.packed(places, of, len(numbers), self.path)
             ints += own
             numbers += more
-        pull = Item("pull_points", is_part=True)
-        room = ORDER + len(self.nodes) * (1 + NODE_WORK)
-        path = Item("straight_path", (OWN, *ints), tuple(numbers), room=room, is_part=True)
-        return [pull, path]
+        kernel, room = "wrapped_path" if self.surfaces else "straight_path", ORDER + len(nodes) * (1 + NODE_WORK)
+        return [*parts, Item(kernel, (*ints, *wraps), tuple(numbers), room=room, is_part=True)]
 
 
 def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
-    """The points of an owner's path.
+    """The points of an owner's path, and the surfaces that it wraps around.
 
     Raises:
-        UnsupportedError: there is a point of an unknown kind, or the path wraps around a surface.
-        ModelError: there are less than two points, or one makes no sense.
+        UnsupportedError: there is a point or a surface of an unknown kind.
+        ModelError: there are less than two points, or something makes no sense.
     """
     path = owner.geometry_path
-    if path.path_wrap_set.objects:
-        raise builder.unsupported(owner, " that wraps around a surface")
-    found = []
+    points = []
     for point in path.path_point_set.objects:
         if type(point) not in READERS:
-            raise builder.unsupported(owner, f" with the {type(point).__name__} '{point.name}'")
+            raise builder.unsupported(owner, f" with the {kind_of(point)} '{point.name}'")
         body, frame = builder.placement(builder.target(point, "socket_parent_frame", point.socket_parent_frame))
-        found.append(READERS[type(point)](builder, point, body, frame))
-    if len(found) < 2:
-        raise ModelError(f"the path of '{builder.path(owner)}' has {len(found)} points; give it at least two")
-    return ThroughPoints(builder.path(owner), tuple(found))
+        points.append(READERS[type(point)](builder, point, body, frame))
+    if len(points) < 2:
+        raise ModelError(f"the path of '{builder.path(owner)}' has {len(points)} points; give it at least two")
+    wraps = path.path_wrap_set.objects
+    found = [builder.target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
+    numbers = {id(surface): number for number, surface in enumerate(found)}
+    alone = float(len(wraps) == 1)
+    surfaces = []
+    for wrap, surface in zip(wraps, found, strict=True):
+        if type(surface) not in LAWS:
+            raise builder.unsupported(owner, f" around the {kind_of(surface)} '{surface.name}'")
+        surfaces.append(_surface(builder, wrap, surface, numbers[id(surface)], alone, len(points)))
+    return ThroughPoints(builder.path(owner), tuple(points), tuple(surfaces))
+
+
+def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int) -> Surface:
+    law, fields = LAWS[type(surface)]
+    sizes = [float(size) for name in fields for size in np.atleast_1d(getattr(surface, name))]
+    builder.check(surface, (*sizes, *surface.translation, *surface.xyz_body_rotation))
+    side, method = SIDES.get(surface.quadrant.lower()), METHODS.get(wrap.method.lower())
+    if side is None:
+        raise ModelError(f"the quadrant of '{builder.path(surface)}' is '{surface.quadrant}'; take x, -y, all or such")
+    if method is None:
+        raise ModelError(f"the method of '{builder.path(wrap)}' is '{wrap.method}'; take hybrid, midpoint or axial")
+    if min(sizes) < 0.0:
+        raise ModelError(f"'{builder.path(surface)}' has a negative size; give it a positive one")
+    first, last = (end - 1 if end >= 1 else other for end, other in zip(wrap.range, (0, points - 1), strict=True))
+    if surface.active and first <= last and last >= points:
+        raise ModelError(f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {points}")
+    frame = surface
+    while not isinstance(frame, PhysicalFrame):
+        frame = builder.tree.parent_of(frame)
+    body, placed = builder.placement(frame)
+    placed = placed @ offset(surface.translation, surface.xyz_body_rotation)
+    tangent = Node(body, placed, np.zeros(3), TANGENT)
+    return Surface(number, tangent, law if surface.active else "", (*side, method, alone, *sizes), first, last)
 
 
 def _fixed(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
@@ -133,3 +201,17 @@ READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array
     ConditionalPathPoint: _conditional,
     MovingPathPoint: _moving,
 }
+
+LAWS: dict[type[WrapObject], tuple[str, tuple[str, ...]]] = {
+    WrapCylinder: ("cylinder_law", ("radius", "length")),
+    WrapSphere: ("sphere_law", ("radius",)),
+    WrapTorus: ("torus_law", ("inner_radius", "outer_radius")),
+}
+"""The law of each surface, and the properties that are its sizes."""
+
+SIGNS = {"": 1.0, "+": 1.0, "-": -1.0}
+SIDES = {sign + name: (float(axis), side) for axis, name in enumerate("xyz") for sign, side in SIGNS.items()}
+SIDES |= {"all": (0.0, 0.0), "unassigned": (0.0, 0.0)}
+"""Axis and sign of a quadrant."""
+
+METHODS = {"hybrid": HYBRID, "midpoint": MIDPOINT, "axial": AXIAL, "unassigned": HYBRID}

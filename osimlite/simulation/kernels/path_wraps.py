@@ -1,0 +1,185 @@
+"""How a path finds its way around its surfaces, in rounds, as in OpenSim.
+
+A round goes through the PathWraps in their order: the tangent points of each are taken out, and each straight piece of
+the path between the points of its range is bent around its surface. The first piece that must wrap does; else the one
+that gets longer by the least. What a round leaves is where the next one starts, until the length stays as it is.
+Nothing is left for the next evaluation.
+
+OpenSim keeps where a point is in ground from its first use on, though later rounds move the tangent points: straight
+distances and the directions of forces go by the place that is kept, while the surfaces, velocities and points of
+application go by the newest one. So do they here.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.simulation.kernels.layout import LAW, NUMBERS, OK, RECORD
+from osimlite.simulation.kernels.paths import (
+    AT,
+    COUNT,
+    IS_KEPT,
+    KIND,
+    LINK,
+    NODE_INTS,
+    NODE_WORK,
+    NODES_AT,
+    OF,
+    ORDER,
+    PLACE,
+    POINTS,
+    STATION,
+    SURFACE,
+    TANGENT,
+    TURN,
+    WRAPS,
+    measure_points,
+    place_points,
+    spot,
+)
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.points import direction, station
+from osimlite.simulation.kernels.vectors import Vector, minus, norm, plus, put, turned, turned_back, vector
+from osimlite.simulation.kernels.wrapping import (
+    ENDS,
+    FIRST_END,
+    FIRST_TANGENT,
+    INSIDE,
+    MANDATORY,
+    NONE,
+    SECOND_END,
+    SECOND_TANGENT,
+    SURFACE_LENGTH,
+    WRAPPED,
+)
+
+WRAP_INTS = 3
+BACK, FIRST, LAST = 0, 1, 2
+"""Of a wrap, after the nodes: how far before the path's item that of the surface stands, 0 if it is not active; the
+first and the last point between which the path may wrap."""
+
+ROUNDS, STILL = 8, 0.0005
+"""At most so many rounds; a change of length (m) below which there is no other."""
+
+NOWHERE = -2
+"""What becomes of a wrap if the path runs through no point of its range; OpenSim then leaves the path as it is."""
+
+POSE = ENDS
+"""The record of a surface: after the piece that is tried, its rotation by rows and its origin in ground."""
+SURFACE_WORK = ENDS + 12
+
+
+def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Length and speed of a path with wraps."""
+    place_points(s, x, w, y, item)
+    place_surfaces(s, x, w, item)
+    wraps, length, exchanged = s[item + WRAPS], inf, False
+    for turn in range(ROUNDS if wraps > 1 else 1):
+        first = second = NONE
+        for k in range(wraps):
+            found = wrap(s, x, w, y, f, item, 1 - k if exchanged and k < 2 else k)
+            if found == NOWHERE:
+                measure_points(s, w, y, item)
+                return OK
+            if k == 0:
+                first = found
+            elif k == 1:
+                second = found
+        before, length = length, measure_points(s, w, y, item)
+        if abs(length - before) < STILL:
+            break
+        if turn == 0 and wraps > 1 and first == NONE and second == INSIDE:
+            exchanged = True
+            take_out(s, w, item, 0)
+    return OK
+
+
+def place_surfaces(s: Ints, x: Floats, w: Floats, item: int) -> None:
+    """Where the surfaces are; no tangent point is known."""
+    i, p = at(s, item), at(x, s[item + NUMBERS])
+    nodes, work = i[POINTS] + 2 * i[WRAPS], at(w, i[RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS])
+    for k in range(i[WRAPS]):
+        number = i[POINTS] + 2 * k
+        at(work, NODE_WORK * number)[IS_KEPT] = at(work, NODE_WORK * (number + 1))[IS_KEPT] = 0.0
+        back = i[NODES_AT + NODE_INTS * nodes + WRAP_INTS * k + BACK]
+        if back > 0:
+            node, pose = at(i, NODES_AT + NODE_INTS * number), at(w, s[item - back + RECORD] + POSE)
+            n = at(p, node[AT])
+            link, t = node[LINK], at(n, TURN)
+            for axis in range(3):
+                pose[axis], pose[3 + axis], pose[6 + axis] = direction(s, w, link, t[axis], t[3 + axis], t[6 + axis])
+            pose[9], pose[10], pose[11] = station(s, w, link, n[STATION], n[STATION + 1], n[STATION + 2])
+
+
+def take_out(s: Ints, w: Floats, item: int, number: int) -> None:
+    """Take the tangent points of a wrap out of the path, if they are in it."""
+    i, found = at(s, item), at(w, s[item + RECORD])
+    order, count, first = at(found, ORDER), int(found[COUNT]), i[POINTS] + 2 * number
+    kept = 0
+    for k in range(count):
+        if not first <= order[k] <= first + 1:
+            order[kept] = order[k]
+            kept += 1
+    found[COUNT] = kept
+
+
+def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number: int) -> int:
+    """Find the way around one surface; returns what became of the last piece that was tried."""
+    take_out(s, w, item, number)
+    i, found = at(s, item), at(w, s[item + RECORD])
+    points, count = i[POINTS], int(found[COUNT])
+    size = points + 2 * i[WRAPS]
+    nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + size)
+    own, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
+    if own[BACK] == 0:
+        return NONE
+    surface = item - own[BACK]
+    e = at(w, s[surface + RECORD])
+    begin = end = -1
+    for k in range(count):
+        if own[FIRST] <= order[k] <= own[LAST] and order[k] < points:
+            begin, end = k if begin < 0 else begin, k
+    if begin < 0:
+        return NOWHERE
+    says, best, least = NONE, -1, inf
+    one, two = at(work, NODE_WORK * tangent), at(work, NODE_WORK * (tangent + 1))
+    for k in range(begin, end):
+        m, n = at(nodes, NODE_INTS * int(order[k])), at(nodes, NODE_INTS * int(order[k + 1]))
+        a, b = at(work, NODE_WORK * int(order[k])), at(work, NODE_WORK * int(order[k + 1]))
+        if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
+            continue
+        put(e, FIRST_END, in_surface(at(e, POSE), vector(a, PLACE)))
+        put(e, SECOND_END, in_surface(at(e, POSE), vector(b, PLACE)))
+        says = call(s[surface + LAW], s, x, w, y, f, surface)
+        if says < WRAPPED:
+            continue
+        r1 = in_ground(at(e, POSE), vector(e, FIRST_TANGENT))
+        r2 = in_ground(at(e, POSE), vector(e, SECOND_TANGENT))
+        longer = -inf
+        if says == WRAPPED:
+            p1, p2 = spot(m, a), spot(n, b)
+            longer = norm(minus(p1, r1)) + e[SURFACE_LENGTH] + norm(minus(p2, r2)) - norm(minus(p1, p2))
+        if longer < least:
+            best, least = k, longer
+            put(one, PLACE, r1)
+            put(two, PLACE, r2)
+            one[SURFACE], two[SURFACE] = 0.0, e[SURFACE_LENGTH]
+        if says == MANDATORY:
+            break
+    # A law has no points for a piece of which OpenSim has none.
+    if best >= 0 and one[PLACE] == one[PLACE]:
+        for k in range(count - 1, best, -1):
+            order[k + 2] = order[k]
+        order[best + 1], order[best + 2] = tangent, tangent + 1
+        found[COUNT] = count + 2
+    return says
+
+
+def in_surface(pose: Floats, a: Vector) -> Vector:
+    """A point of ground in the frame of a surface."""
+    return turned_back(pose, minus(a, vector(pose, 9)))
+
+
+def in_ground(pose: Floats, a: Vector) -> Vector:
+    """A point of a surface in ground."""
+    return plus(vector(pose, 9), turned(pose, a))

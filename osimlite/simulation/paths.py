@@ -1,0 +1,181 @@
+"""Lengths, lengthening speeds and moment arms of the paths of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.constraints import Constraint, Lock
+from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.linear import shortest, stacked
+from osimlite.multibody.mechanism import GROUND, Values
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.schema.paths import AbstractGeometryPath
+from osimlite.simulation.constrained import REDUNDANT
+from osimlite.simulation.elements import ElementBuilder, Forces
+from osimlite.simulation.elements.geometries.path import PATH
+from osimlite.simulation.elements.geometries.path import Path as Along
+from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.paths import LENGTH, SPEED
+from osimlite.simulation.states import StateVariable
+from osimlite.simulation.system import System
+
+ROUNDING = 1e-12
+"""What is left of a moment arm of 0."""
+
+
+def paths(model: Model) -> Paths:
+    """The paths of a model: of its muscles, ligaments, springs and actuators, whether these act or not.
+
+    Raises:
+        UnsupportedError: a path, a joint or a constraint of an unknown class.
+        ModelError: something makes no sense.
+    """
+    return Paths(model)
+
+
+class Paths:
+    """The paths of a model, see :func:`paths`.
+
+    Values of coordinates are an array (n,) in the order of the mechanism, or numbers by name or path; those that are
+    left out have their defaults.
+
+    Args:
+        model: whose paths.
+
+    Attributes:
+        names: component paths of their owners, in the order of the model.
+        mechanism: of the model.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.mechanism = build_mechanism(model)
+        builder = ElementBuilder(model, self.mechanism, False, Path())
+        owners = [
+            owner
+            for owner in builder.tree.components
+            if isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
+        ]
+        self.names = tuple(builder.path(owner) for owner in owners)
+        self._coordinates = [info.path for info in self.mechanism.coordinates]
+        elements = [_Measured(name, PATH.read(builder, owner)) for name, owner in zip(self.names, owners, strict=True)]
+        # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
+        infos = tuple(replace(info, locked=False) for info in self.mechanism.coordinates)
+        free = replace(self.mechanism, coordinates=infos, constraints=())
+        self._system = _System(free, Forces(tuple(elements)), range(len(infos)))
+
+    def lengths(self, q: Values) -> dict[str, float]:
+        """Length of each path (m)."""
+        lengths = self._system.measured(self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH)
+        return dict(zip(self.names, lengths.tolist(), strict=True))
+
+    def speeds(self, q: Values, u: Values) -> dict[str, float]:
+        """Lengthening speed of each path (m/s) for generalized speeds u, given as the values are.
+
+        As in OpenSim it is the sum over all pairs of neighbouring points, tangent points moving with their bodies: the
+        rate of the length only where the path on a surface is the shortest, and no point comes or goes.
+        """
+        speeds = self._system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
+        return dict(zip(self.names, speeds.tolist(), strict=True))
+
+    def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
+        """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.
+
+        As OpenSim's computeMomentArm has them: what a tension of 1 N does at the coordinate, and at those that must
+        move with it. That is the derivative of the length times -1 only where the speed is its rate.
+        """
+        values = self.mechanism.values(q)
+        forces = self._system.pulled(values)
+        arms = (forces @ self._coupling(values)).tolist()
+        return {
+            name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if abs(arm) > ROUNDING}
+            for name, row in zip(self.names, arms, strict=True)
+        }
+
+    def _coupling(self, q: Array) -> Array:
+        """The generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column."""
+        constraints = self.mechanism.constraints
+        if not constraints:
+            return np.eye(len(q))
+        bodies = {body for item in constraints for body in item.bodies} - {GROUND}
+        state = self._system.bodies(sorted(bodies), 0.0, q, np.zeros(len(q)))
+        locks = {item.coordinate: item for item in constraints if isinstance(item, Lock)}
+        coupling = _coupled(constraints, state, [place for place in range(len(q)) if place not in locks])
+        for place, lock in locks.items():
+            others = [item for item in constraints if item is not lock]
+            coupling[:, [place]] = _coupled(others, state, [place])[:, [place]]
+        return coupling
+
+
+def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]) -> Array:
+    """The speeds nearest to 1 for a coordinate and 0 for all others, divided by its own, in the columns of `places`."""
+    coupling = np.eye(len(state.q))
+    if constraints and places:
+        rows, wanted = stacked([item.velocity_equations(state) for item in constraints])
+        speeds = coupling[:, places] - shortest(rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            coupling[:, places] = speeds / speeds[places, range(len(places))]
+    return coupling
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A path as an element that is measured and does not pull.
+
+    Attributes:
+        path: of its owner.
+        along: the path itself.
+    """
+
+    path: str
+    along: Along
+    states: tuple[StateVariable, ...] = ()
+    columns: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The path of its owner."""
+        return self.path
+
+    def items(self, places: Places) -> list[Item]:
+        """Its parts, of which the path is no part of another item."""
+        *parts, last = self.along.items(places)
+        return [*parts, replace(last, is_part=False)]
+
+    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+        """Nothing."""
+        return []
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """None."""
+        return 0.0
+
+
+class _System(System):
+    """Paths and the mechanism that they move with, all of whose coordinates are free and in the mechanism's order."""
+
+    entries = ("evaluate", "pull_each")
+
+    def measured(self, q: Array, u: Array, what: int) -> Array:
+        """Length or speed of each path (p,)."""
+        self._evaluated(q, u)
+        return self._w[[items[-1][0] + what for items in self._items]]
+
+    def pulled(self, q: Array) -> Array:
+        """The generalized forces (p, n) of a tension of 1 N along each path."""
+        self._evaluated(q, np.zeros(len(q)))
+        forces = np.zeros((len(self._items), len(q)))
+        self.program.code.entry("pull_each")(self.program.ints, self.numbers, self._w, self._y, self._f, forces)
+        return forces[:, np.argsort(self._packed_order)]
+
+    def _evaluated(self, q: Array, u: Array) -> None:
+        y = [*q.tolist(), *u.tolist()]
+        status = self.realize(0.0, y, layout.FORCE_STAGE)
+        if status != layout.OK:
+            raise self.refusal(status, 0.0, y)

@@ -1,0 +1,72 @@
+"""Lengths, speeds and moment arms of the paths of a model."""
+
+from __future__ import annotations
+
+import gzip
+import json
+
+import pytest
+
+import osimlite
+from osimlite.errors import ModelError
+from tests.simulation.test_compiled_forces import FORCES, with_force
+
+FILES = {"gait10dof18musc": "m0005", "gait2392": "m0014"}
+"""Where the models are in the corpus."""
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_muscles(name, shared):
+    """All poses of a table of OpenSim's."""
+    with gzip.open(shared / "oracle" / "muscles" / "moment_arms.json.gz") as file:
+        table = next(item for item in json.load(file) if item["model"] == name)
+    (file,) = (shared / "corpus" / "models" / FILES[name]).glob("*.osim")
+    paths = osimlite.paths(osimlite.read(file))
+    muscles = {path: path.rpartition("/")[2] for path in paths.names}
+    assert list(muscles.values()) == table["muscles"]
+    for pose in table["poses"]:
+        lengths, speeds, arms = (
+            paths.lengths(pose["q"]),
+            paths.speeds(pose["q"], pose["u"]),
+            paths.moment_arms(pose["q"]),
+        )
+        for path, muscle in muscles.items():
+            assert lengths[path] == pytest.approx(pose["length"][muscle], rel=0, abs=1e-12)
+            assert speeds[path] == pytest.approx(pose["speed"][muscle], rel=0, abs=1e-10)
+            expected = [pose["moment_arms"][muscle].get(of.rpartition("/")[2], 0.0) for of in table["coordinates"]]
+            found = [arms[path].get(of, 0.0) for of in table["coordinates"]]
+            assert found == pytest.approx(expected, rel=0, abs=1e-10)
+
+
+def test_a_pose_is_an_array_or_a_mapping():
+    paths = osimlite.paths(with_force(FORCES["path"]))
+    assert paths.names == ("/forceset/a",)
+    by_name = paths.lengths({"q2_0": 0.3, "q0_4": -0.2})
+    values = paths.mechanism.values({"/jointset/j2/q2_0": 0.3, "q0_4": -0.2})
+    assert by_name == paths.lengths(values) != paths.lengths({})
+    with pytest.raises(ModelError, match="no coordinate 'q2_9'"):
+        paths.moment_arms({"q2_9": 1.0})
+
+
+def test_a_force_that_does_not_act_has_a_path_too():
+    model = with_force(FORCES["path"])
+    before = osimlite.paths(model).lengths({})
+    model["/forceset/a"].appliesForce = False
+    assert osimlite.paths(model).lengths({}) == before
+
+
+def test_moment_arms_are_what_the_length_loses():
+    """Where nothing jumps and nothing wraps, and where the coordinates are those of pins and slides."""
+    paths = osimlite.paths(with_force(FORCES["path"]))
+    pose = paths.mechanism.values({"q0_3": 0.4, "q2_0": 0.3})
+    arms = paths.moment_arms(pose)["/forceset/a"]
+    assert "/jointset/j3/q3_0" not in arms
+    for name in ("q0_3", "q0_4", "q0_5", "q2_0"):
+        place = paths.mechanism.coordinate_index(name)
+        lengths = []
+        for step in (-1e-6, 1e-6):
+            near = pose.copy()
+            near[place] += step
+            lengths.append(paths.lengths(near)["/forceset/a"])
+        path = paths.mechanism.coordinates[place].path
+        assert arms[path] == pytest.approx((lengths[0] - lengths[1]) / 2e-6, rel=1e-7)
