@@ -47,7 +47,6 @@ REAL = {
 }
 WAYS = {
     "Bullet": ("bullet", "auto"),
-    "recursion": ("bullet", "recursion"),
     "compiled": ("compiled", "auto"),
 }
 ROUNDS, SECONDS = 15, 0.01

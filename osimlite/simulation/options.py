@@ -35,8 +35,8 @@ class Options:
             states that `initial` names stay as it says.
         progress: called with the simulated time reached and the length of the steps there (both in s), after every
             step, or after several that are quick.
-        route: how the accelerations are computed: by Bullet's "mass-matrix" or "articulated-body" algorithm, by
-            osimlite's own "recursion", or "auto" for the quickest that is possible.
+        route: how the accelerations are computed: by Bullet's "mass-matrix", which "auto" stands for, or its
+            "articulated-body" algorithm.
         skip_unsupported: leave out forces that cannot be computed; the summary lists them.
         simbody_early_return: reproduce a defect of Simbody in contact forces of several surfaces: the first contact
             that separates too fast to push takes the force of those after it.

@@ -14,15 +14,14 @@ import numpy as np
 from osimlite.errors import SimulationError
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import massless
-from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.spatial import Array, cross, skew
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.items import ForceElement
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.kernels.pack_chain import Chain
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import NoSolution
@@ -34,14 +33,14 @@ class System:
     Args:
         mechanism: what moves.
         forces: what pushes it, besides gravity.
-        order: place in the mechanism of each coordinate of the state; the order of the kernels if left out.
+        chain: of joints whose mass matrix another program computes; the kernels do without one.
         code: what runs the kernels; the best that is installed if left out.
 
     Attributes:
         structure: what is connected to what, integers; equal for models that differ in numbers only.
         numbers: all numbers in one vector.
         program: the structure with the addresses of what it calls.
-        order: of the coordinates of the state.
+        order: place in the mechanism of each coordinate of the state.
         state: what the numbers of a state are.
         placements: link of each body (-1 for ground), and the body's frame in it.
         contacts: names of the contacts, by number.
@@ -57,51 +56,28 @@ class System:
     """Names of the functions of the kernels that it calls."""
 
     def __init__(
-        self, mechanism: Mechanism, forces: Forces, order: Sequence[int] | None = None, code: Code | None = None
+        self, mechanism: Mechanism, forces: Forces, chain: Chain | None = None, code: Code | None = None
     ) -> None:
-        packed = pack(mechanism, forces)
+        packed = pack(mechanism, forces, chain)
         self.mechanism, self.forces = mechanism, forces
         self.structure, self.numbers, self.placements = packed.structure, packed.numbers, packed.placements
-        self.order = packed.order if order is None else tuple(order)
+        self.order = packed.order
         self.state = StateLayout(mechanism, self.order, forces.elements)
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.program = Program(packed, best() if code is None else code, self.entries)
-        self._items, self._owners, self._packed_order = packed.items, packed.owners, packed.order
+        self._items, self._owners = packed.items, packed.owners
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
-        self._columns = self._rows(layout.WORK_COLUMN, layout.FREEDOMS, 6)
-        self._coordinates = np.array(packed.order, dtype=int)
-        self._carrying = self._freedoms_of_links()
         self._y, self._f = np.zeros(self.state.size), np.zeros(self.state.size)
         self._evaluate = self.program.code.bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
-        self._into, self._from = self._orders(packed.order)
 
     def _rows(self, start: int, count: int, size: int) -> Floats:
         first, rows = self.structure[start], self.structure[count]
         return self._w[first : first + size * rows].reshape(rows, size)
-
-    def _freedoms_of_links(self) -> list[list[int]]:
-        """The degrees of freedom between ground and each link."""
-        found: list[list[int]] = []
-        records = self.structure[self.structure[layout.LINK_AT] :]
-        for number in range(self.structure[layout.LINKS]):
-            record = records[layout.LINK_INTS * number :]
-            own = range(record[layout.FIRST_FREEDOM], record[layout.END_FREEDOM])
-            found.append([*(found[record[layout.PARENT]] if record[layout.PARENT] >= 0 else ()), *own])
-        return found
-
-    def _orders(self, packed: Sequence[int]) -> tuple[Any, Any]:
-        """Where the numbers of a state come from for the kernels, and for the state; a slice is the quickest."""
-        n = len(self.order)
-        places = [self.order.index(place) for place in packed]
-        if places == list(range(n)):
-            return slice(None), slice(None)
-        both = [*places, *(n + place for place in places), *range(2 * n, self.state.size)]
-        return np.array(both), np.argsort(both)
 
     # ------------------------------------------------------------------------------------------- evaluation
     def realize(self, t: float, y: Sequence[float], stage: int) -> int:
@@ -111,7 +87,7 @@ class System:
             OsimliteError: the state has a wrong length, or a part in Python has raised.
         """
         self._set(t, y)
-        status = self._evaluate(stage)
+        status = self.program.run(self._evaluate, stage)
         if status == layout.FAILED:
             raise self.program.failures.pop()
         return status
@@ -120,11 +96,11 @@ class System:
         if len(y) != len(self._y):
             raise self.state.wrong_length(len(y))
         self._w[layout.TIME] = t
-        self._y[:] = y if type(self._into) is slice else np.array(y)[self._into]
+        self._y[:] = y
 
     def found(self) -> list[float]:
         """The derivative (y,) of the state; after the stage of forces, generalized forces in the place of udot."""
-        row: list[float] = self._f[self._from].tolist()
+        row: list[float] = self._f.tolist()
         return row
 
     def applied(self, t: float, y: Sequence[float]) -> list[float]:
@@ -158,13 +134,13 @@ class System:
         equilibrate = self.program.equilibrate()
         self._set(t, y)
         x = self.numbers if numbers is None else numbers
-        status = equilibrate(self.program.ints, x, self._w, self._y, self._f, layout.VELOCITY_STAGE)
+        status = self.program.run(equilibrate, self.program.ints, x, self._w, self._y, self._f, layout.VELOCITY_STAGE)
         if status != layout.OK:
             raise self.refusal(status, t, y)
         for number in np.flatnonzero(self._f[:count]).tolist():
             place = self.structure[self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * number + 1]
             raise SimulationError(f"no equilibrium was found of {self._told(place)}")
-        row: list[float] = self._y[self._from].tolist()
+        row: list[float] = self._y.tolist()
         return row
 
     def _told(self, item: int) -> str:
@@ -192,46 +168,8 @@ class System:
             except SimulationError as error:
                 return error
         elif status == layout.SINGULAR_MASS:
-            return massless(self.mechanism.coordinates[self._packed_order[int(self._f[0])]].name)
+            return massless(self.mechanism.coordinates[self.order[int(self._f[0])]].name)
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
-
-    def bodies(self, wanted: Sequence[int], t: float, q: Array, u: Array) -> Kinematics:
-        """What some bodies do after an evaluation up to the velocities at least; the others are not looked at.
-
-        Args:
-            wanted: indices of the bodies.
-            t: time of the evaluation, s.
-            q: values of all coordinates there (k,).
-            u: generalized speeds of all coordinates there (k,).
-        """
-        count = len(self.placements) + 1
-        rotations, origins, jacobians = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros((count, 6, len(q)))
-        velocities, biases = np.zeros((count, 6)), np.zeros((count, 6))
-        rotations[GROUND] = np.eye(3)
-        gravity = self.mechanism.gravity
-        for body in wanted:
-            link, frame = self.placements[body]
-            if link == GROUND:
-                rotations[body], origins[body] = frame[:3, :3], frame[:3, 3]
-                continue
-            here, freedoms = self._links[link], self._carrying[link]
-            turn = here[:9].reshape(3, 3)
-            rotations[body] = turn @ frame[:3, :3]
-            origins[body] = here[layout.POSITION : layout.POSITION + 3] + turn @ frame[:3, 3]
-            arm = origins[body] - here[layout.ORIGIN : layout.ORIGIN + 3]
-            # Spatial vectors are about the origin of the tree.
-            moving = np.vstack(
-                (
-                    here[layout.VELOCITY : layout.VELOCITY + 6],
-                    here[layout.ACCELERATION : layout.ACCELERATION + 6],
-                    self._columns[freedoms],
-                )
-            )
-            moving[:, 3:] += moving[:, :3] @ skew(arm)
-            velocities[body], biases[body] = moving[0], moving[1]
-            biases[body, 3:] += gravity + cross(velocities[body, :3], velocities[body, 3:])
-            jacobians[body][:, self._coordinates[freedoms]] = moving[2:].T
-        return Kinematics(self.mechanism, q, u, rotations, origins, jacobians, velocities, biases, t)
 
     # ---------------------------------------------------------------------------------------------- reports
     def touching(self, t: float, y: Sequence[float]) -> int:

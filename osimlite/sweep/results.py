@@ -10,9 +10,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-import signal
 import struct
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from hashlib import blake2b
@@ -23,6 +21,7 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import MissingFileError, OsimliteError, SettingError
+from osimlite.simulation.interrupts import defer_sigint
 from osimlite.text import counted, listed
 
 KEY = b"osimlite"
@@ -36,22 +35,6 @@ _MARK = b"OSB1"
 """What a record of the partial file begins with; then the length and the checksum of the rest follow."""
 
 _log = logging.getLogger(__name__)
-
-
-@contextmanager
-def defer_sigint() -> Iterator[None]:
-    """Put off an interruption by the keyboard until what is within is done."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    interruptions: list[object] = []
-    before = signal.signal(signal.SIGINT, lambda *told: interruptions.append(told))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
-    if interruptions:
-        raise KeyboardInterrupt
 
 
 def _arrow() -> Any:

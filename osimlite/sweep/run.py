@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError
+from osimlite.simulation.interrupts import defer_sigint
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, defer_sigint, partial_of, schema, spare
+from osimlite.sweep.results import Partial, partial_of, schema, spare
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
 

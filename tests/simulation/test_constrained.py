@@ -31,13 +31,13 @@ from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet import engine_class
+from osimlite.simulation.engines.bullet import BulletEngine
 
 INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
 
 
-def accelerations(mechanism: Mechanism, q: Any, u: Any, route: str, t: float = 0.0) -> Any:
-    with engine_class(mechanism, route)(mechanism, Forces(()), route=route) as engine:
+def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0, route: str = "auto") -> Any:
+    with BulletEngine(mechanism, Forces(()), route=route) as engine:
         return np.array(engine.acceleration(t, q, u))
 
 
@@ -64,9 +64,8 @@ def test_bullet_and_our_recursion_agree_on_any_mechanism(case: Case, kind: str, 
     # An almost impossible demand makes any result uncertain.
     scale = max(1.0, float(np.abs(expected).max()), float(np.abs(u).max()) ** 2)
     assume(scale < 1e5)
-    for route in ("auto", "recursion"):
-        found = accelerations(mechanism, case.q, u, route, 0.7)
-        assert np.abs(found - expected).max() < 1e-9 * scale
+    found = accelerations(mechanism, case.q, u, 0.7)
+    assert np.abs(found - expected).max() < 1e-9 * scale
 
 
 def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
@@ -97,7 +96,7 @@ def test_the_derivatives_of_opensim_are_those_of_our_recursion(opensim_derivativ
     mechanism = knee(opensim_derivatives=opensim_derivatives)
     q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
     expected = mechanism.acceleration(q, u)
-    assert accelerations(mechanism, q, u, "auto") == pytest.approx(expected, rel=1e-11)
+    assert accelerations(mechanism, q, u) == pytest.approx(expected, rel=1e-11)
     other = knee(opensim_derivatives=not opensim_derivatives).acceleration(q, u)
     assert np.abs(other - expected).max() > 0.01
 
@@ -105,7 +104,7 @@ def test_the_derivatives_of_opensim_are_those_of_our_recursion(opensim_derivativ
 def test_an_inertia_that_bullet_refuses_takes_no_other_route():
     mechanism = knee(opensim_derivatives=False, inertia=np.diag((0.2, 0.01, 0.04)))
     q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
-    with engine_class(mechanism, "auto")(mechanism, Forces(())) as engine:
+    with BulletEngine(mechanism, Forces(())) as engine:
         assert engine._body.impossible
         assert engine.route == "mass-matrix"
         assert engine.acceleration(0.0, q, u) == pytest.approx(mechanism.acceleration(q, u).tolist(), rel=1e-10)
@@ -114,7 +113,7 @@ def test_an_inertia_that_bullet_refuses_takes_no_other_route():
 def test_routes_that_are_none_are_refused():
     mechanism = knee(opensim_derivatives=False)
     with pytest.raises(UnsupportedError, match=r"articulated-body is for models .* take mass-matrix for 'knee'"):
-        accelerations(mechanism, np.zeros(4), np.zeros(4), "articulated-body")
+        accelerations(mechanism, np.zeros(4), np.zeros(4), route="articulated-body")
 
 
 # --------------------------------------------------------------------------------------------------- whole models
@@ -253,8 +252,8 @@ def test_fixed_steps_converge_at_first_order(make: Any):
 
 
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
-def test_both_routes_take_the_same_motion(make: Any):
-    ends = [simulate(make(), 0.3, accuracy=1e-8, route=route).values[-1] for route in ("auto", "recursion")]
+def test_both_engines_take_the_same_motion(make: Any):
+    ends = [simulate(make(), 0.3, engine, accuracy=1e-8).values[-1] for engine in ("bullet", "compiled")]
     assert ends[0] == pytest.approx(ends[1], abs=1e-8)
 
 

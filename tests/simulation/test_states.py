@@ -26,7 +26,6 @@ numbers = st.lists(st.floats(-2.0, 2.0), max_size=20)
 def simulations():
     made = {
         "bullet": Simulation(damped(), "bullet"),
-        "recursion": Simulation(damped(), "bullet", route="recursion"),
         "compiled": Simulation(damped(), "compiled"),
     }
     yield made
@@ -34,7 +33,7 @@ def simulations():
         simulation.close()
 
 
-@pytest.mark.parametrize("engine", ["bullet", "recursion", "compiled"])
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
 @settings(max_examples=50, deadline=None)
 @given(y=numbers)
 def test_a_state_of_another_length_is_refused(simulations, engine, y):

@@ -14,7 +14,7 @@ from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.many import BatchOptions
 
 if TYPE_CHECKING:
-    from osimlite.simulation.engines.compiled import CompiledEngine
+    from osimlite.simulation.engines.base import KernelEngine
 
 NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
 
@@ -48,7 +48,7 @@ class Batch:
 
     def __init__(
         self,
-        engine: CompiledEngine,
+        engine: KernelEngine,
         states: ArrayLike,
         options: BatchOptions,
         *,
@@ -99,8 +99,10 @@ class Batch:
     def run(self, first: int = 0, last: int | None = None) -> None:
         """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
         vectors, room = self._vectors, np.zeros(self._room)
-        self._engine.program.code.entry("run_several")(
-            self._engine.program.ints,
+        program = self._engine.program
+        program.run(
+            program.code.entry("run_several"),
+            program.ints,
             vectors,
             room,
             vectors.shape[1] if len(vectors) > 1 else 0,

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from osimlite.errors import SimulationError
 from osimlite.simulation.euler import burst
 from osimlite.simulation.stepper import Observer, Stepper, straight_line
@@ -27,7 +29,7 @@ class BulletStepper(Stepper):
         observe: called with (time, state) after each step; the loads are those at that state.
     """
 
-    def __init__(self, engine: BulletEngine, t: float, y: list[float], h: float, observe: Observer) -> None:
+    def __init__(self, engine: BulletEngine, t: float, y: Sequence[float], h: float, observe: Observer) -> None:
         if not 0.0 < h < inf:
             raise SimulationError(f"The fixed step must be positive and finite; {h} s is not.")
         self._engine, self._body = engine, engine._body
@@ -38,8 +40,9 @@ class BulletStepper(Stepper):
         self.evaluations = self.taken = 0
         self._previous = t, self.state, []
         engine.state.require(y)
-        count = engine._count
-        self._body.set_state(y[:count], engine._speeds.rates(y[:count], y[count : 2 * count]))
+        q, u = engine.state.values(y), engine.state.speeds(y)
+        places = self._places = engine.coordinates
+        self._body.set_state([q[k] for k in places], engine.mechanism.coordinate_rates(q, u)[places].tolist())
         self._torques = self._evaluate_forces(y)
 
     def step(self, limit: float = inf) -> None:
@@ -53,13 +56,10 @@ class BulletStepper(Stepper):
             t = limit
             self._origin, self._since = limit, 0
         self._body.step(h, self._torques)
-        q, rates = self._body.get_state()
-        y = q + self._engine._speeds.from_rates(q, rates)
+        y = self._state_there(h)
         # Bullet clips what would be faster, so that a motion that has burst may look finite.
-        if not max(map(abs, y), default=0.0) < 0.5 * self._body.FASTEST:
+        if not max(map(abs, y[: 2 * len(self._places)]), default=0.0) < 0.5 * self._body.FASTEST:
             raise burst(self.time, self._h)
-        auxiliary = self._engine.state.auxiliary(self.state)
-        y += [z + h * rate for z, rate in zip(auxiliary, self._auxiliary_rates, strict=True)]
         self._previous = self.time, self.state, []
         self.time, self.state = t, y
         self.taken += 1
@@ -73,9 +73,17 @@ class BulletStepper(Stepper):
         t1, y1 = self.time, self.state
         return lambda t: straight_line(t0, y0, t1, y1, t)
 
-    def _evaluate_forces(self, y: list[float]) -> Sequence[float]:
+    def _state_there(self, h: float) -> list[float]:
+        """The state after a step of Bullet's of length h (s)."""
+        layout, mechanism = self._engine.state, self._engine.mechanism
+        q, rates = np.array(layout.values(self.state)), np.zeros(len(mechanism.coordinates))
+        q[self._places], rates[self._places] = self._body.get_state()
+        z = [x + h * rate for x, rate in zip(layout.auxiliary(self.state), self._auxiliary_rates, strict=True)]
+        return layout.pack(q.tolist(), mechanism.speeds_from_rates(q, rates).tolist(), z)
+
+    def _evaluate_forces(self, y: Sequence[float]) -> Sequence[float]:
         self.evaluations += 1
-        engine, count = self._engine, self._engine._count
-        applied = engine.system.applied(self.time, y)
+        count = len(self._places)
+        applied = self._engine.applied(self.time, y)
         self._auxiliary_rates = applied[2 * count :]
-        return engine._speeds.joint_forces(y[:count], applied[count : 2 * count])
+        return self._engine.joint_forces(y, np.array(applied[count : 2 * count]))

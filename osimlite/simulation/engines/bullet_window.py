@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 
 import numpy as np
@@ -34,12 +34,19 @@ class Window:
         robot: with what its links look like.
         gravity: (3,) tells what is up.
         files: mesh files that the robot names.
+        values: of the joints in Bullet's order at a state of the motion.
 
     Raises:
         SimulationError: there is no screen.
     """
 
-    def __init__(self, robot: Robot, gravity: Sequence[float], files: Mapping[str, bytes]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        gravity: Sequence[float],
+        files: Mapping[str, bytes],
+        values: Callable[[Sequence[float]], Sequence[float]],
+    ) -> None:
         if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
             raise SimulationError(
                 "there is no screen to show the motion on (DISPLAY is not set); leave out --gui, "
@@ -67,15 +74,16 @@ class Window:
         self._view: tuple[float, float, float] | None = None
         self._next = time.perf_counter()
         self._start: tuple[float, float] | None = None
-        self._last: Sequence[float] = [0.0] * len(self._joints)
+        self._values = values
+        self._last: Sequence[float] | None = None
 
-    def show(self, t: float, values: Sequence[float]) -> None:
-        """Show the joints at some values (in Bullet's order) when the time t (s) since the first call has passed.
+    def show(self, t: float, y: Sequence[float]) -> None:
+        """Show a state when the time t (s) since the first call has passed.
 
         Raises:
             SimulationError: somebody has closed the window.
         """
-        now, self._last = time.perf_counter(), values
+        now, self._last = time.perf_counter(), y
         if self._start is None:
             self._start = t, now
         due = self._start[1] + t - self._start[0]
@@ -85,7 +93,7 @@ class Window:
             time.sleep(due - now)
         began = time.perf_counter()
         with self._while_open(t):
-            self._draw(values)
+            self._draw(self._values(y))
             # A slow screen leaves half of the time to the motion.
             self._next = time.perf_counter() + max(FRAME, time.perf_counter() - began)
             if SPACE in self._pressed():
@@ -97,7 +105,8 @@ class Window:
     def hold(self) -> None:
         """Keep the last pose in sight until somebody closes the window or presses Escape."""
         with suppress(bullet.error):
-            self._draw(self._last)
+            if self._last is not None:
+                self._draw(self._values(self._last))
             while bullet.isConnected(self._client) and ESCAPE not in self._pressed():
                 time.sleep(FRAME)
 

@@ -54,7 +54,6 @@ class World:
         id: Bullet's number of the robot.
         joints: the robot's joints in the order of Bullet's degrees of freedom.
         impossible: names of links whose inertia no real body has.
-        zeros: as many as there are joints.
     """
 
     # Without this flag Bullet makes up inertias from collision shapes, of which there are none. Sleeping stays off.
@@ -93,7 +92,6 @@ class World:
         infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
         self.joints = self._by_name(robot, infos)
         self._indices = [int(info[0]) for info in infos if info[3] >= 0]
-        self.zeros = [0.0] * len(self._indices)
         self._release(infos)
         if self.impossible and self._exact:
             self._set_inertias(robot, infos)
@@ -122,8 +120,9 @@ class World:
     def _switch_motors_off(self) -> None:
         """Bullet starts every joint with a motor that holds it."""
         if self._indices:
+            none = [0.0] * len(self._indices)
             bullet.setJointMotorControlArray(
-                self.id, self._indices, bullet.VELOCITY_CONTROL, forces=self.zeros, physicsClientId=self.client
+                self.id, self._indices, bullet.VELOCITY_CONTROL, forces=none, physicsClientId=self.client
             )
 
     def _set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
@@ -139,25 +138,6 @@ class World:
                     localInertiaDiagonal=[float(moment) for moment in moments],
                     physicsClientId=self.client,
                 )
-
-    @property
-    def mass_matrix_works(self) -> bool:
-        """Whether Bullet's inverse dynamics accepts the inertias that it has."""
-        return not (self.impossible and self._exact)
-
-    def mass_matrix(self, q: list[float]) -> Sequence[Sequence[float]]:
-        """M (n, n) of the joints."""
-        matrix: Sequence[Sequence[float]] = bullet.calculateMassMatrix(self.id, q, 0, self.client)
-        return matrix
-
-    def bias(self, q: list[float], rates: list[float]) -> Sequence[float]:
-        """Forces (n,) on the joints without which they would accelerate."""
-        return self.joint_forces(q, rates, self.zeros)
-
-    def joint_forces(self, q: list[float], rates: list[float], accelerations: list[float]) -> Sequence[float]:
-        """Forces (n,) that give the joints these accelerations (n,) against gravity."""
-        forces: Sequence[float] = bullet.calculateInverseDynamics(self.id, q, rates, accelerations, 0, self.client)
-        return forces
 
     def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
         """Put the joints into a state, and all links where they then are."""

@@ -6,13 +6,14 @@ import ctypes
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from inspect import signature
 from typing import Any
 
 import numpy as np
 
+from osimlite.simulation.interrupts import defer_sigint
 from osimlite.simulation.kernels import layout, pointers
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.pointers import Ints
@@ -107,9 +108,10 @@ class _Compiled(Code):
         return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.address(function))
 
     def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        kinds = ctypes.c_int64, *[ctypes.c_double] * 4
+
         def called(*parts: int) -> int:
-            kinds = ctypes.c_int64, *[ctypes.c_double] * 4
-            return python(*map(_view, parts[:5], kinds, sizes), parts[5])
+            return python(*map(_view, parts, kinds, sizes), parts[5])
 
         callback = KERNEL(called)
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
@@ -189,6 +191,16 @@ class Program:
             self.ints[place] = self.code.address(kernel)
         return self.code.entry("equilibrate")
 
+    def run(self, function: Callable[..., int], *parts: Any) -> int:
+        """Call a function of the kernels.
+
+        Ctrl-C in a part in Python is heard after it: no exception passes through machine code.
+        """
+        if not any(self._kept):
+            return function(*parts)
+        with defer_sigint():
+            return function(*parts)
+
     def _guarded(self, python: Callable[..., None]) -> Callable[..., int]:
         """A part in Python whose errors do not pass through machine code: who asked for an evaluation raises them."""
 
@@ -203,5 +215,7 @@ class Program:
         return kernel
 
 
+@lru_cache(maxsize=128)
 def _view(address: int, kind: Any, count: int) -> Any:
+    """The numbers at an address as an array; machine code asks for the same again and again."""
     return np.ctypeslib.as_array((kind * count).from_address(address))

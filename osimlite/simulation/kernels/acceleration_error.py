@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from osimlite.simulation.kernels.layout import (
+    AMOUNT,
     ARGUMENT_COUNT,
     ARGUMENTS,
     AXIS,
+    CURVATURE,
     FREEDOM,
     FREEDOMS,
     GRADIENT,
@@ -28,12 +30,13 @@ joint, and the operations that are the three turns, -1 for what does not move.""
 def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Nothing moves."""
     kept, frame = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH)
-    kept[POINT], kept[POINT + 1], kept[POINT + 2] = frame[9], frame[10], frame[11]
+    for k in range(12):
+        kept[k] = frame[k]
     return OK
 
 
 def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
-    """Velocity and own acceleration in SCRATCH."""
+    """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
     own = at(s, s[s[OPERATION_AT] + OPERATION_INTS * operation + ARGUMENTS])
     kept, found, u = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(y, s[FREEDOMS])
     px, py, pz = kept[POINT] - found[0], kept[POINT + 1] - found[1], kept[POINT + 2] - found[2]
@@ -60,10 +63,12 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
             dy += wrong * axis[1]
             dz += wrong * axis[2]
         axis = at(w, s[WORK_OPERATION] + OPERATION_WORK * last + AXIS)
-        size = -own[SIGN] * rate(s, w, u, last)
+        size = -rate(s, w, u, last)
         tx += size * (axis[1] * dz - axis[2] * dy)
         ty += size * (axis[2] * dx - axis[0] * dz)
         tz += size * (axis[0] * dy - axis[1] * dx)
+    kept[AMOUNT], kept[RATE], kept[CURVATURE] = tx, ty, tz
+    tx, ty, tz = own[SIGN] * tx, own[SIGN] * ty, own[SIGN] * tz
     for k in range(6):
         found[k] = 0.0
     found[6], found[7], found[8] = py * tz - pz * ty, pz * tx - px * tz, px * ty - py * tx

@@ -11,6 +11,9 @@ from __future__ import annotations
 from osimlite.simulation.kernels.layout import (
     ABOVE,
     ACCELERATION,
+    ACCELERATION_STAGE,
+    CHAIN,
+    CHAIN_DYNAMICS,
     CONSTRAINED,
     CONSTRAINED_DYNAMICS,
     CONTACT_WORK,
@@ -72,17 +75,19 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) ->
     status = move(s, x, w, y, f)
     if status != OK or stage == VELOCITY_STAGE:
         return status
-    if stage == FORCE_STAGE:
+    right = at(f, s[FREEDOMS])
+    if stage == FORCE_STAGE or s[CHAIN] > 0:
         clear_wrenches(s, w)
         status = apply_forces(s, x, w, y, f)
-        generalized_forces(s, w, at(f, s[FREEDOMS]))
+        generalized_forces(s, w, right)
+        if stage == ACCELERATION_STAGE and status == OK:
+            status = call(s[LAWS + s[s[CHAIN] + CHAIN_DYNAMICS]], s, x, w, y, f, 0)
+    else:
+        spatial_inertias_and_bias(s, x, w)
+        status = apply_forces(s, x, w, y, f)
+        composite_rigid_body(s, w, right)
+    if stage == FORCE_STAGE or status != OK:
         return status
-    spatial_inertias_and_bias(s, x, w)
-    status = apply_forces(s, x, w, y, f)
-    if status != OK:
-        return status
-    right = at(f, s[FREEDOMS])
-    composite_rigid_body(s, w, right)
     if s[CONSTRAINED] > 0:
         return call(s[LAWS + s[s[CONSTRAINED] + CONSTRAINED_DYNAMICS]], s, x, w, y, f, 0)
     singular = solve(s, w, right)

@@ -41,7 +41,9 @@ EQUILIBRIA, EQUILIBRIUM_AT = 23, 24
 """Count and place of what can be brought into equilibrium: for each the address of the kernel that does it, and the
 place of its item."""
 EQUILIBRIUM_INTS = 2
-LAWS = 25
+CHAIN = 25
+"""Place of the record of the joints of another program that gives the mass matrix and the bias, 0 if there is none."""
+LAWS = 26
 """From here on the addresses of the laws, by their number."""
 
 LINK_INTS = 5
@@ -83,6 +85,24 @@ CONSTRAINED_INTS = 20
 FIRST_EQUATION, END_EQUATION, END_POSITION, CONSTRAINT_OWN = 2, 3, 4, 5
 """Of a constraint, after its law and the place of its numbers: its equations, of which those up to the second end bind
 positions, and from CONSTRAINT_OWN on integers of its own."""
+
+CHAIN_DYNAMICS, SUPPLY, JOINTS, JOINT_AT = 0, 1, 2, 3
+SHARES, SHARE_AT, PRODUCTS, PRODUCT_AT, EXCESSES, EXCESS_AT = 4, 5, 6, 7, 8, 9
+"""Of the joints: the law that finds the mass matrix, the address of the kernel that asks the other program; counts and
+places of their records, of pairs of a joint and a degree of freedom that moves it, of products of two such shares, and
+of links to which the other program gives too much inertia."""
+WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = 10, 11, 12, 13
+"""Places in w: of values, rates, accelerations without udot and forces of all joints and then the mass matrix, of the
+shares, and of the rows of our own mass matrix and their end."""
+CHAIN_INTS = 14
+
+JOINT_INTS = 4
+KIND, SOURCE, PART, FIRST_SHARE = 0, 1, 2, 3
+"""Of a joint: what it is a part of, number of that degree of freedom or operation, which part or the place in x of a
+factor, and its first share."""
+LINE, AMOUNT_OF, ANGLE, ELLIPSOID, ERROR = 0, 1, 2, 3, 4
+"""Kinds of joints: a multiple of a degree of freedom, the amount of an operation, an angle of a ball, a component of
+where its end lies on the ellipsoid, a component of the error of a drift."""
 
 # Numbers.
 GRAVITY_AT, INERTIA_AT = 0, 3

@@ -20,6 +20,7 @@ from osimlite.simulation.elements.items import ForceElement, Placement, Places
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.merson import STATES
+from osimlite.simulation.kernels.pack_chain import Chain, pack_chain
 from osimlite.simulation.kernels.pack_constraints import constraint_record, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS
@@ -70,6 +71,7 @@ class _Operation:
     axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
     turns: list[_Operation | None] = field(default_factory=list)  # of a drift
     looked_at: list[int] = field(default_factory=list)  # by a drift: its sign, and two places in the mechanism
+    joint: str = ""
 
 
 @dataclass
@@ -81,8 +83,13 @@ class _Link:
     second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about the link's origin
 
 
-def pack(mechanism: Mechanism, forces: Forces) -> Packed:
+def pack(mechanism: Mechanism, forces: Forces, chain: Chain | None = None) -> Packed:
     """Pack a mechanism and its forces.
+
+    Args:
+        mechanism: what moves.
+        forces: what pushes it, besides gravity.
+        chain: of joints whose mass matrix another program computes; the kernels do without one.
 
     Raises:
         UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
@@ -106,7 +113,8 @@ def pack(mechanism: Mechanism, forces: Forces) -> Packed:
         order += sorted(own & free)
         ends.append(len(order))
     places = Places(mechanism, {place: number for number, place in enumerate(order)}, placements)
-    return _Packer(places, links, ends, forces, StateLayout(mechanism, order, forces.elements)).packed(tuple(order))
+    state = StateLayout(mechanism, order, forces.elements)
+    return Packer(places, links, ends, forces, state, chain).packed(tuple(order))
 
 
 def _operations(
@@ -156,6 +164,8 @@ def _operations(
                 f"the compiled engine cannot compute the {type(motion).__name__} of '{mobilizer.joint}'; "
                 "take --engine bullet"
             )
+    for operation in found:
+        operation.joint = mobilizer.joint
     for operation, drift in drifts:
         operation.turns = [of_motion.get(id(turn)) for turn in drift.turns]
     return found, frame
@@ -194,7 +204,7 @@ def _inertia(link: _Link) -> list[float]:
     return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
 
-class _Packer:
+class Packer:
     """Puts everything at its place in the vectors."""
 
     def __init__(
@@ -204,7 +214,9 @@ class _Packer:
         ends: list[int],
         forces: Forces,
         state: StateLayout,
+        chain: Chain | None,
     ) -> None:
+        self.chain = chain
         self.places = places
         self.links = links
         self.ends = ends
@@ -239,6 +251,8 @@ class _Packer:
         self.freedom_records(above)
         self.operation_records()
         self.constraint_records(Constrained(self.places.mechanism, order))
+        if self.chain is not None:
+            pack_chain(self, self.chain)
         found = self.item_records()
         self.control_record()
         ints[at.STATE_SIZE] = self.state.size

@@ -22,6 +22,7 @@ LAW_MODULES = {
     "place_drift": "acceleration_error",
     "move_drift": "acceleration_error",
     "constrained_dynamics": "constrained_dynamics",
+    "chain_dynamics": "chain",
     "project": "projection",
     "factorise_law": "least_squares",
     "minimum_norm_law": "least_squares",

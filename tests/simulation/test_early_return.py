@@ -1,4 +1,4 @@
-"""The code written for a model: sums of products, kinematics, solver, contact."""
+"""Several contacts in one force, through the PyBullet engine."""
 
 from __future__ import annotations
 
@@ -6,62 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model
 from osimlite.forces.hunt_crossley import contact_forces, half_space_sphere, simbody_pair_order
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.solver import SingularMassError, tree_solver
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.simulation.engines.bullet import BulletEngine
 
-NUMBERS = st.floats(-3.0, 3.0)
-SCALARS = st.one_of(st.sampled_from(["a", "b", "c"]), st.sampled_from([0.0, 1.0, -1.0]), NUMBERS)
 
-
-@given(st.lists(st.integers(-1, 8), min_size=1, max_size=9), st.integers(0, 10**6))
-def test_solver_of_a_tree(wishes, seed):
-    parents = [min(wish, joint - 1) for joint, wish in enumerate(wishes)]
-    size = len(parents)
-    rng = np.random.default_rng(seed)
-    # The matrix of a tree: a joint moves what it carries.
-    moves = np.zeros((size, size))
-    for joint in range(size):
-        moves[joint, joint] = rng.uniform(0.5, 2.0)
-        if parents[joint] >= 0:
-            moves[joint] += np.where(moves[parents[joint]] != 0.0, rng.uniform(-2, 2, size), 0.0)
-    matrix = moves.T @ moves + 0.1 * np.diag(rng.uniform(1, 2, size))
-    bias, force = rng.uniform(-1, 1, size), rng.uniform(-1, 1, size)
-    found = tree_solver(parents)(matrix.tolist(), bias.tolist(), force.tolist())
-    assert found == pytest.approx(np.linalg.solve(matrix, force - bias), rel=1e-9, abs=1e-9)
-
-
-def test_solver_of_a_long_chain():
-    size = 40
-    rng = np.random.default_rng(0)
-    moves = np.tril(rng.uniform(-1, 1, (size, size))) + 5.0 * np.eye(size)
-    matrix, bias, force = moves.T @ moves, rng.uniform(-1, 1, size), rng.uniform(-1, 1, size)
-    solve = tree_solver(range(-1, size - 1))
-    found = solve(matrix.tolist(), bias.tolist(), force.tolist())
-    assert found == pytest.approx(np.linalg.solve(matrix, force - bias), rel=1e-9)
-    matrix[3, 3] = -1.0
-    with pytest.raises(SingularMassError):
-        solve(matrix.tolist(), bias.tolist(), force.tolist())
-
-
-@pytest.mark.parametrize("entry", [0.0, -1.0, math.nan])
-def test_solver_names_the_joint_that_moves_no_mass(entry):
-    with pytest.raises(SingularMassError) as caught:
-        tree_solver([-1, 0])([[2.0, 1.0], [1.0, entry]], [0.0, 0.0], [1.0, 1.0])
-    assert caught.value.joint == 1
-
-
-# -------------------------------------------------------------------------- several surfaces in one force
 def sled(positions, *, early_return):
     """Two balls on sliders above a floor, all in one force."""
     model = Model(name="sled")

@@ -1,0 +1,115 @@
+"""The joints of another program, packed: what each of them follows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
+from osimlite.multibody.parts import GROUND
+from osimlite.robot.lines import as_line
+from osimlite.robot.robot import RobotJoint
+from osimlite.simulation.kernels import layout as at
+
+if TYPE_CHECKING:
+    from osimlite.simulation.kernels.pack import Packer
+
+
+class Chain(NamedTuple):
+    """A robot whose mass matrix and bias another program computes.
+
+    Attributes:
+        joints: that move, in the order of that program.
+        excess: body, and what its principal moments of inertia are larger by there than in the model (kg·m²).
+        supply: kernel in Python. In the work vector it finds values, rates and accelerations of the joints, and writes
+            the forces behind them that these accelerations take against gravity, and the mass matrix.
+    """
+
+    joints: Sequence[RobotJoint]
+    excess: Sequence[tuple[int, float]]
+    supply: Callable[..., None]
+
+
+def pack_chain(packer: Packer, chain: Chain) -> None:
+    """Write what the kernels need to know of a chain, if it has any joints."""
+    ints, count = packer.ints, len(chain.joints)
+    if not count:
+        return
+    start = ints[at.CHAIN] = len(ints)
+    head = [0] * at.CHAIN_INTS
+    ints += head
+    packer.kernels[start + at.SUPPLY] = chain.supply
+    head[at.CHAIN_DYNAMICS], head[at.JOINTS] = packer.law("chain_dynamics"), count
+    records: list[int] = []
+    shares: list[tuple[int, int]] = []
+    for number, joint in enumerate(chain.joints):
+        kind, source, part, freedoms = _followed(packer, joint)
+        records += [kind, source, part, len(shares)]
+        shares += [(number, freedom) for freedom in freedoms]
+    lists = {
+        (at.JOINTS, at.JOINT_AT): (at.JOINT_INTS, records),
+        (at.SHARES, at.SHARE_AT): (2, [item for share in shares for item in share]),
+        (at.PRODUCTS, at.PRODUCT_AT): (4, _products(packer, shares, count)),
+        (at.EXCESSES, at.EXCESS_AT): (3, _excesses(packer, chain.excess)),
+    }
+    for (length, place), (each, numbers) in lists.items():
+        head[length], head[place] = len(numbers) // each, len(ints)
+        ints += numbers
+    head[at.WORK_JOINTS], head[at.WORK_SHARES] = packer.room((4 + count) * count), packer.room(len(shares))
+    head[at.ENTRY_AT] = ints[ints[at.FREEDOM_AT] + at.ROW]
+    head[at.END_ENTRY] = head[at.ENTRY_AT] + packer.entries
+    ints[start : start + at.CHAIN_INTS] = head
+
+
+def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
+    """Kind, source and part of a joint, and the degrees of freedom that move it."""
+    function, places = joint.function, list(joint.coordinates)
+    freedoms = [packer.places.freedom(place) for place in places]
+    for number, operation in enumerate(packer.operations):
+        if operation.joint != joint.source:
+            continue
+        is_ball = operation.kind in (at.BALL, at.BALL_BACK)
+        if operation.kind == at.DRIFT and isinstance(function, AccelerationErrorAngle):
+            return at.ERROR, number, function.component, []
+        if is_ball and isinstance(function, EllipsoidPoint):
+            return at.ELLIPSOID, number, function.component, freedoms
+        if is_ball and len(places) == 1 and places[0] in operation.arguments:
+            angles = [packer.places.freedom(place) for place in operation.arguments]
+            return at.ANGLE, number, operation.arguments.index(places[0]), angles
+        if operation.function is function and operation.arguments == places:
+            return at.AMOUNT_OF, number, 0, freedoms
+    line = as_line(function)
+    assert line is not None and line.start == 0.0, f"nothing moves '{joint.name}'"
+    packer.numbers.append(line.slope)
+    return at.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
+
+
+def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
+    """Of each entry of our mass matrix the pairs of shares, the entry of the other one, and the place of the sum."""
+    of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for number, (joint, freedom) in enumerate(shares):
+        of_freedom[freedom].append((number, joint))
+    found: list[int] = []
+    freedoms = packer.ints[packer.ints[at.FREEDOM_AT] :]
+    for freedom in range(packer.ints[at.FREEDOMS]):
+        place, other = freedoms[at.FREEDOM_INTS * freedom + at.ROW], freedom
+        while other >= 0:
+            for one, i in of_freedom[freedom]:
+                for two, j in of_freedom[other]:
+                    found += one, two, count * i + j, place
+            place, other = place + 1, freedoms[at.FREEDOM_INTS * other + at.ABOVE]
+    return found
+
+
+def _excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
+    """Link, last degree of freedom on the way to it, and place of the number."""
+    found: list[int] = []
+    for body, moment in excess:
+        link = carrier = packer.places.placements[body].link
+        while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
+            carrier = packer.links[carrier].parent
+        if carrier != GROUND:
+            found += link, packer.ends[carrier + 1] - 1, len(packer.numbers)
+            packer.numbers.append(moment)
+    return found
