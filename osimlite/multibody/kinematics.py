@@ -81,14 +81,14 @@ def kinematics(
 ) -> Kinematics:
     """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,) and `time` (s).
 
-    With `bodies`, each of which must follow the one that carries it, the rows of all others mean nothing.
+    With `bodies`, the rows of all others that do not carry one of them mean nothing.
     """
     count, size = len(mechanism.bodies), len(q)
     rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
     # The columns of RelativeMotion, for each body in ground.
     blocks = np.zeros((count + 1, 6, size + 2))
     rotations[-1] = np.eye(3)
-    for index in range(count) if bodies is None else bodies:
+    for index in range(count) if bodies is None else sorted(_with_carriers(mechanism, bodies)):
         body = mechanism.bodies[index]
         parent, own = body.parent, list(body.mobilizer.coordinates)
         motion = body.mobilizer.relative(q[own], u[own])
@@ -101,3 +101,12 @@ def kinematics(
     return Kinematics(
         mechanism, q, u, rotations, origins, blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1], time
     )
+
+
+def _with_carriers(mechanism: Mechanism, bodies: Iterable[int]) -> set[int]:
+    found: set[int] = set()
+    for body in bodies:
+        while body >= 0 and body not in found:
+            found.add(body)
+            body = mechanism.bodies[body].parent
+    return found

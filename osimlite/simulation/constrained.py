@@ -85,12 +85,6 @@ class Constrained:
             else:
                 self.locks += 1
         self.bodies = sorted({body for item in self.constraints for body in item.bodies} - {GROUND})
-        needed: set[int] = set()
-        for body in self.bodies:
-            while body != GROUND and body not in needed:
-                needed.add(body)
-                body = mechanism.bodies[body].parent
-        self._carriers = sorted(needed)
 
     @property
     def names(self) -> list[str]:
@@ -198,7 +192,7 @@ class Constrained:
     # --------------------------------------------------------------------------------------------- helpers
     def state(self, t: float, x: Array, u: Array) -> Kinematics:
         """State of the bodies that constraints look at, by osimlite's recursion."""
-        return kinematics(self.mechanism, *self.spread(x, u), t, bodies=self._carriers)
+        return kinematics(self.mechanism, *self.spread(x, u), t, bodies=self.bodies)
 
     def spread(self, x: Array, u: Array) -> tuple[Array, Array]:
         """Values and speeds of all coordinates of the mechanism."""

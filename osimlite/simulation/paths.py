@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
-from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.linear import shortest, stacked
 from osimlite.multibody.mechanism import GROUND, Values
 from osimlite.multibody.spatial import Array
@@ -68,7 +68,7 @@ class Paths:
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
         infos = tuple(replace(info, locked=False) for info in self.mechanism.coordinates)
         free = replace(self.mechanism, coordinates=infos, constraints=())
-        self._system = _System(free, Forces(tuple(elements)), range(len(infos)))
+        self._system = _System(free, Forces(tuple(elements)))
 
     def lengths(self, q: Values) -> dict[str, float]:
         """Length of each path (m)."""
@@ -104,7 +104,7 @@ class Paths:
         if not constraints:
             return np.eye(len(q))
         bodies = {body for item in constraints for body in item.bodies} - {GROUND}
-        state = self._system.bodies(sorted(bodies), 0.0, q, np.zeros(len(q)))
+        state = kinematics(self.mechanism, q, np.zeros(len(q)), bodies=bodies)
         locks = {item.coordinate: item for item in constraints if isinstance(item, Lock)}
         coupling = _coupled(constraints, state, [place for place in range(len(q)) if place not in locks])
         for place, lock in locks.items():
@@ -158,7 +158,7 @@ class _Measured:
 
 
 class _System(System):
-    """Paths and the mechanism that they move with, all of whose coordinates are free and in the mechanism's order."""
+    """Paths and the mechanism that they move with, all of whose coordinates are free."""
 
     entries = ("evaluate", "pull_each")
 
@@ -170,12 +170,14 @@ class _System(System):
     def pulled(self, q: Array) -> Array:
         """The generalized forces (p, n) of a tension of 1 N along each path."""
         self._evaluated(q, np.zeros(len(q)))
-        forces = np.zeros((len(self._items), len(q)))
+        forces = np.zeros((len(self._items), len(self.order)))
         self.program.code.entry("pull_each")(self.program.ints, self.numbers, self._w, self._y, self._f, forces)
-        return forces[:, np.argsort(self._packed_order)]
+        found = np.zeros((len(self._items), len(q)))
+        found[:, self.order] = forces
+        return found
 
     def _evaluated(self, q: Array, u: Array) -> None:
-        y = [*q.tolist(), *u.tolist()]
+        y = self.state.pack(q.tolist(), u.tolist())
         status = self.realize(0.0, y, layout.FORCE_STAGE)
         if status != layout.OK:
             raise self.refusal(status, 0.0, y)
