@@ -40,6 +40,8 @@ class Options:
         skip_unsupported: leave out forces that cannot be computed; the summary lists them.
         simbody_early_return: reproduce a defect of Simbody in contact forces of several surfaces: the first contact
             that separates too fast to push takes the force of those after it.
+        own_activation_times: let the activation of every DeGrooteFregly2016Muscle have its own time constants and
+            smoothing; OpenSim takes those of the first one for all.
         opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
             :func:`osimlite.multibody.build_mechanism`.
         rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
@@ -59,6 +61,7 @@ class Options:
     route: str = "auto"
     skip_unsupported: bool = False
     simbody_early_return: bool = False
+    own_activation_times: bool = False
     opensim_derivatives: bool = False
     rolling: bool = False
     external_loads: str | Path | None = None

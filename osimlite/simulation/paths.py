@@ -56,7 +56,7 @@ class Paths:
 
     def __init__(self, model: Model) -> None:
         self.mechanism = build_mechanism(model)
-        builder = ElementBuilder(model, self.mechanism, False, Path())
+        builder = ElementBuilder(model, self.mechanism, Path())
         owners = [
             owner
             for owner in builder.tree.components

@@ -63,7 +63,7 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
         return trajectory
 
 
-TOLD = "skip_unsupported", "simbody_early_return", "opensim_derivatives", "rolling"
+TOLD = "skip_unsupported", "simbody_early_return", "own_activation_times", "opensim_derivatives", "rolling"
 """What the summary says besides the settings of the run."""
 
 
@@ -102,6 +102,7 @@ class Simulation:
             self.mechanism,
             skip_unsupported=chosen.skip_unsupported,
             simbody_early_return=chosen.simbody_early_return,
+            own_activation_times=chosen.own_activation_times,
             external_loads=chosen.external_loads,
             folder=chosen.folder,
         )

@@ -1,60 +1,111 @@
-"""Actuators with states of their own against a live OpenSim 4.6: derivatives, records, energies; steps and tables."""
+"""Muscles, and actuators with states of their own, against a live OpenSim 4.6.
+
+Derivatives, records, energies of random ones in random states; the steps of a motion and its table.
+"""
 
 from __future__ import annotations
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 import osimlite
 from osimlite.multibody import build_mechanism
-from osimlite.schema.actuators import ActivationCoordinateActuator
-from osimlite.schema.path_actuators import ClutchedPathSpring
+from osimlite.schema.registry import class_for
 from osimlite.simulation import read_sto
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.oracle.opensim_runs import simulated
-from tests.simulation.hanging import hanging
+from tests.simulation.elements.muscle_rows import MASS, hung, line
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 STATES = 6
-BOUNDS = {"activation": (0.05, 1.1), "stretch": (0.0, 0.05)}
+BOUNDS = {"activation": (0.05, 1.1), "stretch": (0.0, 0.05), "normalized_tendon_force": (0.01, 1.4)}
 """Of the states that are tried, by their names."""
+HILL = {
+    "max_isometric_force": (200, 2000),
+    "optimal_fiber_length": (0.05, 0.06),
+    "tendon_slack_length": (0.26, 0.28),
+    "pennation_angle_at_optimal": (0, 0.5),
+    "max_contraction_velocity": (6, 12),
+}
+SMOOTH = {
+    **HILL,
+    "default_activation": (0.1, 0.9),
+    "active_force_width_scale": (1, 1.6),
+    "fiber_damping": (0, 0.1),
+}
+TIMES = {
+    "activation_time_constant": (0.01, 0.02),
+    "deactivation_time_constant": (0.03, 0.08),
+    "activation_dynamics_smoothing": (0.1, 10),
+}
+# A process of OpenSim has one set of these times for all of De Groote's muscles; here the usual one.
+DEGROOTE = {
+    **SMOOTH,
+    "default_normalized_tendon_force": (0.1, 0.4),
+    "passive_fiber_strain_at_one_norm_force": (0.5, 0.8),
+    "tendon_strain_at_one_norm_force": (0.03, 0.1),
+}
+RIGID = {"ignore_tendon_compliance": True}
+CASES = {
+    "coordinate": (
+        "ActivationCoordinateActuator",
+        {"optimal_force": (20, 300), "activation_time_constant": (0.005, 0.05), "default_activation": (-1, 1)},
+        {"coordinate": "x"},
+    ),
+    "clutched": (
+        "ClutchedPathSpring",
+        {
+            "stiffness": (100, 9000),
+            "dissipation": (0, 0.5),
+            "relaxation_time_constant": (0.001, 0.1),
+            "initial_stretch": (0, 0.05),
+        },
+        {},
+    ),
+    "degroote": ("DeGrooteFregly2016Muscle", DEGROOTE, {}),
+    "degroote, implicit": ("DeGrooteFregly2016Muscle", DEGROOTE, {"tendon_compliance_dynamics_mode": "implicit"}),
+    "degroote, rigid": ("DeGrooteFregly2016Muscle", DEGROOTE, RIGID),
+    "degroote, rigid, without states": (
+        "DeGrooteFregly2016Muscle",
+        DEGROOTE,
+        {**RIGID, "ignore_activation_dynamics": True, "ignore_passive_fiber_force": True},
+    ),
+    "meyer": ("MeyerFregly2016Muscle", {**SMOOTH, **TIMES}, RIGID),
+    "rigid tendon": ("RigidTendonMuscle", HILL, {}),
+}
 
 
-def coordinate_actuator(rng):
-    return ActivationCoordinateActuator(
-        name="mu",
-        coordinate="x",
-        optimal_force=rng.uniform(20, 300),
-        activation_time_constant=rng.uniform(0.005, 0.05),
-        default_activation=rng.uniform(-1, 1),
-    )
+def made(case, control):
+    """A block that hangs on an actuator of random numbers."""
+    name, bounds, more = CASES[case]
+    rng = np.random.default_rng(len(case))
+    component = class_for(name)
+    if "geometry_path" in component.model_fields:
+        more = {**more, "geometry_path": line()}
+    numbers = {name: rng.uniform(*ends) for name, ends in bounds.items()}
+    model = hung(component(name="mu", **numbers, **more), (control, control), gravity=9.80665)
+    model.find("/jointset/slide/x").default_value = 0.33
+    return model, rng
 
 
-def clutched_spring(rng):
-    return ClutchedPathSpring(
-        name="mu",
-        stiffness=rng.uniform(100, 9000),
-        dissipation=rng.uniform(0, 0.5),
-        relaxation_time_constant=rng.uniform(0.001, 0.1),
-        initial_stretch=rng.uniform(0, 0.05),
-    )
-
-
-MADE = {make.__name__: make for make in (coordinate_actuator, clutched_spring)}
-CONTROLS = (0.0, 0.4, 1.3)
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-@pytest.mark.parametrize("kind", MADE)
-def test_derivatives_and_records(kind, control, tmp_path):
-    rng = np.random.default_rng(len(kind))
-    model = hanging(MADE[kind](rng), control)
-    osimlite.write(model, tmp_path / "model.osim")
+@pytest.fixture(autouse=True)
+def quiet():
+    """Muscles that buckle or are too fast say so."""
     opensim.Logger.setLevelString("off")
+
+
+@pytest.mark.parametrize("control", [0.0, 0.4, 1.3])
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives_and_records(case, control, tmp_path):
+    model, rng = made(case, control)
+    osimlite.write(model, tmp_path / "model.osim")
     theirs = opensim.Model(str(tmp_path / "model.osim"))
     state = theirs.initSystem()
     mechanism = build_mechanism(model)
@@ -68,9 +119,10 @@ def test_derivatives_and_records(kind, control, tmp_path):
         y = [rng.uniform(0.3, 0.37), rng.uniform(-0.4, 0.4)]
         y += [rng.uniform(*BOUNDS[path.rpartition("/")[2]]) for path in own]
         coordinate.setValue(state, y[0], False)
-        coordinate.setSpeedValue(state, y[1])
         for path, value in zip(own, y[2:], strict=True):
             theirs.setStateVariableValue(state, path, value)
+        # Last, since that lets go of what muscles keep of their states.
+        coordinate.setSpeedValue(state, y[1])
         theirs.realizeAcceleration(state)
         expected = [theirs.getStateVariableDerivativeValue(state, path) for path in own]
         expected = [y[1], coordinate.getAccelerationValue(state), *expected]
@@ -78,13 +130,13 @@ def test_derivatives_and_records(kind, control, tmp_path):
         labels, values = force.getRecordLabels(), force.getRecordValues(state)
         assert list(engine.columns) == [labels.get(k) for k in range(labels.getSize())]
         assert engine.force_records(0.0, y) == pytest.approx([values.get(0)], rel=1e-9, abs=1e-12)
-        stored = theirs.calcPotentialEnergy(state) - 20.0 * -9.80665 * y[0]
+        stored = theirs.calcPotentialEnergy(state) + MASS * 9.80665 * y[0]
         assert engine.energies(0.0, y)[2] == pytest.approx(stored, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("kind", MADE)
-def test_states_and_steps(kind, tmp_path):
-    model = hanging(MADE[kind](np.random.default_rng(2)))
+@pytest.mark.parametrize("case", CASES)
+def test_states_and_steps(case, tmp_path):
+    model, _ = made(case, 0.5)
     osimlite.write(model, tmp_path / "model.osim")
     theirs = simulated(tmp_path / "model.osim", 0.2, 1e-5)
     trajectory = osimlite.simulate(model, 0.2, accuracy=1e-5, engine="compiled")
@@ -93,3 +145,26 @@ def test_states_and_steps(kind, tmp_path):
     assert ours.columns == theirs.columns
     assert trajectory.summary["steps"] == len(theirs.rows) - 1
     assert ours.rows[-1] == pytest.approx(theirs.rows[-1], rel=1e-9, abs=1e-9 * np.abs(theirs.rows[-1]).max())
+
+
+def test_constants_of_the_first_muscle_count_for_all(tmp_path):
+    """As in a process that computes no other model of such muscles."""
+    model, _ = made("degroote", 0.9)
+    slow = {"activation_time_constant": 0.03, "deactivation_time_constant": 0.12, "activation_dynamics_smoothing": 5.0}
+    first = class_for("DeGrooteFregly2016Muscle")(name="first", geometry_path=line(), **slow)
+    model.force_set.objects.insert(0, first)
+    osimlite.write(model, tmp_path / "model.osim")
+    program = """
+import opensim
+opensim.Logger.setLevelString("off")
+model = opensim.Model("model.osim")
+state = model.initSystem()
+model.realizeAcceleration(state)
+print(model.getStateVariableDerivativeValue(state, "/forceset/mu/activation"))
+"""
+    found = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    mechanism = build_mechanism(model)
+    engine = CompiledEngine(mechanism, force_elements(model, mechanism))
+    y = engine.state.default()
+    rates = dict(zip(engine.state.paths, engine.derivative(0.0, y)[2:], strict=True))
+    assert rates["/forceset/mu/activation"] == pytest.approx(float(found.stdout), rel=1e-12)

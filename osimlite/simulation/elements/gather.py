@@ -45,6 +45,7 @@ def force_elements(
     *,
     skip_unsupported: bool = False,
     simbody_early_return: bool = False,
+    own_activation_times: bool = False,
     external_loads: str | Path | None = None,
     folder: str | Path | None = None,
 ) -> Forces:
@@ -57,6 +58,7 @@ def force_elements(
         mechanism: of the same model.
         skip_unsupported: leave out what cannot be computed instead of raising.
         simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
+        own_activation_times: do not reproduce OpenSim's defect in the activation of several DeGrooteFregly2016Muscles.
         external_loads: a file of ExternalLoads, which follow the forces of the model.
         folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
 
@@ -65,7 +67,7 @@ def force_elements(
         ModelError: a force names what does not exist, or a parameter has no meaning.
         OsimliteError: a file that is named cannot be read.
     """
-    builder = ElementBuilder(model, mechanism, simbody_early_return, Path(folder or "."))
+    builder = ElementBuilder(model, mechanism, Path(folder or "."), simbody_early_return, own_activation_times)
     elements: list[ForceElement] = []
     skipped: list[str] = []
     for component in builder.forces():
@@ -107,14 +109,18 @@ class ElementBuilder:
         tree: of the model.
         mechanism: of the model.
         folder: of the model's file.
+        early_return: whether Simbody's defect in contact is reproduced.
+        own_times: whether OpenSim's defect in activation is not.
     """
 
-    def __init__(self, model: Model, mechanism: Mechanism, early_return: bool, folder: Path) -> None:
+    def __init__(
+        self, model: Model, mechanism: Mechanism, folder: Path, early_return: bool = False, own_times: bool = False
+    ) -> None:
         self.model = model
         self.tree = model.tree()
         self.mechanism = mechanism
-        self.early_return = early_return
         self.folder = folder
+        self.early_return, self.own_times = early_return, own_times
 
     @property
     def mesh_folders(self) -> MeshFolders:

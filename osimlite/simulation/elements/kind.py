@@ -89,6 +89,7 @@ class Kind:
             None.
         stored: energy (J) of a force from its record, where it is no output of the law.
         check: raises a ModelError if the parameters have no meaning together.
+        shares: whether a force may have numbers of others of its class.
     """
 
     component: type
@@ -106,6 +107,7 @@ class Kind:
     labels: Mapping[str, str] | None = None
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
     check: Callable[[ElementBuilder, Any], None] | None = None
+    shares: bool = False
     terms: tuple[Parameter, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -142,7 +144,7 @@ class Kind:
         """Place in the record of all that is kept there."""
         others = {SOLVED, *(state.rate for state in self.states)}
         names = *(name for name in self.outputs if name not in others), *self.kept
-        return {name: place for place, name in enumerate(names)}
+        return {name: place for place, name in enumerate(dict.fromkeys(names))}
 
     # ------------------------------------------------------------------------------------------ the kernels
     @cached_property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi
+from math import pi, sin
 from typing import Any
 
 from osimlite.forces.muscles import SIGNIFICANT
@@ -25,8 +25,14 @@ RECORDED = (
 """What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of the path, and the
 velocity of the fibers."""
 
+PENNATION = Number(
+    "pennation_angle_at_optimal", lambda x: 0.0 <= x <= 0.5 * pi - SIGNIFICANT, "is not from 0 to less than pi/2"
+)
 
-STRAIGHT = 0.5 * pi - SIGNIFICANT
+
+def height(builder: ElementBuilder, force: Any) -> tuple[float]:
+    """Of the fibers across the tendon, m."""
+    return (force.optimal_fiber_length * sin(force.pennation_angle_at_optimal),)
 
 
 def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
@@ -37,7 +43,7 @@ def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
     """
     least = force.minimum_activation
     usual = (
-        Number("pennation_angle_at_optimal", lambda x: 0.0 <= x <= STRAIGHT, "is not from 0 to less than pi/2"),
+        PENNATION,
         Number("maximum_pennation_angle", lambda x: 0.0 <= x <= 0.5 * pi, "is not from 0 to pi/2"),
         Number("minimum_activation", lambda x: 0.0 <= x < 1.0 - SIGNIFICANT, "is not from 0 to less than 1"),
         Number("min_control", lambda x: not x < least, f"is below its minimum_activation, {least:g}; raise it"),

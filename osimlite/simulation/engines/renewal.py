@@ -18,6 +18,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
@@ -54,7 +55,7 @@ class NumbersOnly:
         self._mechanism: Mechanism = engine.mechanism
         self._forces: Forces = engine.forces
         self._components = model.tree().by_path
-        self._builder = ElementBuilder(model, engine.mechanism, False, folder)
+        self._builder = ElementBuilder(model, engine.mechanism, folder)
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
@@ -73,7 +74,8 @@ class NumbersOnly:
             owners: forces, bodies and the model itself, if a property of theirs has changed.
         """
         made = {}
-        for force in owners:
+        sharing = {type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)}
+        for force in (*owners, *(other for each in sharing for other in self._model.components(each))):
             if isinstance(force, Force):
                 element = self._builder.element(force)
                 made[element.path] = element

@@ -39,11 +39,16 @@ def muscle(case: str, **more: Any) -> Any:
     settings = CONFIGURATIONS[case]
     base = {NAMES[name]: value for name, value in {**USUAL, **settings["base"]}.items()}
     own = {name: value for name, value in settings.items() if name not in ("cls", "base")}
+    component: Any = class_for(settings["cls"])
+    return component(name="mu", geometry_path=line(), **{**base, **own, **more})
+
+
+def line() -> GeometryPath:
+    """A path as long as the coordinate of the block says."""
     path = GeometryPath(name="path")
     for name, frame in (("a", "/ground"), ("b", "/bodyset/block")):
         path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
-    component: Any = class_for(settings["cls"])
-    return component(name="mu", geometry_path=path, **{**base, **own, **more})
+    return path
 
 
 def hung(force: Any, excitations: Sequence[float] = (0.0,), gravity: float = 0.0) -> Model:

@@ -1,0 +1,15 @@
+"""The muscle by Meyer and Fregly, whose tendon is rigid whatever is said of it."""
+
+from osimlite.forces.smooth_muscles import meyer
+from osimlite.schema.muscles import MeyerFregly2016Muscle
+from osimlite.simulation.elements.muscle import muscle
+from osimlite.simulation.elements.smooth_muscle import ACTIVATION, check_smooth, smooth_fields
+
+KIND = muscle(
+    MeyerFregly2016Muscle,
+    meyer,
+    ("activation_rate", "fiber_velocity"),
+    smooth_fields(),
+    states=(ACTIVATION,),
+    check=check_smooth,
+)
