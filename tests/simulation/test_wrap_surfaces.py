@@ -17,7 +17,7 @@ from tests.simulation.test_python_kernels import Checked
 
 SIDES = {"all": (0, 0), "x": (0, 1), "-x": (0, -1), "y": (1, 1), "-y": (1, -1), "z": (2, 1), "-z": (2, -1)}
 METHODS = {"hybrid": wrapping.HYBRID, "midpoint": wrapping.MIDPOINT, "axial": wrapping.AXIAL}
-DIGITS = {"Cylinder": (2e-15, 1e-14), "Sphere": (2e-15, 1e-15), "Torus": (1e-13, 1e-12)}
+DIGITS = {"Cylinder": (2e-15, 1e-14), "Sphere": (2e-15, 1e-15), "Ellipsoid": (2e-15, 1e-14), "Torus": (1e-13, 1e-12)}
 """How exact lengths and points are, m: of a torus, what is searched for with differences over 1e-8 m."""
 
 with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:

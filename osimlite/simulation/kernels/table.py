@@ -40,6 +40,7 @@ LAW_MODULES = {
     "touch_mesh": "meshes",
     "wrap_cylinder": "wrap_cylinder",
     "wrap_sphere": "wrap_sphere",
+    "wrap_ellipsoid": "wrap_ellipsoid",
     "wrap_torus": "wrap_torus",
     "straight_path": "paths",
     "pull_points": "paths",

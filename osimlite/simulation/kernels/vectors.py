@@ -27,6 +27,12 @@ def component(a: Vector, axis: int) -> float:
     return x if axis == 0 else (y if axis == 1 else z)
 
 
+def replaced(a: Vector, axis: int, value: float) -> Vector:
+    """The vector with another component on axis 0, 1 or 2."""
+    x, y, z = a
+    return value if axis == 0 else x, value if axis == 1 else y, value if axis == 2 else z
+
+
 def plus(a: Vector, b: Vector) -> Vector:
     """a + b."""
     ax, ay, az = a
@@ -52,6 +58,13 @@ def along(a: Vector, k: float, b: Vector) -> Vector:
     ax, ay, az = a
     bx, by, bz = b
     return ax + k * bx, ay + k * by, az + k * bz
+
+
+def elementwise(a: Vector, b: Vector) -> Vector:
+    """The products of the components."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return ax * bx, ay * by, az * bz
 
 
 def dot(a: Vector, b: Vector) -> float:
