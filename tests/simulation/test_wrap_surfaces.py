@@ -12,6 +12,7 @@ import pytest
 from osimlite.multibody.spatial import inverse, offset, transform
 from osimlite.simulation.engines.linking import COMPILED
 from osimlite.simulation.kernels import wrapping
+from osimlite.simulation.kernels.layout import OWN
 from tests.conftest import ROOT
 from tests.simulation.test_python_kernels import Checked
 
@@ -36,7 +37,9 @@ def bent(law, p, first, second):
     """What a law says of a piece of a path."""
     e = np.full(wrapping.ENDS, 7.0)
     e[wrapping.FIRST_END : wrapping.FIRST_TANGENT] = *first, *second
-    return law(p, e), e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3), e[wrapping.SURFACE_LENGTH]
+    item, state = np.zeros(OWN, dtype=np.int64), np.zeros(1)
+    says = law(item, p, e, state, state, 0)
+    return says, e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3), e[wrapping.SURFACE_LENGTH]
 
 
 @pytest.mark.parametrize("code", [Checked("Python"), COMPILED], ids=lambda code: code.name)

@@ -46,9 +46,6 @@ LAW_MODULES = {
     "pull_points": "paths",
     "pull_each": "paths",
     "wrapped_path": "path_wraps",
-    "cylinder_law": "wrap_laws",
-    "sphere_law": "wrap_laws",
-    "torus_law": "wrap_laws",
 }
 """The module of each of the engine's own."""
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from math import atan2, cos, pi, radians, sin, sqrt, tan
 
-from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.vectors import EPSILON, Vector, along, cross, dot, minus, plus, put, unit, vector
 from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, on_side, tangents
 from osimlite.simulation.kernels.wrapping import (
@@ -41,8 +42,9 @@ BEND, ROUNDS = tan(radians(0.1)), 100
 """Tangent of the angle by which a line and the helix may differ where they meet; in so many rounds, at most."""
 
 
-def wrap_cylinder(p: Floats, e: Floats) -> int:
+def wrap_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapCylinder, see :mod:`osimlite.simulation.kernels.wrapping`."""
+    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
     return around_cylinder(first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e)
 

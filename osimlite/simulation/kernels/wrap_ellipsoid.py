@@ -13,7 +13,8 @@ from __future__ import annotations
 from math import acos, cos, isnan, nan, pi, sin, sqrt
 
 from osimlite.simulation.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
-from osimlite.simulation.kernels.pointers import Floats, at
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.vectors import (
     Vector,
     along,
@@ -61,8 +62,9 @@ EXACT, ROUNDS, TRIALS, STEPS = 1e-8, 50, 1000, 16.0
 step that is taken."""
 
 
-def wrap_ellipsoid(p: Floats, e: Floats) -> int:
+def wrap_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapEllipsoid, see :mod:`osimlite.simulation.kernels.wrapping`."""
+    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     a, b, c = vector(p, SIZES)
     factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
     radii = times(factor, (a, b, c))

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from math import atan2, pi, sqrt
 
-from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.vectors import (
     Vector,
     along,
@@ -40,12 +41,13 @@ STRAIGHT = 1e-5
 """Sine of the angle between the line and the direction of the centre below which OpenSim finds no plane."""
 
 
-def wrap_sphere(p: Floats, e: Floats) -> int:
+def wrap_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapSphere, see :mod:`osimlite.simulation.kernels.wrapping`.
 
     As in OpenSim a line through the centre goes straight on, a length on the far side of the sphere is negative, and
     where a side is active a line must wrap only if its first end is less than 1 m from the middle of it.
     """
+    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
     if norm(first) < radius or norm(second) < radius:
         return INSIDE

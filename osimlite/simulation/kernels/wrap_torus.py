@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from math import nan, sqrt
 
-from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.vectors import (
     Vector,
     along,
@@ -47,8 +48,9 @@ STEP = sqrt(1.2e-16)
 DOWN = (0.0, 0.0, -1.0)
 
 
-def wrap_torus(p: Floats, e: Floats) -> int:
+def wrap_torus(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapTorus about z, see :mod:`osimlite.simulation.kernels.wrapping`; a piece never must wrap."""
+    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
@@ -57,19 +59,19 @@ def wrap_torus(p: Floats, e: Floats) -> int:
         if not (one_active or two_active):
             return NONE
         closer = one_active and (closer or not two_active)
-    x, y, _ = one if closer else two
-    distance = sqrt(x * x + y * y)
+    rx, ry, _ = one if closer else two
+    distance = sqrt(rx * rx + ry * ry)
     if not distance > 0.0:
         return nowhere(e, WRAPPED)
-    centre = (x * ring / distance, y * ring / distance, 0.0)
+    centre = (rx * ring / distance, ry * ring / distance, 0.0)
     inwards = times(-1.0 / ring, centre)
     tangent = cross(inwards, DOWN)
     a, b = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
     if around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
         return nowhere(e, WRAPPED)
     for place in (FIRST_TANGENT, SECOND_TANGENT):
-        x, y, z = vector(e, place)
-        put(e, place, along(along(along(centre, x, inwards), y, DOWN), z, tangent))
+        ax, ay, az = vector(e, place)
+        put(e, place, along(along(along(centre, ax, inwards), ay, DOWN), az, tangent))
     return WRAPPED
 
 

@@ -17,7 +17,7 @@ from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array, offset
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, MovingPathPoint, PathPoint
-from osimlite.schema.wrapping import WrapCylinder, WrapObject, WrapSphere, WrapTorus
+from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels.functions import table_of_one
@@ -161,8 +161,8 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
         raise ModelError(f"the quadrant of '{builder.path(surface)}' is '{surface.quadrant}'; take x, -y, all or such")
     if method is None:
         raise ModelError(f"the method of '{builder.path(wrap)}' is '{wrap.method}'; take hybrid, midpoint or axial")
-    if min(sizes) < 0.0:
-        raise ModelError(f"'{builder.path(surface)}' has a negative size; give it a positive one")
+    if min(sizes) < 0.0 or (min(sizes) == 0.0 and isinstance(surface, WrapEllipsoid | WrapTorus)):
+        raise ModelError(f"'{builder.path(surface)}' has a size that is not positive; give it a positive one")
     first, last = (end - 1 if end >= 1 else other for end, other in zip(wrap.range, (0, points - 1), strict=True))
     if surface.active and first <= last and last >= points:
         raise ModelError(f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {points}")
@@ -203,9 +203,10 @@ READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array
 }
 
 LAWS: dict[type[WrapObject], tuple[str, tuple[str, ...]]] = {
-    WrapCylinder: ("cylinder_law", ("radius", "length")),
-    WrapSphere: ("sphere_law", ("radius",)),
-    WrapTorus: ("torus_law", ("inner_radius", "outer_radius")),
+    WrapCylinder: ("wrap_cylinder", ("radius", "length")),
+    WrapSphere: ("wrap_sphere", ("radius",)),
+    WrapEllipsoid: ("wrap_ellipsoid", ("dimensions",)),
+    WrapTorus: ("wrap_torus", ("inner_radius", "outer_radius")),
 }
 """The law of each surface, and the properties that are its sizes."""
 
