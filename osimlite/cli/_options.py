@@ -58,6 +58,15 @@ Foot = Annotated[
     ),
 ]
 Equilibrate = Annotated[bool, typer.Option("--equilibrate", help="Start muscles in equilibrium of fibers and tendon.")]
+Controls = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--controls",
+        metavar="FILE|NAME=VALUE",
+        help="Drive actuators: a table of controls over time, or one number; may be given several times.",
+        show_default=False,
+    ),
+]
 Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
 Folder = Annotated[
     Path | None,

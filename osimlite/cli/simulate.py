@@ -32,6 +32,7 @@ def simulate(
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
     equilibrate: options.Equilibrate = False,
+    controls: options.Controls = None,
     states: Annotated[
         Path | None,
         typer.Option(
@@ -79,6 +80,7 @@ def simulate(
     if animate:
         require("PIL", extra="view", purpose="an animation")
     model = read(file)
+    from osimlite.simulation.given_controls import words_to_controls
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
     from osimlite.simulation.trajectory import Interrupted
@@ -107,6 +109,7 @@ def simulate(
                     initial=initial,
                     initial_speeds=speeds,
                     equilibrate=equilibrate,
+                    controls=words_to_controls(controls) if controls else None,
                     progress=progress,
                 )
         except Interrupted as stopped:

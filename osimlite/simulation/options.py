@@ -10,9 +10,19 @@ from typing import Any
 from osimlite.errors import SettingError
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.stepper import Progress
+from osimlite.simulation.storage import StoTable
 from osimlite.text import or_known
 
-PER_RUN = "accuracy", "fixed_step", "report_interval", "initial", "initial_speeds", "equilibrate", "progress"
+PER_RUN = (
+    "accuracy",
+    "fixed_step",
+    "report_interval",
+    "initial",
+    "initial_speeds",
+    "equilibrate",
+    "controls",
+    "progress",
+)
 """The options of a run; the others are chosen when a model is made ready."""
 
 
@@ -33,6 +43,9 @@ class Options:
         initial_speeds: generalized speeds that do not start at their default, likewise.
         equilibrate: start muscles where fiber and tendon are in equilibrium, as OpenSim's `equilibrateMuscles` does;
             states that `initial` names stay as it says.
+        controls: what drives actuators besides the controllers of the model, as a PrescribedController more would: by
+            name or path a number, a function of time (s) or ``(times, values)``; or a table of such columns, or its
+            file. What nothing drives has a control of 0.
         progress: called with the simulated time reached and the length of the steps there (both in s), after every
             step, or after several that are quick.
         route: how the accelerations are computed: by Bullet's "mass-matrix", which "auto" stands for, or its
@@ -57,6 +70,7 @@ class Options:
     initial: Mapping[str, float | str] | str | Path | None = None
     initial_speeds: Mapping[str, float | str] | None = None
     equilibrate: bool = False
+    controls: Mapping[str, Any] | StoTable | str | Path | None = None
     progress: Progress | None = None
     route: str = "auto"
     skip_unsupported: bool = False

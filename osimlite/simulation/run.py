@@ -21,8 +21,10 @@ from osimlite.quantity import tell
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import Constrained, kept_state
 from osimlite.simulation.elements import force_elements
+from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
+from osimlite.simulation.given_controls import driven, told
 from osimlite.simulation.options import Options
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
@@ -153,6 +155,8 @@ class Simulation:
             }
             for given in (initial, chosen.initial_speeds)
         )
+        controls = driven(self.forces.controls, chosen.controls, to)
+        self.engine.drive(controls)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         settings = Settings(accuracy=chosen.accuracy, fixed_step=fixed_step, route=self.engine.route, show=chosen.show)
@@ -171,10 +175,11 @@ class Simulation:
             "initial": initial,
             "initial_speeds": initial_speeds,
             **({"equilibrate": True} if chosen.equilibrate else {}),
+            **({} if chosen.controls is None else {"controls": told(chosen.controls)}),
             **{name: getattr(chosen, name) for name in TOLD},
             **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }
-        trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall)
+        trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall, controls)
         if stepper.interrupted:
             raise Interrupted(trajectory)
         return trajectory
@@ -262,24 +267,28 @@ class Simulation:
         recorder: Recorder,
         settings: dict[str, Any],
         wall: float,
+        controls: Controls,
     ) -> Trajectory:
-        engine = self.engine
+        def engine() -> Engine:
+            """The engine as it was in this run: since then there may have been others."""
+            self.engine.drive(controls)
+            return self.engine
 
         def summary() -> dict[str, Any]:
             return {
                 "model": self.mechanism.name,
-                "engine": engine.name,
-                "route": engine.route,
+                "engine": self.engine.name,
+                "route": self.engine.route,
                 **integration_summary(stepper, settings, wall),
-                **result_summary(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
+                **result_summary(engine(), recorder, (times[0], states[0]), (times[-1], states[-1])),
                 "skipped_forces": list(self.forces.skipped),
                 "constraints": self.constraints,
-                "versions": versions(engine),
+                "versions": versions(self.engine),
             }
 
         report = Report(
-            lambda: (engine.columns, [engine.force_records(*moment) for moment in zip(times, states, strict=True)]),
-            lambda: [engine.energies(*moment) for moment in zip(times, states, strict=True)],
+            lambda: (self.engine.columns, list(map(engine().force_records, times, states))),
+            lambda: list(map(engine().energies, times, states)),
             summary,
         )
         values, speeds = self.state.histories(states)

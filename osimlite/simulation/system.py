@@ -17,6 +17,7 @@ from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.items import ForceElement
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
@@ -73,7 +74,24 @@ class System:
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
         self._y, self._f = np.zeros(self.state.size), np.zeros(self.state.size)
+        self._bind()
+        self._controls = forces.controls
+
+    def _bind(self) -> None:
         self._evaluate = self.program.code.bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
+
+    def drive(self, controls: Controls) -> None:
+        """Have the actuators driven by other controls of the same names in all evaluations and motions from now on."""
+        place = self.structure[layout.CONTROLS]
+        if controls is self._controls or not place:
+            return
+        own, numbers, kernel = controls.record()
+        self.structure = np.concatenate((self.structure[: place + layout.OWN], np.array(own, dtype=np.int64)))
+        first = self.structure[place + layout.NUMBERS]
+        self.numbers = np.concatenate((self.numbers[:first], np.array(numbers, dtype=np.float64)))
+        self.program.drive(self.structure, kernel)
+        self._bind()
+        self._controls = controls
 
     def _rows(self, start: int, count: int, size: int) -> Floats:
         first, rows = self.structure[start], self.structure[count]
@@ -172,6 +190,12 @@ class System:
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
 
     # ---------------------------------------------------------------------------------------------- reports
+    def controls(self) -> list[float]:
+        """The controls of all actuators after an evaluation, in the order of `Controls.names`."""
+        first = self.structure[layout.WORK_CONTROL]
+        found: list[float] = self._w[first : first + len(self._controls.names)].tolist()
+        return found
+
     def touching(self, t: float, y: Sequence[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""
         self.applied(t, y)

@@ -15,7 +15,8 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.simulation import read_sto
+from osimlite.schema.actuators import CoordinateActuator
+from osimlite.simulation import read_sto, write_sto
 from osimlite.simulation.engines import engine_name
 from tests.cli.command import run
 from tests.simulation.damped import damped
@@ -199,3 +200,46 @@ def test_auto_is_bullet_where_it_is_installed(monkeypatch):
     assert engine_name("auto") == "bullet"
     monkeypatch.setattr("osimlite.simulation.engines.find_spec", lambda name: None)
     assert engine_name("auto") == "compiled"
+
+
+@pytest.fixture
+def driven(tmp_path: Path) -> Path:
+    """A bob on a rail with a motor, and a table of controls."""
+    model = osimlite.Model(name="driven")
+    bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    rail = osimlite.SliderJoint(name="rail", coordinates=[osimlite.Coordinate(name="x")])
+    model.add(rail.between(model.ground, bob), *(CoordinateActuator(name=name, coordinate="x") for name in "ab"))
+    osimlite.write(model, tmp_path / "driven.osim")
+    write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2], ["/forceset/a"], [[1.0], [3.0]])
+    return tmp_path / "driven.osim"
+
+
+def test_controls_of_a_table_and_of_a_number(driven):
+    words = "--controls", "controls.sto", "--controls", "b=-2.5"
+    code, _, err = run("simulate", driven.name, "--to", "0.2", *words, folder=driven.parent)
+    assert (code, err) == (0, "")
+    forces = read_sto(driven.parent / "driven" / "forces.sto")
+    assert forces["a"].tolist() == pytest.approx((1.0 + 10.0 * forces.times).tolist(), abs=1e-12)
+    assert (forces["b"] == -2.5).all()
+    summary = json.loads((driven.parent / "driven" / "summary.json").read_text())
+    assert summary["settings"]["controls"] == {"/forceset/a": "a table", "b": -2.5}
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("c=1",), "the model has no actuator 'c' to control"),
+        (("b=fast",), "--controls takes a file, or NAME=VALUE with a number; got 'b=fast'"),
+        (("b=1", "b=2"), "'b' is controlled twice; leave one out"),
+        (("controls.sto", "a=2"), "'/forceset/a' is controlled twice, by its name and by its path; leave one out"),
+        (("gone.sto",), "gone.sto: cannot read the file: no such file"),
+        (("bad.sto",), "bad.sto:6:7: 'a' is nan; give a number"),
+    ],
+)
+def test_controls_that_do_not_fit(driven, words, told):
+    (driven.parent / "bad.sto").write_text("bad\nendheader\ntime\ta\n0\t1\n0.1\t2\n0.125\tnan\n")
+    options = [part for word in words for part in ("--controls", word)]
+    code, out, err = run("simulate", driven.name, *options, folder=driven.parent)
+    assert (code, out) == (1 if words == ("bad.sto",) else 2, "")
+    assert told in " ".join(err.split())
+    assert not (driven.parent / "driven").exists()

@@ -175,14 +175,27 @@ class Program:
         code.make_ready(tuple(dict.fromkeys((*entries, *packed.laws, *kernels))))
         for name in packed.laws:
             self.ints[layout.LAWS + LAW_NUMBERS[name]] = code.address(name)
-        size = int(packed.structure[layout.STATE_SIZE])
-        sizes = len(self.ints), len(packed.numbers), int(packed.structure[layout.WORK_SIZE]), size, size
+        self._count = len(packed.numbers)
         for place, kernel in packed.kernels.items():
-            if isinstance(kernel, str):
-                self.ints[place] = code.address(kernel)
-            else:
-                self.ints[place], kept = code.callback(self._guarded(kernel), sizes)
-                self._kept.append(kept)
+            self._link(place, kernel)
+
+    def drive(self, structure: Ints, kernel: str | Callable[..., None]) -> None:
+        """Take the record of the controls, behind which there is nothing, from another structure."""
+        place = int(structure[layout.CONTROLS])
+        self.ints = np.concatenate((self.ints[:place], structure[place:]))
+        if isinstance(kernel, str):
+            self.code.make_ready((kernel,))
+        self._link(place, kernel)
+
+    def _link(self, place: int, kernel: str | Callable[..., None]) -> None:
+        """Put the address of a kernel at a place."""
+        if isinstance(kernel, str):
+            self.ints[place] = self.code.address(kernel)
+            return
+        size = int(self.ints[layout.STATE_SIZE])
+        sizes = len(self.ints), self._count, int(self.ints[layout.WORK_SIZE]), size, size
+        self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
+        self._kept.append(kept)
 
     def equilibrate(self) -> Callable[..., int]:
         """What brings states into equilibrium, which is made ready when it is first asked for."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
@@ -102,6 +103,9 @@ class Engine(Protocol):
 
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on."""
+
+    def drive(self, controls: Controls) -> None:
+        """Have the actuators driven by other controls of the same names, in what is computed from now on."""
 
     def hold(self) -> None:
         """Keep the window, if there is one, until somebody closes it."""

@@ -47,8 +47,9 @@ HEAD = "controls\nversion=1\nnRows=2\nnColumns=3\ninDegrees=no\nendheader\ntime\
         ("0\t1\tx\n", "controls.sto:8:5: 'x' is no number"),
         ("", "controls.sto:7: the table has no rows; give it some"),
         (
-            "0\t1\t2\n",
-            "controls.sto: the column 'other' of the file of '/controllerset/brain' is no actuator of the model",
+            "0\t1\t2\n1\t1\t2\n",
+            "controls.sto: the column 'other' of the file of '/controllerset/brain' is no actuator of the model; "
+            "did you mean 'motor'?",
         ),
     ],
 )

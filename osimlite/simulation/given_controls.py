@@ -1,0 +1,168 @@
+"""Controls as people give them to a run: numbers, functions of time, tables, files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import SettingError, SimulationError
+from osimlite.multibody.functions import Constant, Function, Scaled, Univariate
+from osimlite.multibody.schema_functions import numeric
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.quantity import tell
+from osimlite.schema.base import Object
+from osimlite.simulation.elements.control_sets import ControlCurves
+from osimlite.simulation.elements.control_tables import read_controls
+from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.elements.signals import TableColumn
+from osimlite.simulation.storage import StoTable
+from osimlite.text import did_you_mean, listed
+
+
+@dataclass(frozen=True)
+class Called(Univariate):
+    """A function of Python that gives a control for a time (s).
+
+    Attributes:
+        function: it.
+        name: of the control, for messages.
+    """
+
+    function: Callable[[float], float]
+    name: str
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        value = float(self.function(x))
+        if not isfinite(value):
+            raise SettingError(f"the control of '{self.name}' is {value} at {x:g} s; give a number")
+        return value, 0.0, 0.0
+
+
+def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path | None, to: float) -> Controls:
+    """What a run adds to the controls of a model, as a PrescribedController more would add it.
+
+    Between the rows of a table are straight lines; before and after, its first and last values hold.
+
+    Args:
+        controls: of the model.
+        given: by the name or path of an actuator a number, a function of time (s) or ``(times, values)``; or a table
+            of such columns, or the file of one or of a ControlSet.
+        to: end of the motion, s, up to which tables should go.
+
+    Raises:
+        OsimliteError: an actuator is not there, or driven twice; or a file cannot be read.
+        SettingError: a control is no number, or times do not increase.
+        SimulationError: a TableSource of the model does not go as far as the motion.
+    """
+    _require_tables(controls, to)
+    if given is None:
+        return controls
+    known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
+    shared = {key for key in known if sum(name.endswith(f"/{key}") for name in controls.names) > 1}
+    functions: dict[str, Function] = {}
+    start, end = -inf, inf
+    for key, value in _by_name(given).items():
+        if key not in known:
+            raise SettingError(f"the model has no actuator '{key}' to control{did_you_mean(key, known)}")
+        if key in shared:
+            paths = [name for name in controls.names if name.endswith(f"/{key}")]
+            raise SettingError(f"{len(paths)} actuators are called '{key}': {listed(paths)}; give the path of one")
+        if known[key] in functions:
+            raise SettingError(f"'{known[key]}' is controlled twice, by its name and by its path; leave one out")
+        if isinstance(value, tuple):
+            functions[known[key]], first, last = _lines(key, *value)
+            start, end = max(start, first), min(end, last)
+        else:
+            functions[known[key]] = _function(key, value)
+    if start > 0.0 or end < to:
+        tell(
+            f"the controls are given from {max(start, 0.0):g} to {min(end, to):g} s of a motion from 0 to {to:g} s; "
+            "their first and last values hold before and after"
+        )
+    return controls.driven(functions)
+
+
+def told(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
+    """What is said of such controls in a summary: a file, or numbers by name and other things by what they are."""
+    if not isinstance(given, Mapping):
+        return "a table" if isinstance(given, StoTable) else str(given)
+    kinds = {name: "a table" if isinstance(value, tuple) else "a function" for name, value in given.items()}
+    return {name: value if isinstance(value, int | float | str) else kinds[name] for name, value in given.items()}
+
+
+def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
+    """Controls from words that are files, or ``NAME=VALUE``.
+
+    Raises:
+        OsimliteError: a word is neither, or two of them give the same control.
+    """
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = (part.strip() for part in word.partition("="))
+        if equals and not Path(word).is_file():
+            try:
+                more: Mapping[str, Any] = {name: float(value)}
+            except ValueError:
+                raise SettingError(f"--controls takes a file, or NAME=VALUE with a number; got '{word}'") from None
+        else:
+            more = _by_name(word)
+        for key in more.keys() & found.keys():
+            raise SettingError(f"'{key}' is controlled twice; leave one out")
+        found |= more
+    return found
+
+
+def _require_tables(controls: Controls, to: float) -> None:
+    """SimulationError if a TableSource, outside of whose times there is nothing, does not go as far as the motion."""
+    for function in (function for functions in controls.functions for function in functions):
+        column = function.function if isinstance(function, Scaled) else function
+        if isinstance(column, TableColumn) and not column.x[0] <= 0.0 < to <= column.x[-1]:
+            raise SimulationError(
+                f"the table of '{column.source}' goes from {column.x[0]:g} to {column.x[-1]:g} s, and the motion from "
+                f"0 to {to:g} s; outside of it OpenSim stops"
+            )
+
+
+def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, Any]:
+    if isinstance(given, Mapping):
+        return given
+    if isinstance(given, str | Path) and Path(given).suffix == ".xml":
+        curves = ControlCurves.read(Path(given))
+        return {name: curves.of(name) for name in curves.actuators}
+    table = given if isinstance(given, StoTable) else read_controls(given)
+    return {label: (table.times, table.rows[:, place]) for place, label in enumerate(table.columns)}
+
+
+def _function(name: str, value: Any) -> Function:
+    """What somebody gave as the control of an actuator."""
+    if isinstance(value, Function):
+        return value
+    if isinstance(value, Object):
+        return numeric(value, 1, f"the control of '{name}'")
+    if callable(value):
+        return Called(value, name)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise SettingError(
+            f"the control of '{name}' is {value!r}; give a number, a function of time or (times, values)"
+        ) from None
+    if not isfinite(number):
+        raise SettingError(f"the control of '{name}' is {number}; give a number")
+    return Constant(number)
+
+
+def _lines(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
+    """Straight lines through values at times, and the first and last of these."""
+    x, y = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
+    if x.ndim != 1 or x.shape != y.shape or not len(x):
+        raise SettingError(f"the control of '{name}' has {x.size} times and {y.size} values; give as many of both")
+    if not (np.isfinite(x).all() and np.isfinite(y).all() and (np.diff(x) > 0.0).all()):
+        raise SettingError(f"the control of '{name}' has times that do not increase, or what is no number; mend it")
+    line = Constant(float(y[0])) if len(x) == 1 else smoothing_spline(x, y, 1, 0.0)
+    return line, float(x[0]), float(x[-1])
