@@ -27,7 +27,7 @@ from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 
 ROUNDING = 1e-12
-"""What is left of a moment arm of 0."""
+"""What is left of a moment arm, or a speed, of 0."""
 
 
 def paths(model: Model) -> Paths:
@@ -88,13 +88,14 @@ class Paths:
         """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.
 
         As OpenSim's computeMomentArm has them: what a tension of 1 N does at the coordinate, and at those that must
-        move with it. That is the derivative of the length times -1 only where the speed is its rate.
+        move with it; NaN at one that cannot move. That is the derivative of the length times -1 only where the speed
+        is its rate.
         """
         values = self.mechanism.values(q)
         forces = self._system.pulled(values)
         arms = (forces @ self._coupling(values)).tolist()
         return {
-            name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if abs(arm) > ROUNDING}
+            name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if not abs(arm) <= ROUNDING}
             for name, row in zip(self.names, arms, strict=True)
         }
 
@@ -119,8 +120,8 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
     if constraints and places:
         rows, wanted = stacked([item.velocity_equations(state) for item in constraints])
         speeds = coupling[:, places] - shortest(rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            coupling[:, places] = speeds / speeds[places, range(len(places))]
+        own = speeds[places, range(len(places))]
+        coupling[:, places] = speeds / np.where(np.abs(own) > ROUNDING, own, np.nan)
     return coupling
 
 

@@ -15,6 +15,7 @@ pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402
+from tests.oracle.opensim_paths import compare_paths  # noqa: E402
 
 GROUND, B0, B1, B2, F1, F2, STUCK = (
     *("/ground", "/bodyset/b0", "/bodyset/b1", "/bodyset/b2", "/bodyset/b1/f1", "/bodyset/b2/f2", "/bodyset/stuck"),
@@ -90,7 +91,7 @@ PATHS = {
 }
 
 
-def test_points_that_move_or_come_and_go(model, tmp_path):
+def with_springs(model):
     for number, points in enumerate(PATHS.values()):
         path = GeometryPath(name="path")
         for place, point in enumerate(points):
@@ -98,5 +99,33 @@ def test_points_that_move_or_come_and_go(model, tmp_path):
         spring = PathSpring(name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4)
         spring.geometry_path = path
         model.add(spring)
+    return model
+
+
+def test_points_that_move_or_come_and_go(model, tmp_path):
     # OpenSim counts no energy for these springs.
-    assert compare(model, tmp_path, counted=0)
+    assert compare(with_springs(model), tmp_path, counted=0)
+
+
+COUPLERS = {
+    "no constraint": {},
+    "a coupler": {"q2_0": "q0_0"},
+    "couplers that share a coordinate": {"q1_0": "q0_0", "q2_0": "q0_0"},
+    "a coupler to a locked coordinate": {"q2_0": "locked"},
+}
+
+
+@pytest.mark.parametrize("coupled", COUPLERS.values(), ids=COUPLERS)
+def test_lengths_speeds_and_moment_arms(model, coupled, tmp_path):
+    with_springs(model)
+    for dependent, independent in coupled.items():
+        constraint = osimlite.CoordinateCouplerConstraint(
+            name=f"couples_{dependent}",
+            independent_coordinate_names=(independent,),
+            dependent_coordinate_name=dependent,
+            coupled_coordinates_function=Sine(amplitude=0.4, omega=1.3, phase=0.2, offset=0.1),
+        )
+        model.add(constraint)
+    osimlite.write(model, tmp_path / "model.osim")
+    # Once it was asked for the moment arm of a locked coordinate, OpenSim forgets that this is locked.
+    compare_paths(tmp_path / "model.osim", poses=1 if "locked" in coupled.values() else 4)

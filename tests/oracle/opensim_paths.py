@@ -1,0 +1,43 @@
+"""Lengths, speeds and moment arms of the paths of a file, beside OpenSim's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import opensim
+
+import osimlite
+from tests.oracle.opensim_runs import put
+
+
+def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
+    """Compare at random values within the ranges of the coordinates, and random speeds; locked coordinates rest."""
+    opensim.Logger.setLevelString("off")
+    theirs = opensim.Model(str(file))
+    state = theirs.initSystem()
+    model = osimlite.read(file)
+    paths, infos = osimlite.paths(model), osimlite.paths(model).mechanism.coordinates
+    coordinates = [opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos]
+    along = [_path(theirs, model, name) for name in paths.names]
+    rng = np.random.default_rng(seed)
+    for _ in range(poses):
+        low, high = np.clip([info.range for info in infos], -2.0, 2.0).T
+        locked = [info.locked for info in infos]
+        q = np.where(locked, [info.default_value for info in infos], rng.uniform(low, high))
+        u = np.where(locked, 0.0, rng.uniform(-2.0, 2.0, len(infos)))
+        put(coordinates, state, q, u)
+        theirs.realizeVelocity(state)
+        lengths, speeds, arms = paths.lengths(q), paths.speeds(q, u), paths.moment_arms(q)
+        for name, path in zip(paths.names, along, strict=True):
+            assert abs(lengths[name] - path.getLength(state)) < 1e-12, name
+            assert abs(speeds[name] - path.getLengtheningSpeed(state)) < 1e-10, name
+            expected = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
+            found = [arms[name].get(info.path, 0.0) for info in infos]
+            assert np.allclose(found, expected, rtol=0.0, atol=1e-10, equal_nan=True), name
+
+
+def _path(theirs, model, owner):
+    tree = model.tree()
+    found = theirs.getComponent(tree.path_of(tree.by_path[owner].geometry_path))
+    return opensim.AbstractGeometryPath.safeDownCast(found)
