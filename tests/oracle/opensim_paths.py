@@ -12,19 +12,25 @@ from tests.oracle.opensim_runs import put
 
 
 def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
-    """Compare at random values within the ranges of the coordinates, and random speeds; locked coordinates rest."""
+    """Compare at random poses within the ranges of the coordinates, and random speeds; locked coordinates rest.
+
+    Where bodies are tied to each other, the poses are near the default one.
+    """
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
     state = theirs.initSystem()
     model = osimlite.read(file)
-    paths, infos = osimlite.paths(model), osimlite.paths(model).mechanism.coordinates
+    paths = osimlite.paths(model)
+    infos, tied = paths.mechanism.coordinates, any(item.bodies for item in paths.mechanism.constraints)
     coordinates = [opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos]
     along = [_path(theirs, model, name) for name in paths.names]
     rng = np.random.default_rng(seed)
     for _ in range(poses):
         low, high = np.clip([info.range for info in infos], -2.0, 2.0).T
-        locked = [info.locked for info in infos]
-        q = np.where(locked, [info.default_value for info in infos], rng.uniform(low, high))
+        locked, rest = [info.locked for info in infos], paths.mechanism.values({})
+        q = np.where(locked, rest, rng.uniform(low, high))
+        if tied:
+            q = paths.mechanism.assemble(rest + 0.1 * (q - rest))
         u = np.where(locked, 0.0, rng.uniform(-2.0, 2.0, len(infos)))
         put(coordinates, state, q, u)
         theirs.realizeVelocity(state)

@@ -1,0 +1,34 @@
+"""Lengths, speeds and moment arms of the paths of every real model, against a live OpenSim 4.6.
+
+OSIMLITE_POSES is how many poses to take of each model.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+
+import pytest
+
+import osimlite
+from osimlite.errors import UnsupportedError
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+from tests.oracle.opensim_paths import compare_paths  # noqa: E402
+
+
+def test_real_paths(corpus_model, tmp_path, monkeypatch):
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    # Of old files OpenSim keeps six digits, which are in what it prints.
+    file = tmp_path / "model.osim"
+    file.write_bytes(gzip.decompress(corpus_model.converted.read_bytes()))
+    try:
+        names = osimlite.paths(osimlite.read(file)).names
+    except UnsupportedError as error:
+        pytest.skip(str(error))
+    if not names:
+        pytest.skip("there are no paths")
+    compare_paths(file, poses=int(os.environ.get("OSIMLITE_POSES", "1")))
