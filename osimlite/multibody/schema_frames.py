@@ -74,6 +74,7 @@ class Placements:
             )
         return target
 
+    @np.errstate(invalid="ignore")
     def station(self, station: Station) -> tuple[str, Array]:
         """The body (or ground) that a station is fixed to, and its place (3,) there."""
         base, matrix = self.frame(self.named(station, "socket_parent_frame"))

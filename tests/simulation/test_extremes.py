@@ -118,3 +118,9 @@ def test_any_number_gets_one_verdict(data):
     assert told[0] == told[1]
     for engine in ("bullet", "compiled"):
         verdict(model, engine, fixed_step=1e-6)
+
+
+def test_a_station_that_is_nowhere_is_no_matter():
+    model = pendulum(osimlite.PinJoint)
+    model.add(osimlite.Station(name="toe", location=(float("inf"), 0.0, 0.0), socket_parent_frame=model.ground))
+    assert osimlite.simulate(model, 0.01, "compiled").times[-1] == 0.01
