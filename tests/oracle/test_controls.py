@@ -14,7 +14,9 @@ from osimlite.schema.controller_types import (
     SynergyController,
     SynergyVector,
 )
+from osimlite.schema.examples import ToyReflexController
 from osimlite.schema.functions import Constant, Sine
+from osimlite.schema.muscles import RigidTendonMuscle
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
@@ -23,7 +25,7 @@ pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle'
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
-from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare, drive  # noqa: E402
+from tests.oracle.force_carrier import JOINTS, STATES, along, carrier, compare, drive  # noqa: E402
 
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
@@ -143,6 +145,15 @@ def test_synergies(model, frames, tmp_path):
         ),
     )
     assert compare(model, tmp_path) > 0
+
+
+def test_reflexes(model, tmp_path):
+    """A muscle that lengthens, at some of the states, has a greater control; here that is its activation."""
+    model.add(*along(RigidTendonMuscle, optimal_fiber_length=0.4, max_contraction_velocity=3.0))
+    drive(model, "along0", "along1")
+    for name, gain in (("first", 2.0), ("second", 3.0)):
+        model.add(ToyReflexController(name=name, gain=gain, socket_actuators=("/forceset/along0", "/forceset/along1")))
+    assert compare(model, tmp_path, counted=None) == 2 * STATES
 
 
 @pytest.mark.parametrize(
