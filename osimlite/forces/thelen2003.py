@@ -323,6 +323,8 @@ def shared(m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffn
         rate: of the path, m/s.
         stiffness: of the fibers, as of `stiffnesses`, N/m.
     """
+    if rate == 0.0:
+        return 1.0
     along, of_tendon = stiffness * fibers.cos, fibers.tendon_slope * m.strength / m.slack
     of_rate = rate
     if fibers.is_taut and abs(along + of_tendon) > SIGNIFICANT:

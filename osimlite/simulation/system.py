@@ -149,7 +149,7 @@ class System:
         count = self.structure[layout.EQUILIBRIA]
         if not count:
             return list(y)
-        equilibrate = self.program.equilibrate()
+        equilibrate = self.program.equilibrate
         self._set(t, y)
         x = self.numbers if numbers is None else numbers
         status = self.program.run(equilibrate, self.program.ints, x, self._w, self._y, self._f, layout.VELOCITY_STAGE)

@@ -2,53 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 import osimlite
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines import linking
 from osimlite.simulation.engines.compiled import CompiledEngine
+from tests.simulation.checked import Checked, bounded
 from tests.simulation.test_compiled_forces import FORCES, states, with_force
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 FILES = ("walker/DynamicWalkerModel.osim", "walkers/steady-walker.osim", "kinematics/mixed_joint_tree.osim")
-
-
-class Bounded(np.ndarray[Any, Any]):
-    """A vector that refuses the negative places that numpy counts from the end."""
-
-    def __getitem__(self, place: Any) -> Any:
-        return super().__getitem__(_inside(place))
-
-    def __setitem__(self, place: Any, value: Any) -> None:
-        super().__setitem__(_inside(place), value)
-
-
-def _inside(place: Any) -> Any:
-    ends = (place.start, place.stop) if isinstance(place, slice) else (place,)
-    if any(isinstance(end, int | np.integer) and end < 0 for end in ends):
-        raise IndexError(f"the place {place} is before the vector")
-    return place
-
-
-class Checked(linking._Python):
-    """Kernels as Python on such vectors."""
-
-    def entry(self, function: str) -> Any:
-        kernel = super().entry(function)
-        return lambda *parts: kernel(*map(bounded, parts))
-
-    def bound(self, function: str, *arrays: Any) -> Any:
-        return super().bound(function, *map(bounded, arrays))
-
-
-def bounded(part: Any) -> Any:
-    return part.view(Bounded) if isinstance(part, np.ndarray) else part
 
 
 def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int = 2) -> None:

@@ -14,7 +14,7 @@ from osimlite.simulation.engines.linking import COMPILED
 from osimlite.simulation.kernels import wrapping
 from osimlite.simulation.kernels.layout import OWN
 from tests.conftest import ROOT
-from tests.simulation.test_python_kernels import Checked
+from tests.simulation.checked import Checked
 
 SIDES = {"all": (0, 0), "x": (0, 1), "-x": (0, -1), "y": (1, 1), "-y": (1, -1), "z": (2, 1), "-z": (2, -1)}
 METHODS = {"hybrid": wrapping.HYBRID, "midpoint": wrapping.MIDPOINT, "axial": wrapping.AXIAL}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi, sin
 from typing import Any
 
+from osimlite.errors import ModelError
 from osimlite.forces.muscles import SIGNIFICANT
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind
-from osimlite.simulation.elements.parameters import Number, Parameter
+from osimlite.simulation.elements.parameters import Number, Parameter, Vector
 
 RECORDED = (
     "tension",
@@ -33,6 +34,29 @@ PENNATION = Number(
 def height(builder: ElementBuilder, force: Any) -> tuple[float]:
     """Of the fibers across the tendon, m."""
     return (force.optimal_fiber_length * sin(force.pennation_angle_at_optimal),)
+
+
+def curve(name: str, size: int, numbers: Callable[[Any], Sequence[float]]) -> Vector:
+    """The curve that a property of a muscle stands for; the law is given its numbers, as `curve_value` takes them.
+
+    Args:
+        name: of the property.
+        size: how many numbers.
+        numbers: from the muscle; a ValueError tells why there is no such curve.
+    """
+
+    def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
+        try:
+            return numbers(force)
+        except ValueError as error:
+            raise ModelError(f"the {name} of '{builder.path(force)}' makes no curve: {error}") from None
+
+    return Vector(size, read)
+
+
+def properties(part: Any) -> list[Any]:
+    """The properties that the class of a part of a muscle declares, in their order."""
+    return [getattr(part, name) for name in type(part).__annotations__]
 
 
 def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:

@@ -6,7 +6,7 @@ import ctypes
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from importlib.util import find_spec
 from inspect import signature
 from typing import Any
@@ -197,6 +197,7 @@ class Program:
         self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
         self._kept.append(kept)
 
+    @cached_property
     def equilibrate(self) -> Callable[..., int]:
         """What brings states into equilibrium, which is made ready when it is first asked for."""
         self.code.make_ready(("equilibrate", *dict.fromkeys(self._equilibria.values())))

@@ -1,0 +1,147 @@
+"""Smooth curves of quintic Bezier sections, as OpenSim's SmoothSegmentedFunction has them; straight lines outside.
+
+A section is a corner: it leaves its first end along one line and reaches its second along another, and the more curvy
+it is, the nearer it comes to where the lines meet (M. Millard et al., Journal of Biomechanical Engineering 135, 2013,
+appendix A). Along it, x and y are polynomials in u, from 0 to 1.
+
+A curve is numbers, for `curve_value`: HEAD of all, and SECTION of each section.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+Point = tuple[float, float, float]
+"""x, y, and the slope there."""
+
+SECTIONS, FIRST, LAST = 0, 1, 4
+HEAD = 7
+"""Count of the sections, and both ends, each as a `Point`."""
+START, SCALE, X, Y, STARTS = 0, 1, 2, 7, 13
+NODES = 16
+SECTION = STARTS + 2 * (NODES + 1)
+"""x at its first end, NODES over its width, the coefficients of x from u on and those of y, and at NODES + 1 places
+that are equally far from each other in x, where u is, and how far it would go up to the next at its rate there."""
+ROUNDS, NEAR = 20, 1e-6
+"""Halley's steps in the search for u; one that is so small is the last, since what it leaves is beyond rounding."""
+
+
+def curve_size(sections: int) -> int:
+    """How many numbers a curve of some sections has."""
+    return HEAD + SECTION * sections
+
+
+def curve(points: Sequence[Point], curviness: Sequence[float]) -> list[float]:
+    """The numbers of a curve through points, with the curviness of the sections between them, each from 0 to 1.
+
+    Raises:
+        ValueError: the lines through two points do not meet in a corner between them.
+    """
+    sections = zip(points, points[1:], curviness, strict=False)
+    return [float(len(curviness)), *points[0], *points[-1], *(x for item in sections for x in _section(*item))]
+
+
+@lru_cache(maxsize=1024)
+def _section(first: Point, last: Point, curviness: float) -> tuple[float, ...]:
+    """The numbers of a section."""
+    (x0, y0, slope0), (x1, y1, slope1) = first, last
+    if not 0.0 <= curviness <= 1.0:
+        raise ValueError("its curviness is not from 0 to 1")
+    # Where the lines meet.
+    x = (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1) if abs(slope0 - slope1) > 2.0**-26 else (x1 + x0) / 2
+    y = (x - x1) * slope1 + y1
+    longest = (x1 - x0) ** 2 + (y1 - y0) ** 2
+    if not max((x - x0) ** 2 + (y - y0) ** 2, (x - x1) ** 2 + (y - y1) ** 2) < longest:
+        raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
+    c = 0.1 + 0.8 * curviness
+    _, *of_x = _polynomial(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)
+    of_y = _polynomial(y0, y0 + c * (y - y0), y1 + c * (y - y1), y1)
+    return (x0, NODES / (x1 - x0), *of_x, *of_y, *_starts(of_x, x1 - x0))
+
+
+def _polynomial(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
+    """Coefficients, by rising powers, for the control points p, q, q, r, r, s."""
+    return p, 5 * (q - p), 10 * (p - q), 10 * (r - p), 5 * (p + 2 * q - 3 * r), s - p + 5 * (r - q)
+
+
+def _starts(x: Sequence[float], width: float) -> list[float]:
+    """From where the search for u starts; it need not be exact."""
+    found: list[float] = []
+    for node in range(NODES + 1):
+        low, high = 0.0, 1.0
+        for _ in range(20):
+            u = 0.5 * (low + high)
+            low, high = (u, high) if _times_u(x, u) < width * node / NODES else (low, u)
+        slope = _derivative(x, high)
+        found += [high, width / NODES / slope if slope > 0.0 else 0.0]
+    return found
+
+
+def _times_u(x: Sequence[float], u: float) -> float:
+    return u * (x[0] + u * (x[1] + u * (x[2] + u * (x[3] + u * x[4]))))
+
+
+def _derivative(x: Sequence[float], u: float) -> float:
+    return x[0] + u * (2.0 * x[1] + u * (3.0 * x[2] + u * (4.0 * x[3] + u * 5.0 * x[4])))
+
+
+def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
+    """y and the slope of a curve."""
+    if not x >= c[FIRST]:
+        return c[FIRST + 1] + c[FIRST + 2] * (x - c[FIRST]), c[FIRST + 2]
+    if x > c[LAST]:
+        return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
+    k, u = place_on(c, x)
+    p, q = k + X, k + Y
+    run = c[p] + u * (2.0 * c[p + 1] + u * (3.0 * c[p + 2] + u * (4.0 * c[p + 3] + u * 5.0 * c[p + 4])))
+    rise = c[q + 1] + u * (2.0 * c[q + 2] + u * (3.0 * c[q + 3] + u * (4.0 * c[q + 4] + u * 5.0 * c[q + 5])))
+    y = c[q] + u * (c[q + 1] + u * (c[q + 2] + u * (c[q + 3] + u * (c[q + 4] + u * c[q + 5]))))
+    return y, rise / run
+
+
+def place_on(c: Sequence[float], x: float) -> tuple[int, float]:
+    """The section of a curve that has x, by the place of its numbers, and u there: the root is unique."""
+    k, last = HEAD, HEAD + SECTION * (int(c[SECTIONS]) - 1)
+    while k < last and x >= c[k + SECTION]:
+        k += SECTION
+    rest = x - c[k + START]
+    part = rest * c[k + SCALE]
+    node = min(int(part), NODES - 1)
+    part -= node
+    s = k + STARTS + 2 * node
+    u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
+    u = u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
+    p = k + X
+    a, b, d, e, f = c[p], c[p + 1], c[p + 2], c[p + 3], c[p + 4]
+    for _ in range(ROUNDS):
+        off = u * (a + u * (b + u * (d + u * (e + u * f)))) - rest
+        slope = a + u * (2.0 * b + u * (3.0 * d + u * (4.0 * e + u * 5.0 * f)))
+        bend = b + u * (3.0 * d + u * (6.0 * e + u * 10.0 * f))
+        divisor = slope * slope - off * bend
+        if not divisor > 0.0:
+            break
+        step = off * slope / divisor
+        u = min(max(u - step, 0.0), 1.0)
+        if abs(step) < NEAR:
+            break
+    return k, u
+
+
+def curve_integral(c: Sequence[float], x: float) -> float:
+    """Integral of a curve from its first end to x; exact, while OpenSim's is a spline good to about 1e-9."""
+    total, off = 0.0, x - c[FIRST]
+    if off <= 0.0:
+        return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
+    at, u = place_on(c, min(x, c[LAST]))
+    for k in range(HEAD, at, SECTION):
+        total += _area(c, k, 1.0)
+    total += _area(c, at, u)
+    off = max(x - c[LAST], 0.0)
+    return total + (c[LAST + 1] + 0.5 * c[LAST + 2] * off) * off
+
+
+def _area(c: Sequence[float], k: int, u: float) -> float:
+    """Integral of y over x of a section up to u."""
+    x, y = c[k + X : k + Y], c[k + Y : k + STARTS]
+    return sum(b * j * a * u ** (i + j) / (i + j) for i, b in enumerate(y) for j, a in enumerate(x, 1))

@@ -1,0 +1,140 @@
+"""The curves of Millard's muscles (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, section 2).
+
+Lengths are parts of the optimal fiber length or of the tendon slack length, velocities of the maximum contraction
+velocity, forces of the maximum isometric force. Each function takes the properties of the class of OpenSim that has its
+name, in their order, and gives the numbers of a curve; None stands for a property that is left out.
+"""
+
+from __future__ import annotations
+
+from math import cos, radians
+
+from osimlite.forces.bezier import curve, curve_size
+
+ACTIVE_SIZE, VELOCITY_SIZE, PASSIVE_SIZE, TENDON_SIZE = map(curve_size, (5, 4, 2, 2))
+COMPRESSIVE_SIZE = curve_size(1)
+"""How many numbers each curve has."""
+
+
+def active_force_length(shortest: float, transition: float, longest: float, slope: float, least: float) -> list[float]:
+    """Active force over fiber length; it is 1 at 1, where the curve is flat.
+
+    Raises:
+        ValueError: there is no such curve; likewise for those below. The message names a property.
+    """
+    _require(0.0 <= shortest < transition < 1.0 < longest, "its lengths do not rise: 0, min, transition, 1, max")
+    _require(least >= 0.0, "its minimum_value is negative")
+    _require(0.0 <= slope < (1.0 - least) / (1.0 - transition), "its shallow_ascending_slope is negative or too steep")
+    half = 0.05
+    knee = 1.0 - slope * (1.0 - half - transition)
+    top = 1.0 + half
+    return curve(
+        (
+            (shortest, least, 0.0),
+            (shortest + 0.5 * (transition - shortest), 0.5 * knee, 1.25 * knee / (transition - shortest)),
+            (transition + 0.5 * (1.0 - half - transition), knee + 0.5 * (1.0 - knee), slope),
+            (1.0, 1.0, 0.0),
+            (top + 0.5 * (longest - top), 0.5, -1.0 / ((longest - half) - top)),
+            (longest, least, 0.0),
+        ),
+        [1.0] * 5,
+    )
+
+
+def force_velocity(
+    concentric_end: float,
+    concentric_near: float,
+    isometric: float,
+    eccentric_end: float,
+    eccentric_near: float,
+    most: float,
+    concentric_curviness: float,
+    eccentric_curviness: float,
+    *,
+    inverse: bool = False,
+) -> list[float]:
+    """Factor of the active force over fiber velocity, or the velocity over that factor."""
+    _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
+    _require(
+        0.0 <= concentric_end < concentric_near <= 1.0, "its concentric slopes are not from 0 to 1, or do not rise"
+    )
+    _require(isometric > 1.0, "its isometric_slope is not above 1")
+    _require(
+        0.0 <= eccentric_end <= eccentric_near < most - 1.0, "its eccentric slopes are not from 0 on, or are too steep"
+    )
+    points = [
+        (-1.0, 0.0, concentric_end),
+        (-0.9, 0.5 * concentric_near * (-0.9 + 1.0) + 0.5 * concentric_end * (-0.9 + 1.0), concentric_near),
+        (0.0, 1.0, isometric),
+        (0.9, most + 0.5 * eccentric_near * (0.9 - 1.0) + 0.5 * eccentric_end * (0.9 - 1.0), eccentric_near),
+        (1.0, most, eccentric_end),
+    ]
+    if inverse:
+        points = [(y, x, 1.0 / slope) for x, y, slope in points]
+    return curve(points, [concentric_curviness] * 2 + [eccentric_curviness] * 2)
+
+
+def fiber_force_length(
+    zero: float, one: float, low: float | None = None, stiffness: float | None = None, curviness: float | None = None
+) -> list[float]:
+    """Passive force over fiber length."""
+    _require(one > zero, "its strain_at_one_norm_force is not above its strain_at_zero_force")
+    low, stiffness, curviness = _given_or(
+        (low, stiffness, curviness), (0.2, 2.0 / (one - zero), 0.75), "stiffnesses and curviness"
+    )
+    _require(stiffness > 1.0 / (one - zero), "its stiffness_at_one_norm_force is too small")
+    _require(0.0 < low < 1.0 / (one - zero), "its stiffness_at_low_force is not positive, or too large")
+    start, end = 1.0 + zero, 1.0 + one
+    foot = start + min(0.1 / stiffness, 0.1 * (end - start))
+    middle = start + 0.5 * (foot - start)
+    return curve(((start, 0.0, 0.0), (foot, low * (foot - middle), low), (end, 1.0, stiffness)), [curviness] * 2)
+
+
+def tendon_force_length(
+    one: float, stiffness: float | None = None, toe: float | None = None, curviness: float | None = None
+) -> list[float]:
+    """Force over tendon length."""
+    _require(one > 0.0, "its strain_at_one_norm_force is not positive")
+    stiffness, toe, curviness = _given_or(
+        (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness, toe and curviness"
+    )
+    _require(0.0 < toe < 1.0, "its norm_force_at_toe_end is not between 0 and 1")
+    _require(stiffness > 1.0 / one, "its stiffness_at_one_norm_force is too small")
+    end = (toe - 1.0) / stiffness + 1.0 + one
+    foot, middle = 1.0 + (end - 1.0) / 10.0, (0.5 * toe - 1.0) / stiffness + 1.0 + one
+    slope = 0.5 * toe / (middle - foot)
+    control = foot + 0.5 * (middle - foot)
+    return curve(((1.0, 0.0, 0.0), (control, slope * (control - foot), slope), (end, toe, stiffness)), [curviness] * 2)
+
+
+def fiber_compressive_force_length(
+    zero: float, stiffness: float | None = None, curviness: float | None = None
+) -> list[float]:
+    """Force against short fibers over their length."""
+    _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
+    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.5), "stiffness and curviness")
+    _require(stiffness < -1.0 / zero, "its stiffness_at_zero_length is not negative enough")
+    return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
+
+
+def fiber_compressive_force_cos_pennation(
+    angle: float, stiffness: float | None = None, curviness: float | None = None
+) -> list[float]:
+    """Force against steep fibers over the cosine of pennation; the angle of engagement is in degrees."""
+    zero = cos(radians(angle))
+    _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
+    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.1), "stiffness and curviness")
+    _require(stiffness < -1.0 / zero, "its stiffness_at_perpendicular is not negative enough")
+    return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
+
+
+def _require(holds: bool, otherwise: str) -> None:
+    if not holds:
+        raise ValueError(otherwise)
+
+
+def _given_or(given: tuple[float | None, ...], usual: tuple[float, ...], what: str) -> tuple[float, ...]:
+    """What is given, or the usual if nothing is."""
+    found = [x for x in given if x is not None]
+    _require(len(found) in (0, len(usual)), f"only some of {what} are given; give all, or none")
+    return tuple(found) or usual

@@ -1,0 +1,155 @@
+"""The muscle by Millard whose fibers and tendon are in equilibrium."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from osimlite.forces.millard2012_equilibrium import (
+    Millard2012Equilibrium,
+    millard2012_energy,
+    millard2012_equilibrium,
+    millard2012_equilibrium_length,
+)
+from osimlite.forces.muscle_curves import (
+    ACTIVE_SIZE,
+    PASSIVE_SIZE,
+    TENDON_SIZE,
+    VELOCITY_SIZE,
+    active_force_length,
+    fiber_force_length,
+    force_velocity,
+    tendon_force_length,
+)
+from osimlite.forces.muscles import SIGNIFICANT, pennation
+from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
+from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.kind import DeclaredForce, State
+from osimlite.simulation.elements.muscle import curve, muscle, properties, require
+from osimlite.simulation.elements.parameters import Fields, Number, positive
+
+LEAST_DAMPING = 0.001
+"""Less counts as none."""
+
+
+def _is_classic(force: Any) -> bool:
+    """Whether it is Hill's muscle, whose equations are singular where no force is left."""
+    return not force.ignore_tendon_compliance and force.fiber_damping < LEAST_DAMPING
+
+
+def _least_activation(force: Any) -> float:
+    # Without dynamics of activation, OpenSim's part for them never hears of the property.
+    owner = MuscleFirstOrderActivationDynamicModel() if force.ignore_activation_dynamics else force
+    return float(owner.minimum_activation)
+
+
+def _pennation(force: Any) -> tuple[float, ...]:
+    return pennation(force.optimal_fiber_length, force.pennation_angle_at_optimal, force.maximum_pennation_angle)
+
+
+def _smallest(force: Any) -> float:
+    by_curve: float = force.active_force_length_curve.min_norm_active_fiber_length * force.optimal_fiber_length
+    return max(SIGNIFICANT, by_curve, _pennation(force)[1])
+
+
+def _others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+    damping = force.fiber_damping if force.fiber_damping >= LEAST_DAMPING else 0.0
+    return damping, _least_activation(force), *_pennation(force), _smallest(force)
+
+
+def _active(force: Any) -> list[float]:
+    own = force.active_force_length_curve
+    least = max(own.minimum_value, 0.1) if _is_classic(force) else min(own.minimum_value, 0.0)
+    return active_force_length(*properties(own.model_copy(update={"minimum_value": least})))
+
+
+def _velocity(force: Any) -> list[float]:
+    own = force.force_velocity_curve
+    concentric, eccentric = own.concentric_slope_at_vmax, own.eccentric_slope_at_vmax
+    if _is_classic(force):
+        ends = (
+            max(concentric, 0.5 * own.concentric_slope_near_vmax),
+            max(eccentric, 0.5 * own.eccentric_slope_near_vmax),
+        )
+    else:
+        ends = min(concentric, 0.0), min(eccentric, 0.0)
+    return force_velocity(*_with_ends(own, *ends))
+
+
+def _inverse(force: Any) -> list[float]:
+    own = force.force_velocity_curve
+    ends = 0.5 * own.concentric_slope_near_vmax, 0.5 * own.eccentric_slope_near_vmax
+    return force_velocity(*_with_ends(own, *ends), inverse=True)
+
+
+def _with_ends(own: Any, concentric: float, eccentric: float) -> list[float]:
+    ends = {"concentric_slope_at_vmax": concentric, "eccentric_slope_at_vmax": eccentric}
+    return properties(own.model_copy(update=ends))
+
+
+def _check(builder: ElementBuilder, force: Any) -> None:
+    least = 0.01 if _is_classic(force) else 0.0
+    slack = Number("tendon_slack_length", lambda x: x >= 0.0, "is negative")
+    require(
+        builder,
+        force,
+        Number("minimum_activation", lambda x: x >= least, f"is less than {least:g}"),
+        slack if force.ignore_tendon_compliance else positive("tendon_slack_length"),
+    )
+
+
+def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    _, m, *_, passive_curve, tendon_curve = force.values
+    known = force.known(record)
+    where = known["length"], known["fiber_length"], known["cos_pennation"]
+    return millard2012_energy(m, *where, passive_curve, tendon_curve)
+
+
+KIND = muscle(
+    Millard2012EquilibriumMuscle,
+    millard2012_equilibrium,
+    ("solved", "activation_rate", "fiber_velocity"),
+    Fields(
+        Millard2012Equilibrium,
+        (
+            Number("max_isometric_force"),
+            positive("optimal_fiber_length"),
+            Number("tendon_slack_length"),
+            positive("max_contraction_velocity"),
+            positive("activation_time_constant"),
+            positive("deactivation_time_constant"),
+            Number("ignore_tendon_compliance"),
+            Number("ignore_activation_dynamics"),
+        ),
+        _others,
+    ),
+    curve("active_force_length_curve", ACTIVE_SIZE, _active),
+    curve("force_velocity_curve", VELOCITY_SIZE, _velocity),
+    curve("force_velocity_curve", VELOCITY_SIZE, _inverse),
+    curve(
+        "fiber_force_length_curve",
+        PASSIVE_SIZE,
+        lambda it: fiber_force_length(*properties(it.fiber_force_length_curve)),
+    ),
+    curve(
+        "tendon_force_length_curve",
+        TENDON_SIZE,
+        lambda it: tendon_force_length(*properties(it.tendon_force_length_curve)),
+    ),
+    states=(
+        State(
+            "activation",
+            lambda force: min(max(force.default_activation, _least_activation(force)), 1.0),
+            lambda force: not force.ignore_activation_dynamics,
+        ),
+        State(
+            "fiber_length",
+            lambda force: max(force.default_fiber_length, _smallest(force)),
+            lambda force: not force.ignore_tendon_compliance,
+            output="fiber_velocity",
+        ),
+    ),
+    equilibrium=millard2012_equilibrium_length,
+    settled=("fiber_length",),
+    stored=_energy,
+    check=_check,
+)

@@ -1,0 +1,41 @@
+"""Kernels as Python on vectors where a place outside is an error: machine code would read or write there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from osimlite.simulation.engines import linking
+
+
+class Bounded(np.ndarray[Any, Any]):
+    """A vector that refuses the negative places that numpy counts from the end."""
+
+    def __getitem__(self, place: Any) -> Any:
+        return super().__getitem__(_inside(place))
+
+    def __setitem__(self, place: Any, value: Any) -> None:
+        super().__setitem__(_inside(place), value)
+
+
+def _inside(place: Any) -> Any:
+    ends = (place.start, place.stop) if isinstance(place, slice) else (place,)
+    if any(isinstance(end, int | np.integer) and end < 0 for end in ends):
+        raise IndexError(f"the place {place} is before the vector")
+    return place
+
+
+class Checked(linking._Python):
+    """Kernels as Python on such vectors."""
+
+    def entry(self, function: str) -> Any:
+        kernel = super().entry(function)
+        return lambda *parts: kernel(*map(bounded, parts))
+
+    def bound(self, function: str, *arrays: Any) -> Any:
+        return super().bound(function, *map(bounded, arrays))
+
+
+def bounded(part: Any) -> Any:
+    return part.view(Bounded) if isinstance(part, np.ndarray) else part
