@@ -8,6 +8,7 @@ import numpy as np
 import opensim
 
 import osimlite
+from osimlite.multibody.constraints import Lock
 from tests.oracle.opensim_runs import put
 
 
@@ -24,6 +25,9 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     infos, tied = paths.mechanism.coordinates, any(item.bodies for item in paths.mechanism.constraints)
     coordinates = [opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos]
     along = [_path(theirs, model, name) for name in paths.names]
+    # On a torus OpenSim divides by small differences; and it projects speeds to 1e-10 only.
+    short = 1e-10 if list(model.components(osimlite.WrapTorus)) else 1e-12
+    coupled = 1e-8 if any(not isinstance(item, Lock) for item in paths.mechanism.constraints) else 0.0
     rng = np.random.default_rng(seed)
     for _ in range(poses):
         low, high = np.clip([info.range for info in infos], -2.0, 2.0).T
@@ -36,11 +40,11 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
         theirs.realizeVelocity(state)
         lengths, speeds, arms = paths.lengths(q), paths.speeds(q, u), paths.moment_arms(q)
         for name, path in zip(paths.names, along, strict=True):
-            assert abs(lengths[name] - path.getLength(state)) < 1e-12, name
+            assert abs(lengths[name] - path.getLength(state)) < short, name
             assert abs(speeds[name] - path.getLengtheningSpeed(state)) < 1e-10, name
             expected = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
             found = [arms[name].get(info.path, 0.0) for info in infos]
-            assert np.allclose(found, expected, rtol=0.0, atol=1e-10, equal_nan=True), name
+            assert np.allclose(found, expected, rtol=coupled, atol=1e-10, equal_nan=True), name
 
 
 def _path(theirs, model, owner):
