@@ -17,13 +17,15 @@ def put(coordinates: Iterable[Any], state: Any, q: Iterable[float], u: Iterable[
         coordinate.setSpeedValue(state, float(speed))
 
 
-def simulated(path: Path, to: float, accuracy: float) -> StoTable:
-    """The states of a model over time."""
+def simulated(path: Path, to: float, accuracy: float, *, equilibrate: bool = False) -> StoTable:
+    """The states of a model over time, from its default state, or one with all muscles in equilibrium."""
     import opensim
 
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(path))
     state = model.initSystem()
+    if equilibrate:
+        model.equilibrateMuscles(state)
     manager = opensim.Manager(model)
     manager.setIntegratorAccuracy(accuracy)
     manager.initialize(state)

@@ -13,6 +13,7 @@ import pytest
 
 import osimlite
 from osimlite.multibody import build_mechanism
+from osimlite.schema.functions import SimmSpline
 from osimlite.schema.registry import class_for
 from osimlite.simulation import read_sto
 from osimlite.simulation.elements import force_elements
@@ -25,7 +26,13 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 STATES = 6
-BOUNDS = {"activation": (0.05, 1.1), "stretch": (0.0, 0.05), "normalized_tendon_force": (0.01, 1.4)}
+BOUNDS = {
+    "activation": (0.05, 1.1),
+    "stretch": (0.0, 0.05),
+    "normalized_tendon_force": (0.01, 1.4),
+    "fiber_length": (0.03, 0.09),
+    "fiber_velocity": (-0.5, 0.5),
+}
 """Of the states that are tried, by their names."""
 HILL = {
     "max_isometric_force": (200, 2000),
@@ -51,6 +58,21 @@ DEGROOTE = {
     "default_normalized_tendon_force": (0.1, 0.4),
     "passive_fiber_strain_at_one_norm_force": (0.5, 0.8),
     "tendon_strain_at_one_norm_force": (0.03, 0.1),
+}
+TIMED = {**HILL, "time_scale": (0.05, 0.2), "activation1": (5, 9), "activation2": (1, 2)}
+THELEN = {
+    **HILL,
+    "activation_time_constant": (0.005, 0.02),
+    "deactivation_time_constant": (0.03, 0.08),
+    "Vmax": (8, 12),
+    "Vmax0": (4, 6),
+    "FmaxTendonStrain": (0.03, 0.06),
+    "FmaxMuscleStrain": (0.4, 0.8),
+    "KshapeActive": (0.3, 0.7),
+    "KshapePassive": (3, 6),
+    "damping": (0.02, 0.2),
+    "Af": (0.2, 0.4),
+    "Flen": (1.2, 1.9),
 }
 RIGID = {"ignore_tendon_compliance": True}
 CASES = {
@@ -79,6 +101,14 @@ CASES = {
     ),
     "meyer": ("MeyerFregly2016Muscle", {**SMOOTH, **TIMES}, RIGID),
     "rigid tendon": ("RigidTendonMuscle", HILL, {}),
+    "schutte": ("Schutte1993Muscle_Deprecated", {**TIMED, "damping": (0.05, 0.2)}, {}),
+    "schutte, passive curve": (
+        "Schutte1993Muscle_Deprecated",
+        {**TIMED, "damping": (0.05, 0.2)},
+        {"passive_force_length_curve": SimmSpline(x=(0.0, 0.5, 1.0, 1.3, 2.0), y=(-0.1, 0.0, 0.05, 0.3, 2.0))},
+    ),
+    "delp": ("Delp1990Muscle_Deprecated", {**TIMED, "mass": (0.002, 0.004)}, {}),
+    "thelen, first form": ("Thelen2003Muscle_Deprecated", THELEN, {}),
 }
 
 
@@ -130,16 +160,20 @@ def test_derivatives_and_records(case, control, tmp_path):
         labels, values = force.getRecordLabels(), force.getRecordValues(state)
         assert list(engine.columns) == [labels.get(k) for k in range(labels.getSize())]
         assert engine.force_records(0.0, y) == pytest.approx([values.get(0)], rel=1e-9, abs=1e-12)
-        stored = theirs.calcPotentialEnergy(state) + MASS * 9.80665 * y[0]
-        assert engine.energies(0.0, y)[2] == pytest.approx(stored, rel=1e-9, abs=1e-9)
+        # The old muscles know nothing of energy.
+        if "Deprecated" not in CASES[case][0]:
+            stored = theirs.calcPotentialEnergy(state) + MASS * 9.80665 * y[0]
+            assert engine.energies(0.0, y)[2] == pytest.approx(stored, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_states_and_steps(case, tmp_path):
     model, _ = made(case, 0.5)
     osimlite.write(model, tmp_path / "model.osim")
-    theirs = simulated(tmp_path / "model.osim", 0.2, 1e-5)
-    trajectory = osimlite.simulate(model, 0.2, accuracy=1e-5, engine="compiled")
+    # Stability bounds the steps that Delp's mass allows: every rounding grows.
+    end = 0.02 if case == "delp" else 0.2
+    theirs = simulated(tmp_path / "model.osim", end, 1e-5, equilibrate=True)
+    trajectory = osimlite.simulate(model, end, accuracy=1e-5, engine="compiled", equilibrate=True)
     trajectory.to_sto(tmp_path / "states.sto")
     ours = read_sto(tmp_path / "states.sto")
     assert ours.columns == theirs.columns

@@ -156,7 +156,7 @@ class Fields(Parameter):
 
     type: type[Any]
     properties: tuple[Number, ...]
-    others: Callable[[ElementBuilder, Any], Sequence[float]]
+    others: Callable[[ElementBuilder, Any], Sequence[float]] = lambda builder, force: ()
 
     @property
     def size(self) -> int:  # type: ignore[override]
@@ -215,6 +215,31 @@ class Curve(Parameter):
     def pack(self, value: Function, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Place of the table."""
         return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
+
+
+@dataclass(frozen=True)
+class Curves(Parameter):
+    """Properties that are functions of one number; the law is given their tables as one tuple."""
+
+    names: tuple[str, ...]
+
+    @property
+    def heads(self) -> int:  # type: ignore[override]
+        """How many."""
+        return len(self.names)
+
+    def read(self, builder: ElementBuilder, force: Any) -> tuple[Function, ...]:
+        """The functions."""
+        return tuple(Curve(name).read(builder, force) for name in self.names)
+
+    def arguments(self, head: int, number: int) -> list[str]:
+        """The tables."""
+        return [f"({', '.join(f'at(p, i[{head + k}])' for k in range(self.heads))})"]
+
+    def pack(self, value: Sequence[Function], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Places of the tables."""
+        places = [Curve(name).pack(own, tail, where)[0] for name, own in zip(self.names, value, strict=True)]
+        return [place for (place,) in places], ()
 
 
 @dataclass(frozen=True)

@@ -70,9 +70,11 @@ def test_derivatives_forces_and_energy(case, code):
             assert value == pytest.approx(expected, rel=close, abs=1e-14 + scale, nan_ok=True), (number, name)
         assert force == pytest.approx(-known["tension"], rel=1e-15)
         assert ready.force_records(float(number), y) == [known["tension"]]
-        stored = float(row["FiberPotentialEnergy"]) + float(row["TendonPotentialEnergy"])
-        # OpenSim's integrals of curves are splines.
-        assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=1e-5, abs=1e-7)
+        parts = [row[f"{part}PotentialEnergy"] for part in ("Fiber", "Tendon")]
+        stored = 0.0 if "n/a" in parts else sum(map(float, parts))
+        # OpenSim's integrals of Millard's curves are splines.
+        close = 1e-5 if "millard" in case else 1e-8
+        assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=close, abs=0.01 * close)
 
 
 @pytest.mark.parametrize("code", [None, Checked("Python")], ids=["compiled", "Python"])
@@ -88,7 +90,7 @@ def test_equilibrium(case, code):
                 ready.equilibrated(float(number), y)
             continue
         found = ready.equilibrated(float(number), y)
-        expected = [float(row[f"eq_{name}"]) for name in states(ready)]
+        expected = [float(row.get(f"eq_{name}", value)) for name, value in zip(states(ready), start, strict=True)]
         assert found[:2] == y[:2] and found[2:] == pytest.approx(expected, rel=1e-12, abs=1e-14), number
 
 

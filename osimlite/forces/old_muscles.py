@@ -1,0 +1,211 @@
+"""The muscles that OpenSim keeps for old files: its classes whose names end in Deprecated.
+
+Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length where they are normalized.
+Fibers are parallel and keep their height across the tendon, at any angle.
+
+Sources: L. M. Schutte, "Using musculoskeletal models to explore strategies for improving performance in electrical
+stimulation-induced leg cycle ergometry" (Stanford University, 1993); S. L. Delp, "Surgery simulation" (Stanford
+University, 1990); D. G. Thelen, Journal of Biomechanical Engineering 125 (2003) 70-77; as OpenSim computes them.
+"""
+
+from __future__ import annotations
+
+from math import exp, sqrt
+from typing import NamedTuple
+
+SMALLEST = 2.220446049250313e-16
+"""Fibers that are shorter (m) are in line with the tendon."""
+UPRIGHT = 6.123233995736766e-17
+"""Cosine of a right angle, as a float: that of the pennation angle of fibers that are no longer than high."""
+NOTHING = 2e-13
+"""What is no larger counts as 0."""
+ROUNDS, TOLERANCE = 100, 0.01
+"""In the search for an equilibrium: how often a length is tried, and what the forces may differ by, N."""
+TENDON_MODULUS, TENDON_STRENGTH = 1200.0, 32.0
+"""Of the material of a tendon, MPa."""
+
+
+class OldMuscle(NamedTuple):
+    """The numbers that all these muscles have.
+
+    Attributes:
+        strength: max_isometric_force, N.
+        optimal: optimal_fiber_length, m.
+        slack: tendon_slack_length, m.
+        height: of the fibers, optimal sin(pennation_angle_at_optimal), m.
+    """
+
+    strength: float
+    optimal: float
+    slack: float
+    height: float
+
+
+class Guess(NamedTuple):
+    """A guess of where fibers and tendon are in equilibrium.
+
+    Attributes:
+        length: of the fibers, m.
+        cos: of pennation.
+        strain: of the tendon, not negative.
+    """
+
+    length: float
+    cos: float
+    strain: float
+
+
+def cos_upright(length: float, height: float) -> float:
+    """Cosine of the pennation angle of fibers of a length (m) and a height (m)."""
+    if length < SMALLEST:
+        return 1.0
+    return sqrt((length - height) * (length + height)) / length if height < length else UPRIGHT
+
+
+def scaled_activation_rate(excitation: float, activation: float, more: float, least: float, time: float) -> float:
+    """Rate of activation, 1/s.
+
+    Args:
+        excitation: what the control asks for.
+        activation: the state.
+        more: activation1, by which excitation speeds up the rise.
+        least: activation2, the rate of the fall.
+        time: time_scale, s.
+    """
+    speed = more * excitation + least if excitation >= activation else least
+    return (excitation - activation) * speed / time
+
+
+def rigid_cos(path_length: float, m: OldMuscle) -> float:
+    """What OpenSim takes for the cosine of pennation where fibers stand across a tendon that pulls.
+
+    Of a normalized length it subtracts the slack length in m.
+    """
+    along = path_length / m.optimal - m.slack
+    return cos_upright(sqrt(along * along + m.height * m.height), m.height)
+
+
+def schutte_passive_force(length: float) -> float:
+    """Passive force of fibers of a normalized length, where the file has no curve for it."""
+    return exp(8.0 * (length - 1.0)) / exp(4.0)
+
+
+def schutte_velocity(activation: float, active: float, borne: float, damping: float) -> float:
+    """Velocity of fibers, optimal fiber lengths per time scale: the root of a quadratic equation on either side of 0.
+
+    Args:
+        activation: 1.
+        active: force at rest, fully activated.
+        borne: force that depends on the velocity.
+        damping: force at a velocity of 1.
+    """
+    isometric = activation * active
+    if borne < -damping:
+        return borne / damping
+    if borne < isometric:
+        b = -(borne + 0.15 * (isometric + damping)) / damping
+        c = 0.15 * (borne - isometric) / damping
+        return 0.5 * (-b - sqrt(b * b - 4.0 * c))
+    slope = 0.13 * 0.15 / 1.15
+    b = slope - (borne - 1.4 * isometric) / damping
+    c = slope * (isometric - borne) / damping
+    return 0.5 * (-b + sqrt(b * b - 4.0 * c))
+
+
+def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
+    """Force of a tendon: an exponential and a line, and a little at any length that is not 0."""
+    toe = 0.609 * strain_at_one
+    force = 0.001 * (1.0 + strain)
+    if strain > toe:
+        return force + 1.712 / strain_at_one * (strain - toe) + 0.333333
+    return force + 0.333333 * (exp(3.0 * strain / toe) - 1.0) / (exp(3.0) - 1.0) if strain > 0.0 else force
+
+
+def thelen_passive_force(length: float, strain_at_one: float, shape: float) -> float:
+    """Passive force of fibers of a normalized length: an exponential, and a line beyond the strain at 1."""
+    beyond = length - (1.0 + strain_at_one)
+    return 1.0 + shape / strain_at_one * beyond if beyond > 0.0 else exp(shape * (length - 1.0) / strain_at_one - shape)
+
+
+def thelen_active_force(length: float, width: float) -> float:
+    """Force at rest of fully activated fibers of a normalized length."""
+    return exp(-(length - 1.0) * (length - 1.0) / width)
+
+
+def thelen_velocity(activation: float, active: float, borne: float, damping: float, shape: float, most: float) -> float:
+    """Velocity of fibers over their fastest one; the curve goes on as straight lines, through two points at its ends.
+
+    Args:
+        activation: 1.
+        active: force at rest, fully activated.
+        borne: force that depends on the velocity.
+        damping: added to the denominator.
+        shape: Af.
+        most: Flen.
+    """
+    isometric, near = max(activation, 1e-6) * active, 1e-6
+    if borne < isometric:
+        if borne >= 0.0:
+            return thelen_shortening(borne, isometric, damping, shape)
+        at_end = thelen_shortening(0.0, isometric, damping, shape)
+        return at_end + borne / (near / (thelen_shortening(near, isometric, damping, shape) - at_end))
+    end = 0.95 * isometric * most
+    if borne < end:
+        return thelen_lengthening(borne, isometric, damping, shape, most)
+    beside = (0.95 + near) * isometric * most
+    at_end = thelen_lengthening(end, isometric, damping, shape, most)
+    slope = (thelen_lengthening(beside, isometric, damping, shape, most) - at_end) / (beside - end)
+    return at_end + slope * (borne - end)
+
+
+def thelen_shortening(borne: float, isometric: float, damping: float, shape: float) -> float:
+    """The curve of `thelen_velocity` below the isometric force."""
+    return (borne - isometric) / (isometric + borne / shape + damping)
+
+
+def thelen_lengthening(borne: float, isometric: float, damping: float, shape: float, most: float) -> float:
+    """The curve of `thelen_velocity` from the isometric force on."""
+    return (borne - isometric) / ((2.0 + 2.0 / shape) * (isometric * most - borne) / (most - 1.0) + damping)
+
+
+def fitted(path_length: float, length: float, m: OldMuscle) -> Guess:
+    """Fibers of a length (m), or of that which leaves the tendon its slack length if it would be shorter."""
+    cos = cos_upright(length, m.height)
+    tendon = path_length - length * cos
+    if tendon >= m.slack:
+        return Guess(length, cos, tendon / m.slack - 1.0)
+    along = path_length - m.slack
+    cos = max(along / sqrt(along * along + m.height * m.height), UPRIGHT)
+    return Guess(max(along / cos, m.height), cos, 0.0)
+
+
+def next_length(
+    guess: Guess,
+    before: float,
+    error: float,
+    error_before: float,
+    fibers: float,
+    fully: float,
+    tendon: float,
+    m: OldMuscle,
+) -> float:
+    """The fiber length (m) to try next.
+
+    Between two of which one is too short and the other too long; else as the stiffness of fibers and tendon, which are
+    taken for their forces over their lengths, leads to, but no more than half an optimal length away.
+
+    Args:
+        guess: that was tried last.
+        before: length that was tried before, m.
+        error: what the tendon pulls more than the fibers, N.
+        error_before: the same at the length before, N.
+        fibers: their force, activated as they are.
+        fully: their force, fully activated.
+        tendon: its force.
+        m: the muscle.
+    """
+    if (error >= 0.0) != (error_before >= 0.0):
+        return guess.length + abs(error) / (abs(error) + abs(error_before)) * (before - guess.length)
+    of_tendon = max(tendon, fibers * TENDON_MODULUS / TENDON_STRENGTH) * m.strength / m.slack
+    step = min(abs(error / (m.strength / m.optimal * fully / guess.cos + of_tendon)), 0.5 * m.optimal)
+    return guess.length + step if error > 0.0 else guess.length - step
