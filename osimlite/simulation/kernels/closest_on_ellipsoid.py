@@ -119,8 +119,10 @@ def fan(radii: Vector, start: Vector, chord: Vector, room: Floats) -> Vector:
         for k in range(LANES):
             part = min(first + k, SAMPLES - 2) / SAMPLES
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
-            room[PART + k], room[MULTIPLIER + k] = part, 0.0
-            room[X + k], room[Y + k], room[Z + k] = aa * (u * u), bb * (v * v), cc * (w * w)
+            aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
+            value, slope = polynomial(aa, bb, cc, aauu, bbvv, ccww)
+            room[PART + k], room[MULTIPLIER + k] = part, -value / slope if abs(value) >= SMALL else 0.0
+            room[X + k], room[Y + k], room[Z + k] = aauu, bbvv, ccww
         for _ in range(STEPS):
             going = 0
             for k in range(LANES):

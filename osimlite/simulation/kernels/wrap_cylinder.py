@@ -177,38 +177,51 @@ def settled(first: Vector, second: Vector, one: Vector, two: Vector, arc: float,
     """Heights of the tangent points where the lines go over into the helix with almost no bend.
 
     OpenSim compares with the next point that it would draw, so that the result jumps where their number changes. It
-    asks for this only if a path has several PathWraps.
+    asks for this only if a path has several PathWraps, and need not come to an end.
     """
     x1, y1, z1 = one
     x2, y2, z2 = two
+    pieces, part = 0, 0.0
+    leg1 = leg2 = (0.0, 0.0, 0.0, 0.0)
     for _ in range(ROUNDS):
-        pieces = int(helix(arc, z2 - z1) / PIECE)
-        if pieces < 2:
+        rise = z2 - z1
+        count = int(helix(arc, rise) / PIECE)
+        if count < 2:
             break
-        c, s, rise = cos(turn / pieces), sin(turn / pieces), (z2 - z1) / pieces
-        w1 = moved(first, (x1, y1, z1), (c * x1 - s * y1, s * x1 + c * y1, z1 + rise))
-        # The helix has moved with its first point.
-        w2 = moved(second, (x2, y2, z2), (c * x2 + s * y2, c * y2 - s * x2, w1 + (z2 - z1) - rise))
+        if count != pieces:
+            pieces, part = count, 1.0 / count
+            c, s = cos(part * turn), sin(part * turn)
+            leg1 = leg(first, one, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
+            leg2 = leg(second, two, (c * x2 + s * y2, c * y2 - s * x2, 0.0))
+        _, _, height1 = first
+        _, _, height2 = second
+        w1 = moved(leg1, height1, z1, z1 + part * rise)
+        # By now the helix has moved with its first point.
+        w2 = moved(leg2, height2, z2, w1 + (1.0 - part) * rise)
         if w1 == z1 and w2 == z2:
             break
         z1, z2 = w1, w2
     return z1, z2
 
 
-def moved(end: Vector, tangent: Vector, next_point: Vector) -> float:
-    """The next height of a tangent point: further on than where its edge is closest to a line, or the old one.
+def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float, float, float]:
+    """What stays as a tangent point slides along its edge.
 
-    The line joins the end to the next point on the surface.
+    As seen along the axis, the lengths of the line to it and of the first piece of the helix; and by how much the
+    heights of the next point and of the end move it: 3/2 of the way to where its edge is closest to their line.
     """
-    lx, ly, lz = minus(tangent, end)
-    nx, ny, nz = minus(next_point, tangent)
-    _, _, z = tangent
-    flat_line, flat_helix = sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny)
-    if abs(flat_line * nz - lz * flat_helix) <= BEND * (lz * nz + flat_line * flat_helix):
-        return z
-    dx, dy, dz = way = minus(next_point, end)
+    lx, ly, _ = minus(tangent, end)
+    nx, ny, _ = minus(next_point, tangent)
+    dx, dy, _ = minus(next_point, end)
     across = dx * dx + dy * dy
-    if across <= PARALLEL * (across + dz * dz) or abs(dz) < EPSILON:
-        return z
-    _, _, height = along(end, (lx * dx + ly * dy) / across, way)
-    return z + 1.5 * (height - z)
+    share = (lx * dx + ly * dy) / across if across > 0.0 else 0.0
+    return sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny), 1.5 * share, 1.5 * (1.0 - share)
+
+
+def moved(leg: tuple[float, float, float, float], end: float, tangent: float, next_point: float) -> float:
+    """The next height of a tangent point from the three heights, the same if the path hardly bends there."""
+    line, piece, with_next, with_end = leg
+    line_rise, piece_rise = tangent - end, next_point - tangent
+    if abs(line * piece_rise - line_rise * piece) <= BEND * (line_rise * piece_rise + line * piece):
+        return tangent
+    return with_next * next_point + (with_end * end - 0.5 * tangent)
