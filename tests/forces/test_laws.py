@@ -12,46 +12,65 @@ from typing import get_type_hints
 import pytest
 
 from osimlite import forces
+from osimlite.simulation import kernels
+from osimlite.simulation.elements.kind import Kind, kinds
 
-ITERATES_OVER_A_LAW = {"contact_forces", "simbody_pair_order"}
-MODULES = [import_module(f"osimlite.forces.{item.name}") for item in iter_modules(forces.__path__)]
-LAWS = [
-    pytest.param(function, id=f"{module.__name__.rpartition('.')[2]}.{name}")
-    for module in MODULES
-    for name, function in inspect.getmembers(module, inspect.isfunction)
-    if function.__module__ == module.__name__ and name not in ITERATES_OVER_A_LAW
-]
+BUILT_IN = {"abs", "bool", "float", "int", "max", "min", "range"}
+SCALARS = {"bool", "float", "int"}
+TABLE = "Sequence[float]"
+
+
+def is_of_forces(value):
+    return getattr(value, "__module__", "").startswith(f"{forces.__name__}.")
+
+
+def globals_of(function):
+    """What a function names that is not built in."""
+    names = {item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"} - BUILT_IN
+    return {name: function.__globals__[name] for name in names if name in function.__globals__}
+
+
+def laws():
+    """The functions of the package that kernels and kinds of forces call; the rest prepares numbers or reports."""
+    modules = [import_module(f"{kernels.__name__}.{item.name}") for item in iter_modules(kernels.__path__)]
+    pending = [function for module in modules for _, function in inspect.getmembers(module, inspect.isfunction)]
+    for kind in (kind for kind in kinds() if isinstance(kind, Kind)):
+        own = kind.law, kind.equilibrium, *kind.geometry.calls
+        pending += [law for law in own if law is not None]
+    found = set()
+    while pending:
+        function = pending.pop()
+        if function not in found:
+            found.add(function)
+            pending += [
+                value
+                for value in globals_of(function).values()
+                if inspect.isfunction(value) and value.__module__.startswith("osimlite.")
+            ]
+    return sorted(filter(is_of_forces, found), key=lambda law: (law.__module__, law.__name__))
+
+
+LAWS = [pytest.param(law, id=f"{law.__module__.rpartition('.')[2]}.{law.__name__}") for law in laws()]
 
 
 def test_all_laws_are_here():
-    assert len(MODULES) >= 3 and len(LAWS) >= 19
-
-
-BUILT_IN = {"ValueError", "abs", "bool", "float", "max", "min", "range"}
-
-
-def is_tuple_of_numbers(value):
-    return inspect.isclass(value) and issubclass(value, tuple) and value.__module__.startswith(forces.__name__)
+    assert len(LAWS) >= 40
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_stands_alone(law):
     """A function that closes over nothing, and that calls none but laws and those of `math`, can be compiled."""
-    for name in {item.argval for item in dis.get_instructions(law) if item.opname == "LOAD_GLOBAL"} - BUILT_IN:
-        value = law.__globals__[name]
-        if inspect.isfunction(value):
-            assert value.__module__.startswith(forces.__name__)
-        else:
-            assert vars(math).get(name) is value or isinstance(value, (float, int)) or is_tuple_of_numbers(value)
+    for name, value in globals_of(law).items():
+        assert is_of_forces(value) or vars(math).get(name) is value or isinstance(value, (float, int)), name
     assert not law.__code__.co_freevars and not law.__code__.co_cellvars
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_takes_and_gives_scalars(law):
-    """Or named tuples of them."""
-    tuples = {name for name, value in law.__globals__.items() if is_tuple_of_numbers(value)}
-    for name in tuples:
-        assert set(get_type_hints(law.__globals__[name]).values()) <= {float, bool}
-    assert {p.annotation for p in inspect.signature(law).parameters.values()} <= {"float", "bool", *tuples}
+    """And tables of numbers, and named tuples."""
+    named = {name: value for name, value in law.__globals__.items() if inspect.isclass(value) and is_of_forces(value)}
+    for value in named.values():
+        assert set(get_type_hints(value).values()) <= {bool, float}
+    assert {p.annotation for p in inspect.signature(law).parameters.values()} <= {*SCALARS, TABLE, *named}
     returned = inspect.signature(law).return_annotation
-    assert set(returned.removeprefix("tuple[").removesuffix("]").split(", ")) <= {"float", "bool", *tuples}
+    assert set(returned.removeprefix("tuple[").removesuffix("]").split(", ")) <= {*SCALARS, *named}
