@@ -15,8 +15,6 @@ DEFAULT_ACCURACY = 1e-3
 INITIAL_STEP = 0.01
 """First step tried, s: a tenth of Simbody's default time scale."""
 
-_ROUNDING = 2.0**-52
-
 
 class RungeKuttaMerson(Stepper):
     """Simbody's RungeKuttaMerson, the default integrator of OpenSim: `accuracy` means what it means there.
@@ -35,7 +33,7 @@ class RungeKuttaMerson(Stepper):
         accuracy: as OpenSim's Manager and ForwardTool understand it, 1.
         maximum_step: s.
         minimum_step: s. The integrator refuses to go on where it needs a smaller one; Simbody takes the step
-            then, whatever its error. Rounding sets a bound of about 1e-15 s in any case; OpenSim's tools use 1e-8.
+            then, whatever its error. OpenSim's tools use 1e-8.
         count_q: what the sum of the squared errors of q is divided by. Simbody counts all coordinates of a model,
             also locked and prescribed ones (their error is 0), and one more for each ball, free or ellipsoid
             joint: give that number where y leaves them out.
@@ -93,7 +91,7 @@ class RungeKuttaMerson(Stepper):
         f, t0, y0, f0 = self._f, self.time, self.state, self.derivative
         # Errors of speeds and auxiliary states count relative to their value at the start where that exceeds 1.
         weights = [1.0 / abs(x) if abs(x) > 1.0 else 1.0 for x in y0[self._end_q :]]
-        smallest = max(self._minimum_step, 4.0 * _ROUNDING * max(1.0, abs(t0)))
+        smallest = max(self._minimum_step, shortest_step(t0))
         while True:
             h = self._next_step
             # A step that all but reaches the limit goes there. One cut much shorter tells nothing about the next.
@@ -186,6 +184,11 @@ class RungeKuttaMerson(Stepper):
             t0,
             index,
         ) from cause
+
+
+def shortest_step(t: float) -> float:
+    """The shortest step that moves the time t; as in Simbody, from 0 it may be of any length."""
+    return max(2.0**-52 * abs(t), 1e-300)
 
 
 def merson_step(

@@ -361,7 +361,9 @@ def test_why_there_is_no_step_is_told_late_too():
     model.add(pin.between(model.ground, body))
     messages = []
     for engine in ("compiled", "bullet"):
-        with pytest.raises(SimulationError, match=r"at t = 5\.5 s: even its smallest step of 4\.\d*e-15 s") as error:
+        with pytest.raises(
+            SimulationError, match=r"at t = 5\.5 s: even its smallest step of \d\.?\d*e-1[56] s"
+        ) as error:
             osimlite.simulate(model, to=6.0, engine=engine)
         messages.append(str(error.value))
     assert messages[0] == messages[1]

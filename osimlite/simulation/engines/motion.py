@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from osimlite.errors import SimulationError
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.integrators import RungeKuttaMerson
+from osimlite.simulation.integrators import RungeKuttaMerson, shortest_step
 from osimlite.simulation.kernels import merson
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import BatchOptions
@@ -147,7 +147,7 @@ class CompiledMerson(RungeKuttaMerson):
         """Raise the error that the steps in Python end with, from where the compiled ones ended."""
         self.derivative = self._evaluate(self.time, self.state)
         # A step that failed has made the next one shorter than the shortest, and the time might not move with it.
-        self._next_step = max(self._next_step, 4.0 * 2.0**-52 * max(1.0, abs(self.time)))
+        self._next_step = max(self._next_step, shortest_step(self.time))
         for _ in range(100):
             super().step()
         raise SimulationError(f"the motion cannot be computed beyond t = {self.time:.9g} s; ask for more accuracy")

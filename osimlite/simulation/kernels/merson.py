@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
-from osimlite.simulation.integrators import next_step_size
+from osimlite.simulation.integrators import next_step_size, shortest_step
 from osimlite.simulation.kernels.layout import (
     ACCELERATION_STAGE,
     CONSTRAINED,
@@ -232,7 +232,7 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
     counts, clock, settings, sizes, size = m.counts, m.clock, m.settings, m.sizes, m.s[STATE_SIZE]
     companion = at(m.w, m.s[WORK_STATE] + 8 * size)
     limit, accuracy = settings[LIMIT], settings[ACCURACY]
-    smallest = max(settings[SMALLEST_STEP], 4.0 * 2.0**-52 * max(1.0, abs(t0)))
+    smallest = max(settings[SMALLEST_STEP], shortest_step(t0))
     while True:
         if counts[ATTEMPTED] >= sizes[MOST_TRIES]:
             return t0
