@@ -36,27 +36,30 @@ def height(builder: ElementBuilder, force: Any) -> tuple[float]:
     return (force.optimal_fiber_length * sin(force.pennation_angle_at_optimal),)
 
 
-def curve(name: str, size: int, numbers: Callable[[Any], Sequence[float]]) -> Vector:
+def curve(
+    name: str,
+    size: int,
+    make: Callable[..., Sequence[float]],
+    changed: Callable[[Any], dict[str, Any]] = lambda _: {},
+) -> Vector:
     """The curve that a property of a muscle stands for; the law is given its numbers, as `curve_value` takes them.
 
     Args:
         name: of the property.
         size: how many numbers.
-        numbers: from the muscle; a ValueError tells why there is no such curve.
+        make: makes them of the curve's own properties, in their order; a ValueError tells why there is no such curve.
+        changed: those that the muscle changes.
     """
 
     def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
+        own = getattr(force, name)
+        properties = {name: getattr(own, name) for name in type(own).__annotations__} | changed(force)
         try:
-            return numbers(force)
+            return make(*properties.values())
         except ValueError as error:
             raise ModelError(f"the {name} of '{builder.path(force)}' makes no curve: {error}") from None
 
     return Vector(size, read)
-
-
-def properties(part: Any) -> list[Any]:
-    """The properties that the class of a part of a muscle declares, in their order."""
-    return [getattr(part, name) for name in type(part).__annotations__]
 
 
 def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:

@@ -35,7 +35,7 @@ def table(name: str, case: str) -> list[dict[str, str]]:
 
 
 def muscle(case: str, **more: Any) -> Any:
-    """The muscle of a case, along a path from the origin of ground to that of the block."""
+    """The muscle of a case, along `path`."""
     settings = CONFIGURATIONS[case]
     base = {NAMES[name]: value for name, value in {**USUAL, **settings["base"]}.items()}
     own = {name: value for name, value in settings.items() if name not in ("cls", "base")}

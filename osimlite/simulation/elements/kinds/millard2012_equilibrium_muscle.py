@@ -1,6 +1,7 @@
 """The muscle by Millard whose fibers and tendon are in equilibrium."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from osimlite.forces.millard2012_equilibrium import (
@@ -24,7 +25,7 @@ from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import DeclaredForce, State
-from osimlite.simulation.elements.muscle import curve, muscle, properties, require
+from osimlite.simulation.elements.muscle import curve, muscle, require
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 
 LEAST_DAMPING = 0.001
@@ -56,34 +57,26 @@ def _others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
     return damping, _least_activation(force), *_pennation(force), _smallest(force)
 
 
-def _active(force: Any) -> list[float]:
-    own = force.active_force_length_curve
-    least = max(own.minimum_value, 0.1) if _is_classic(force) else min(own.minimum_value, 0.0)
-    return active_force_length(*properties(own.model_copy(update={"minimum_value": least})))
+def _active(force: Any) -> dict[str, float]:
+    least = force.active_force_length_curve.minimum_value
+    return {"minimum_value": max(least, 0.1) if _is_classic(force) else min(least, 0.0)}
 
 
-def _velocity(force: Any) -> list[float]:
+def _velocity(force: Any) -> dict[str, float]:
     own = force.force_velocity_curve
-    concentric, eccentric = own.concentric_slope_at_vmax, own.eccentric_slope_at_vmax
+    ends = own.concentric_slope_at_vmax, own.eccentric_slope_at_vmax
     if _is_classic(force):
-        ends = (
-            max(concentric, 0.5 * own.concentric_slope_near_vmax),
-            max(eccentric, 0.5 * own.eccentric_slope_near_vmax),
-        )
-    else:
-        ends = min(concentric, 0.0), min(eccentric, 0.0)
-    return force_velocity(*_with_ends(own, *ends))
+        return _ends(*map(max, ends, _inverse(force).values()))
+    return _ends(*(min(end, 0.0) for end in ends))
 
 
-def _inverse(force: Any) -> list[float]:
+def _inverse(force: Any) -> dict[str, float]:
     own = force.force_velocity_curve
-    ends = 0.5 * own.concentric_slope_near_vmax, 0.5 * own.eccentric_slope_near_vmax
-    return force_velocity(*_with_ends(own, *ends), inverse=True)
+    return _ends(0.5 * own.concentric_slope_near_vmax, 0.5 * own.eccentric_slope_near_vmax)
 
 
-def _with_ends(own: Any, concentric: float, eccentric: float) -> list[float]:
-    ends = {"concentric_slope_at_vmax": concentric, "eccentric_slope_at_vmax": eccentric}
-    return properties(own.model_copy(update=ends))
+def _ends(concentric: float, eccentric: float) -> dict[str, float]:
+    return {"concentric_slope_at_vmax": concentric, "eccentric_slope_at_vmax": eccentric}
 
 
 def _check(builder: ElementBuilder, force: Any) -> None:
@@ -122,19 +115,11 @@ KIND = muscle(
         ),
         _others,
     ),
-    curve("active_force_length_curve", ACTIVE_SIZE, _active),
-    curve("force_velocity_curve", VELOCITY_SIZE, _velocity),
-    curve("force_velocity_curve", VELOCITY_SIZE, _inverse),
-    curve(
-        "fiber_force_length_curve",
-        PASSIVE_SIZE,
-        lambda it: fiber_force_length(*properties(it.fiber_force_length_curve)),
-    ),
-    curve(
-        "tendon_force_length_curve",
-        TENDON_SIZE,
-        lambda it: tendon_force_length(*properties(it.tendon_force_length_curve)),
-    ),
+    curve("active_force_length_curve", ACTIVE_SIZE, active_force_length, _active),
+    curve("force_velocity_curve", VELOCITY_SIZE, force_velocity, _velocity),
+    curve("force_velocity_curve", VELOCITY_SIZE, partial(force_velocity, inverse=True), _inverse),
+    curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+    curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
     states=(
         State(
             "activation",

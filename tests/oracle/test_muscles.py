@@ -1,0 +1,132 @@
+"""Muscles beside a live OpenSim 4.6: derivatives, records, energy, equilibrium, and motions with its steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import SimulationError
+from osimlite.multibody import build_mechanism
+from osimlite.schema.muscle_curves import (
+    ActiveForceLengthCurve,
+    FiberCompressiveForceCosPennationCurve,
+    FiberCompressiveForceLengthCurve,
+    FiberForceLengthCurve,
+    ForceVelocityCurve,
+    TendonForceLengthCurve,
+)
+from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
+from osimlite.schema.muscles import Millard2012AccelerationMuscle, Millard2012EquilibriumMuscle, Thelen2003Muscle
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.engines.compiled import CompiledEngine
+from tests.simulation.elements.muscle_rows import hung, line
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytestmark = pytest.mark.oracle
+
+USUAL = {"max_isometric_force": 700.0, "optimal_fiber_length": 0.06, "tendon_slack_length": 0.2}
+VELOCITY = ForceVelocityCurve(
+    concentric_slope_at_vmax=0.1, concentric_slope_near_vmax=0.3, eccentric_slope_at_vmax=0.05, eccentric_curviness=0.5
+)
+MUSCLES = {
+    "Thelen": Thelen2003Muscle(pennation_angle_at_optimal=0.3, Af=0.3),
+    "damped": Millard2012EquilibriumMuscle(
+        pennation_angle_at_optimal=0.2,
+        force_velocity_curve=VELOCITY,
+        fiber_force_length_curve=FiberForceLengthCurve(
+            strain_at_zero_force=-0.1, stiffness_at_low_force=0.3, stiffness_at_one_norm_force=4.0, curviness=0.6
+        ),
+        tendon_force_length_curve=TendonForceLengthCurve(strain_at_one_norm_force=0.08),
+    ),
+    "undamped": Millard2012EquilibriumMuscle(
+        fiber_damping=0.0005,
+        force_velocity_curve=VELOCITY,
+        active_force_length_curve=ActiveForceLengthCurve(minimum_value=0.2, transition_norm_fiber_length=0.8),
+    ),
+    "excited": Millard2012EquilibriumMuscle(
+        ignore_activation_dynamics=True, minimum_activation=0.0, min_control=0.0, pennation_angle_at_optimal=0.1
+    ),
+    "rigid": Millard2012EquilibriumMuscle(ignore_tendon_compliance=True, pennation_angle_at_optimal=0.1),
+    "mass": Millard2012AccelerationMuscle(),
+    "pennate mass": Millard2012AccelerationMuscle(
+        pennation_angle_at_optimal=0.4,
+        mass=0.3,
+        tendon_force_length_damping=0.2,
+        fiber_force_length_damping=0.05,
+        fiber_damping=0.05,
+        muscle_first_order_activation_dynamic_model=MuscleFirstOrderActivationDynamicModel(
+            activation_time_constant=0.02, minimum_activation=0.05
+        ),
+        fiber_compressive_force_length_curve=FiberCompressiveForceLengthCurve(norm_length_at_zero_force=0.8),
+        fiber_compressive_force_cos_pennation_curve=FiberCompressiveForceCosPennationCurve(
+            engagement_angle_in_degrees=40.0
+        ),
+    ),
+}
+
+
+@pytest.fixture(params=list(MUSCLES))
+def both(request, tmp_path):
+    """The compiled engine, and OpenSim's model with a state, of one muscle that is excited by 0.4."""
+    opensim.Logger.setLevelString("off")
+    force = MUSCLES[request.param].model_copy(deep=True)
+    for name, value in {**USUAL, "name": "mu", "geometry_path": line()}.items():
+        setattr(force, name, value)
+    osimlite.write(hung(force, [0.4, 0.4]), tmp_path / "model.osim")
+    model = osimlite.read(tmp_path / "model.osim")
+    mechanism = build_mechanism(model)
+    theirs = opensim.Model(str(tmp_path / "model.osim"))
+    return CompiledEngine(mechanism, force_elements(model, mechanism)), theirs, theirs.initSystem()
+
+
+def random_states(engine, seed):
+    rng = np.random.default_rng(seed)
+    parts = {"activation": (0.0, 1.1), "fiber_length": (0.02, 0.11), "fiber_velocity": (-0.4, 0.4)}
+    while True:
+        names = [path.rpartition("/")[2] for path in engine.state.paths]
+        yield [rng.uniform(0.2, 0.32), rng.choice([0.0, rng.uniform(-1, 1)]), *(rng.uniform(*parts[x]) for x in names)]
+
+
+def put(engine, theirs, state, y):
+    paths = [f"{engine.mechanism.coordinates[0].path}/{what}" for what in ("value", "speed")] + engine.state.paths
+    for path, value in zip(paths, y, strict=True):
+        theirs.setStateVariableValue(state, path, float(value))
+    return paths
+
+
+def test_a_start_derivatives_records_and_energy(both):
+    engine, theirs, start = both
+    assert engine.state.default()[2:] == [theirs.getStateVariableValue(start, path) for path in engine.state.paths]
+    for y, _ in zip(random_states(engine, 1), range(60), strict=False):
+        state = opensim.State(start)
+        paths = put(engine, theirs, state, y)
+        try:
+            theirs.realizeAcceleration(state)
+        except RuntimeError:
+            with pytest.raises(SimulationError, match=r"'/forceset/mu' \(length 0\.\d+, .* have no solution"):
+                engine.derivative(0.0, y)
+            continue
+        expected = [theirs.getStateVariableDerivativeValue(state, path) for path in paths]
+        assert engine.derivative(0.0, y) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+        record = theirs.getForceSet().get(0).getRecordValues(state)
+        assert engine.force_records(0.0, y) == pytest.approx([record.get(0)], rel=1e-10, abs=1e-9)
+        # OpenSim's integrals of curves are splines.
+        stored = theirs.calcPotentialEnergy(state)
+        assert engine.energies(0.0, y)[2] == pytest.approx(stored, rel=1e-4, abs=1e-5)
+
+
+def test_equilibrium(both):
+    engine, theirs, start = both
+    for y, _ in zip(random_states(engine, 2), range(40), strict=False):
+        state = opensim.State(start)
+        put(engine, theirs, state, y)
+        try:
+            theirs.equilibrateMuscles(state)
+        except RuntimeError:
+            with pytest.raises(SimulationError, match="no equilibrium was found of '/forceset/mu'"):
+                engine.equilibrated(0.0, y)
+            continue
+        expected = [theirs.getStateVariableValue(state, path) for path in engine.state.paths]
+        assert engine.equilibrated(0.0, y)[2:] == pytest.approx(expected, rel=1e-9, abs=1e-12)
