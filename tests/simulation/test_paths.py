@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import gzip
 import json
+from math import isfinite
 
 import pytest
 
 import osimlite
 from osimlite.errors import ModelError
+from osimlite.multibody.spatial import inverse
+from osimlite.schema.paths import PathPoint
 from tests.simulation.test_compiled_forces import FORCES, with_force
 
 FILES = {"gait10dof18musc": "m0005", "gait2392": "m0014"}
@@ -70,3 +73,14 @@ def test_moment_arms_are_what_the_length_loses():
             lengths.append(paths.lengths(near)["/forceset/a"])
         path = paths.mechanism.coordinates[place].path
         assert arms[path] == pytest.approx((lengths[0] - lengths[1]) / 2e-6, rel=1e-7)
+
+
+def test_points_in_one_place_pull_nothing():
+    """What is left then are the pieces between the bodies, which move nothing in ground."""
+    model = with_force(FORCES["path"])
+    points = model["/forceset/a"].geometry_path.path_point_set.objects
+    place = inverse(osimlite.mechanism(model).body_transforms({})["b0"]) @ (*points[0].location, 1.0)
+    points.insert(1, PathPoint(name="same", socket_parent_frame="/bodyset/b0", location=tuple(place[:3])))
+    arms = osimlite.paths(model).moment_arms({})["/forceset/a"]
+    assert list(arms) == ["/jointset/j1/q1_0", "/jointset/j1/q1_1", "/jointset/j1/q1_2", "/jointset/j2/q2_0"]
+    assert all(map(isfinite, arms.values()))

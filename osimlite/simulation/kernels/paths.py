@@ -7,8 +7,6 @@ order in which the path runs through them, so that nothing is computed twice.
 
 from __future__ import annotations
 
-from math import nan
-
 from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.layout import FREEDOMS, ITEM_AT, ITEMS, LAW, NUMBERS, OK, OWN, RECORD
@@ -47,7 +45,8 @@ PLACE, KEPT, ALONG, GRADIENT, SURFACE, IS_KEPT = 0, 3, 6, 9, 9, 10
 vector to the next node; derivative of the place by the coordinate, in ground; length on the surface before it."""
 
 COINCIDENT, SIGNIFICANT = 2.0**-52, 2.0 ** (-52.0 * 7.0 / 8.0)
-"""Distances (m) below which two points have no line, for speeds and for forces, in Simbody."""
+"""Distances (m) below which two points have no line in OpenSim, for speeds and for forces; these then are NaN
+there, and nothing here."""
 
 
 def path_length(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
@@ -122,7 +121,7 @@ def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
         if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
             moves = minus(node_velocity(s, w, y, n, b), node_velocity(s, w, y, m, a))
             speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
-        put(a, ALONG, times(nan if distance < SIGNIFICANT else 1.0 / distance, way))
+        put(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
     found[LENGTH], found[SPEED] = length, speed
     return length
 
