@@ -18,6 +18,7 @@ from osimlite.schema.muscle_curves import (
 )
 from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import Millard2012AccelerationMuscle, Millard2012EquilibriumMuscle, Thelen2003Muscle
+from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.simulation.elements.muscle_rows import hung, line
@@ -130,3 +131,74 @@ def test_equilibrium(both):
             continue
         expected = [theirs.getStateVariableValue(state, path) for path in engine.state.paths]
         assert engine.equilibrated(0.0, y)[2:] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_the_steps_of_a_motion(both, engine, tmp_path):
+    """Of a stiff mass, every rounding has grown after some steps."""
+    _, theirs, start = both
+    to = 0.01 if "Acceleration" in theirs.getForceSet().get(0).getConcreteClassName() else 0.3
+    theirs.setStateVariableValue(start, "/jointset/slide/x/value", 0.27)
+    theirs.equilibrateMuscles(start)
+    manager = opensim.Manager(theirs)
+    manager.setIntegratorAccuracy(1e-5)
+    manager.initialize(start)
+    end = manager.integrate(to)
+    trajectory = osimlite.simulate(
+        osimlite.read(tmp_path / "model.osim"), to, engine, accuracy=1e-5, initial={"x": 0.27}, equilibrate=True
+    )
+    assert trajectory.summary["steps"] == manager.getStatesTable().getNumRows() - 1
+    found = trajectory.auxiliary | {"/jointset/slide/x/value": trajectory.values[:, 0]}
+    for path, values in found.items():
+        assert values[-1] == pytest.approx(theirs.getStateVariableValue(end, path), rel=1e-9, abs=1e-9)
+
+
+WHOLE = (
+    "gait10dof18musc.osim",
+    "gait2392_thelen2003muscle.osim",
+    "gait2392_millard2012muscle.osim",
+    "testControllers_TugOfWar.osim",
+)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_whole_models(name, corpus):
+    """Equilibrium, derivatives at random states, and the steps of a motion with both engines."""
+    opensim.Logger.setLevelString("off")
+    file = next(item.path for item in corpus if item.path.name == name)
+    theirs = opensim.Model(str(file))
+    start = theirs.initSystem()
+    theirs.equilibrateMuscles(start)
+    rng = np.random.default_rng(3)
+    trajectories = []
+    for engine in ("bullet", "compiled"):
+        with Simulation(osimlite.read(file), engine, folder=file.parent) as simulation:
+            trajectories.append(simulation.run(0.05, accuracy=1e-5, equilibrate=True))
+            layout, mechanism = simulation.state, simulation.mechanism
+            coordinates = [mechanism.coordinates[place].path for place in layout.order]
+            paths = [f"{path}/{what}" for what in ("value", "speed") for path in coordinates] + layout.paths
+            rest = simulation.initial_state({}, {}, equilibrate=True)
+            assert rest == pytest.approx([theirs.getStateVariableValue(start, path) for path in paths], abs=1e-14)
+            for _ in range(3):
+                n = len(coordinates)
+                y = [*(x + rng.uniform(-0.1, 0.1) for x in rest[:n]), *rng.uniform(-1.0, 1.0, n).tolist()]
+                y += [x * rng.uniform(0.9, 1.1) for x in rest[2 * n :]]
+                state = opensim.State(start)
+                for path, value in zip(paths, y, strict=True):
+                    theirs.setStateVariableValue(state, path, value)
+                theirs.realizeAcceleration(state)
+                expected = np.array([theirs.getStateVariableDerivativeValue(state, path) for path in paths])
+                scale = np.maximum(1.0, np.abs(expected[n : 2 * n]).max(initial=0.0))
+                assert np.abs(simulation.engine.derivative(0.0, y) - expected).max() < 1e-9 * scale
+    manager = opensim.Manager(theirs)
+    manager.setIntegratorAccuracy(1e-5)
+    manager.initialize(start)
+    end = manager.integrate(0.05)
+    for trajectory in trajectories:
+        assert trajectory.summary["steps"] == manager.getStatesTable().getNumRows() - 1
+        found = {path: values[-1] for path, values in trajectory.auxiliary.items()}
+        for info, value, speed in zip(mechanism.coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True):
+            found |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
+        expected = {path: theirs.getStateVariableValue(end, path) for path in found}
+        scale = max(1.0, *map(abs, expected.values()))
+        assert max(abs(found[path] - expected[path]) for path in found) < 1e-9 * scale
