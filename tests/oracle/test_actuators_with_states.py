@@ -181,6 +181,27 @@ def test_states_and_steps(case, tmp_path):
     assert ours.rows[-1] == pytest.approx(theirs.rows[-1], rel=1e-9, abs=1e-9 * np.abs(theirs.rows[-1]).max())
 
 
+@pytest.mark.parametrize("case", CASES)
+def test_states_of_what_is_off(case, tmp_path):
+    """Some rest, others change as ever; nothing pulls."""
+    model, _ = made(case, 0.5)
+    actuator = model.find("/forceset/mu")
+    actuator.appliesForce = False
+    trajectory = osimlite.simulate(model, 0.05, accuracy=1e-5, engine="compiled")
+    assert trajectory.forces == {}
+    # OpenSim's ClutchedPathSpring pulls whatever the file says, and its Delp1990Muscle cannot be computed.
+    if case in ("clutched", "delp"):
+        assert trajectory.speeds[-1, 0] == pytest.approx(9.80665 * 0.05)
+        return
+    osimlite.write(model, tmp_path / "model.osim")
+    theirs = simulated(tmp_path / "model.osim", 0.05, 1e-5, equilibrate=True)
+    trajectory.to_sto(tmp_path / "states.sto")
+    ours = read_sto(tmp_path / "states.sto")
+    assert ours.columns == theirs.columns
+    assert trajectory.summary["steps"] == len(theirs.rows) - 1
+    assert ours.rows[-1] == pytest.approx(theirs.rows[-1], rel=1e-9)
+
+
 def test_constants_of_the_first_muscle_count_for_all(tmp_path):
     """As in a process that computes no other model of such muscles."""
     model, _ = made("degroote", 0.9)

@@ -51,7 +51,7 @@ def force_elements(
 ) -> Forces:
     """Gather the forces of a model.
 
-    Forces whose `appliesForce` is false are no forces.
+    Those whose `appliesForce` is false have nothing but their states, as in OpenSim.
 
     Args:
         model: whose forces.
@@ -130,10 +130,15 @@ class ElementBuilder:
         return MeshFolders(self.folder)
 
     def forces(self) -> Iterator[Any]:
-        """Yield everything that applies a force, known or not."""
+        """Yield everything that applies a force, known or not, or has states that go with one."""
+        from osimlite.simulation.elements.kind import kind_of_class
+
         for component in self.tree.components:
             unknown = isinstance(component, Unknown) and self.tree.parent_of(component) is self.model.force_set
-            if unknown or (isinstance(component, Force) and component.appliesForce):
+            if unknown or (
+                isinstance(component, Force)
+                and (component.appliesForce or getattr(kind_of_class(type(component)), "states", False))
+            ):
                 yield component
 
     def element(self, force: Any) -> ForceElement:

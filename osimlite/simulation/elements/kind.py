@@ -19,7 +19,7 @@ from functools import cache, cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import iter_modules
-from typing import Any
+from typing import Any, ClassVar
 
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.muscles import Muscle
@@ -28,7 +28,7 @@ from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels import layout, pointers
-from osimlite.simulation.kernels.table import EQUILIBRIUM
+from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF
 from osimlite.simulation.states import StateVariable
 
 ENERGY, SOLVED = "energy", "solved"
@@ -90,6 +90,7 @@ class Kind:
         stored: energy (J) of a force from its record, where it is no output of the law.
         check: raises a ModelError if the parameters have no meaning together.
         shares: whether a force may have numbers of others of its class.
+        goes_on: whether the states of a force that is off (appliesForce) change as those of others do; else they rest.
     """
 
     component: type
@@ -108,6 +109,7 @@ class Kind:
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
     check: Callable[[ElementBuilder, Any], None] | None = None
     shares: bool = False
+    goes_on: bool = False
     terms: tuple[Parameter, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -129,15 +131,18 @@ class Kind:
             UnsupportedError: something of it cannot be computed.
             ModelError: it names what does not exist, or a parameter has no meaning.
         """
-        if self.check is not None:
-            self.check(builder, force)
-        values = tuple(term.read(builder, force) for term in self.terms)
         path = builder.path(force)
         states = tuple(
             StateVariable(f"{path}/{state.name}", state.start(force), state.is_simbody) if state.exists(force) else None
             for state in self.states
         )
-        return DeclaredForce(self.component, path, force.name, self.geometry.read(builder, force), values, states)
+        if not (force.appliesForce or self.goes_on):
+            return ForceOff(self.component, path, force.name, None, (), states)
+        if self.check is not None:
+            self.check(builder, force)
+        values = tuple(term.read(builder, force) for term in self.terms)
+        made = DeclaredForce if force.appliesForce else ForceOff
+        return made(self.component, path, force.name, self.geometry.read(builder, force), values, states)
 
     @cached_property
     def recorded(self) -> dict[str, int]:
@@ -151,6 +156,11 @@ class Kind:
     def kernel(self) -> Callable[..., int]:
         """The function that computes and applies one force, written from the declaration."""
         return self._written(self.name, self.law, self.source)
+
+    @cached_property
+    def off_kernel(self) -> Callable[..., int]:
+        """The function that computes one force and does not apply it."""
+        return self._written(self.name + OFF, self.law, self.off_source)
 
     @cached_property
     def equilibrium_kernel(self) -> Callable[..., int]:
@@ -176,7 +186,15 @@ class Kind:
     @property
     def source(self) -> str:
         """The text of the kernel."""
-        lines = self._before(self.name)
+        return _function([*self._computing(self.name), *self.geometry.after])
+
+    @property
+    def off_source(self) -> str:
+        """The text of the kernel of a force that is off."""
+        return _function(self._computing(self.name + OFF))
+
+    def _computing(self, name: str) -> list[str]:
+        lines = self._before(name)
         if self.law is not None:
             results = f"{', '.join(self.outputs)} = " if self.outputs else ""
             lines.append(f"{results}law({', '.join(self._arguments)})")
@@ -185,7 +203,7 @@ class Kind:
             lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
         for place, state in self._places.items():
             lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
-        return _function([*lines, *self.geometry.after])
+        return lines
 
     @property
     def equilibrium_source(self) -> str:
@@ -259,12 +277,12 @@ class Kind:
         all_ints = (*heads, *[-1] * len(self.states), *ints, *tail.ints)
         there = {state.name for state, own in zip(self.states, force.optional_states, strict=True) if own is not None}
         item = Item(
-            self.name,
+            self.name + force.form,
             all_ints,
             (*own, *numbers, *tail.numbers),
             room=tail.room,
             states=at_states,
-            equilibrium=self.name + EQUILIBRIUM if there & set(self.settled) else "",
+            equilibrium=self.name + EQUILIBRIUM if there & set(self.settled) and not force.form else "",
         )
         return [*parts, item]
 
@@ -281,6 +299,9 @@ class DeclaredForce:
         values: of the parameters.
         optional_states: for each state of the kind what it is called and where it starts, None if there is none.
     """
+
+    form: ClassVar[str] = ""
+    """Of its kernel, behind the name of the kind."""
 
     component: type
     path: str
@@ -341,6 +362,26 @@ class DeclaredForce:
         if kind.stored is not None:
             return float(kind.stored(self, records[-1]))
         return float(records[-1][kind.recorded[ENERGY]]) if ENERGY in kind.recorded else 0.0
+
+
+@dataclass(frozen=True)
+class ForceOff(DeclaredForce):
+    """A force that is off: it has nothing but its states."""
+
+    form = OFF
+    columns = ()
+
+    def items(self, places: Places) -> list[Item]:
+        """What the kernels compute."""
+        return super().items(places) if self.kind.goes_on else []
+
+    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+        """Nothing."""
+        return []
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """None."""
+        return 0.0
 
 
 def _function(lines: Sequence[str]) -> str:

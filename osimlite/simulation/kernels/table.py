@@ -1,8 +1,8 @@
 """Which functions are compiled by themselves and called by their address, by name.
 
 Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; the kernel of
-a kind of force is written from its declaration, and has the name of the module that declares it; so is the one that
-brings such a force into equilibrium, with EQUILIBRIUM behind the name.
+a kind of force is written from its declaration, and has the name of the module that declares it; so are the one that
+brings such a force into equilibrium, with EQUILIBRIUM behind the name, and that of a force that is off, with OFF.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LAW_MODULES = {
 }
 """The module of each of the engine's own."""
 
-EQUILIBRIUM = "_equilibrium"
+EQUILIBRIUM, OFF = "_equilibrium", "_off"
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Place of a law's address after `layout.LAWS`."""
@@ -61,6 +61,8 @@ def law_function(name: str) -> Callable[..., Any]:
     if name in LAW_MODULES:
         function = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
     else:
-        kind = import_module(f"osimlite.simulation.elements.kinds.{name.removesuffix(EQUILIBRIUM)}").KIND
-        function = kind.equilibrium_kernel if name.endswith(EQUILIBRIUM) else kind.kernel
+        module = name.removesuffix(EQUILIBRIUM).removesuffix(OFF)
+        kind = import_module(f"osimlite.simulation.elements.kinds.{module}").KIND
+        forms = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel"}
+        function = getattr(kind, forms.get(name.removeprefix(module), "kernel"))
     return function

@@ -21,4 +21,5 @@ KIND = Kind(
     controlled=True,
     states=(State("activation", lambda actuator: actuator.default_activation),),
     labels={"{name}": "force"},
+    goes_on=True,
 )

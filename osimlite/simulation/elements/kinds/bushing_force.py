@@ -32,4 +32,5 @@ KIND = Kind(
         Vector(6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)),
     ),
     states=(State("dissipated_energy", given=False, is_simbody=True),),
+    goes_on=True,
 )

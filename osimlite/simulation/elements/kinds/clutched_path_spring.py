@@ -38,4 +38,5 @@ KIND = Kind(
     controlled=True,
     states=(State("stretch", lambda spring: spring.initial_stretch),),
     labels={"{name}": "tension"},
+    goes_on=True,
 )

@@ -49,4 +49,5 @@ KIND = muscle(
     settled=("normalized_tendon_force",),
     check=_check,
     shares=True,
+    goes_on=True,
 )

@@ -12,4 +12,5 @@ KIND = muscle(
     smooth_fields(),
     states=(ACTIVATION,),
     check=check_smooth,
+    goes_on=True,
 )
