@@ -157,7 +157,9 @@ class System:
             raise self.refusal(status, t, y)
         for number in np.flatnonzero(self._f[:count]).tolist():
             place = self.structure[self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * number + 1]
-            raise SimulationError(f"no equilibrium was found of {self._told(place)}")
+            raise SimulationError(
+                f"no equilibrium was found of {self._told(place)}; start elsewhere, or without an equilibrium"
+            )
         row: list[float] = self._y.tolist()
         return row
 
@@ -166,7 +168,8 @@ class System:
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
         place, room = self._items[owner][-1]
-        return f"'{element.path}' ({element.told(self._w[place : place + room].tolist())})"
+        told: str = element.told(self._w[place : place + room].tolist())
+        return told
 
     def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         """The error for what the kernels say of a state."""
@@ -174,7 +177,7 @@ class System:
             return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
         if status == layout.UNSOLVED:
             item = self.structure[self.structure[layout.ITEM_AT] + int(self._f[0])]
-            return NoSolution(f"the equations of {self._told(item)} have no solution")
+            return NoSolution(f"there is no solution of the equations of {self._told(item)}")
         if status == layout.SINGULAR_RATES:
             try:
                 self.mechanism.rate_matrix(self.state.values(y))

@@ -83,8 +83,7 @@ class Kind:
         equilibrium: computes states in equilibrium from what the law is given: whether it found them, and those that
             `settled` names.
         settled: names of the states that it finds.
-        told: what is said of a force whose law, or equilibrium, has no solution: names of parameters that are numbers
-            and of what is recorded.
+        told: what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it.
         labels: of the record, in which {name} stands for that of the force, each with its output; the geometry's own if
             None.
         stored: energy (J) of a force from its record, where it is no output of the law.
@@ -104,7 +103,7 @@ class Kind:
     states: tuple[State, ...] = ()
     equilibrium: Callable[..., Any] | None = None
     settled: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
+    told: Callable[[Mapping[str, float]], str] | None = None
     labels: Mapping[str, str] | None = None
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
     check: Callable[[ElementBuilder, Any], None] | None = None
@@ -353,8 +352,7 @@ class DeclaredForce:
 
     def told(self, record: Sequence[float]) -> str:
         """What is said of it where a law has no solution."""
-        known = self.known(record)
-        return ", ".join(f"{name} {known[name]:.6g}" for name in self.kind.told)
+        return f"'{self.path}'" + (self.kind.told(self.known(record)) if self.kind.told else "")
 
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """Potential energy, J."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import pi, sin
 from typing import Any
 
@@ -79,6 +79,14 @@ def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
         number.read(builder, force)
 
 
+def _told(known: Mapping[str, float]) -> str:
+    off = known["length"] - known["tendon_slack_length"] - known["optimal_fiber_length"]
+    return (
+        f", whose path of {known['length']:.4g} m is {abs(off):.3g} m {'longer' if off > 0.0 else 'shorter'} than its "
+        f"tendon_slack_length and optimal_fiber_length together, with fibers of {known['fiber_length']:.4g} m"
+    )
+
+
 def muscle(
     component: type, law: Callable[..., Any], rates: tuple[str, ...], *parameters: Parameter, **more: Any
 ) -> Kind:
@@ -100,6 +108,6 @@ def muscle(
         kept=("length", "rate", "fiber_velocity"),
         controlled=True,
         labels={"{name}": "tension"},
-        told=("length", "fiber_length", "tendon_slack_length", "optimal_fiber_length"),
+        told=_told,
         **more,
     )

@@ -37,6 +37,11 @@ DIGITS = {"Millard2012EquilibriumMuscle": 2e-11}
 """How exactly the numbers of a muscle are known, where it is not 2e-12."""
 
 
+NOWHERE = (
+    r"no equilibrium was found of '/forceset/mu', whose path of 0\.\d+ m is 0\.\d+ m (long|short)er than its tendon"
+)
+
+
 def system(model, code=None):
     mechanism = build_mechanism(model)
     return System(mechanism, force_elements(model, mechanism), code=code)
@@ -86,7 +91,7 @@ def test_equilibrium(case, code):
         start = [float(row["activation"]) if name == "activation" else 0.1 for name in states(ready)]
         y = [float(row["path_length"]), float(row["path_speed"]), *start]
         if row["error"]:
-            with pytest.raises(SimulationError, match=r"no equilibrium was found of '/forceset/mu' \(length 0\.\d+, "):
+            with pytest.raises(SimulationError, match=NOWHERE):
                 ready.equilibrated(float(number), y)
             continue
         found = ready.equilibrated(float(number), y)
