@@ -81,9 +81,11 @@ def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
 
 def _told(known: Mapping[str, float]) -> str:
     off = known["length"] - known["tendon_slack_length"] - known["optimal_fiber_length"]
+    # A search that is not for a fiber length has none to tell.
+    fibers = f", with fibers of {known['fiber_length']:.4g} m" if known["fiber_length"] > 0.0 else ""
     return (
         f", whose path of {known['length']:.4g} m is {abs(off):.3g} m {'longer' if off > 0.0 else 'shorter'} than its "
-        f"tendon_slack_length and optimal_fiber_length together, with fibers of {known['fiber_length']:.4g} m"
+        f"tendon_slack_length and optimal_fiber_length together{fibers}"
     )
 
 

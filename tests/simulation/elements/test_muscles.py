@@ -179,3 +179,11 @@ def test_activation_times_of_the_first_muscle_count_for_all():
     renewal = before.renewal(model, Path())
     first.deactivation_time_constant = 0.02
     assert rates(renewal.renewed([first]).engine()) == rates(made()) != rates(before)
+
+
+@pytest.mark.parametrize("length", [0.2, 0.6])
+def test_a_tendon_force_that_is_nowhere(length):
+    """OpenSim seeks it between 0 and 5 times the largest force of the fibers."""
+    words = f"whose path of {length} m is .* than its tendon_slack_length and optimal_fiber_length together; start"
+    with pytest.raises(SimulationError, match=f"'/forceset/mu', {words}"):
+        system(hung(muscle("dgf_default"))).equilibrated(0.0, [length, 0.0, 0.3, 0.5])
