@@ -125,30 +125,29 @@ def accelerations(state: Kinematics, applied: Array, constraints: Sequence[Const
     equations = (
         stacked([constraint.acceleration_equations(state) for constraint in constraints]) if constraints else None
     )
-    return constrained_accelerations(state.mechanism, matrix, right, equations, range(len(right)))
+    return constrained_accelerations(state.mechanism, matrix, right, equations)
 
 
 def constrained_accelerations(
-    mechanism: Mechanism, matrix: Array, right: Array, equations: tuple[Array, Array] | None, order: Sequence[int]
+    mechanism: Mechanism, matrix: Array, right: Array, equations: tuple[Array, Array] | None
 ) -> Array:
-    """Udot (k,) with M udot = f but for forces that make G udot = b.
+    """Udot (n,) with M udot = f but for forces that make G udot = b.
 
     Equations that follow from others or contradict them are fulfilled in the sense of least squares. Where M cannot be
     divided by, the motion is solved for in the null space of G: constraints may drive what has no mass.
 
     Args:
         mechanism: whose motion.
-        matrix: M (k, k).
-        right: f (k,).
-        equations: G (m, k) and b (m,), if there are any.
-        order: place in the mechanism of each of the k coordinates, for messages.
+        matrix: M (n, n).
+        right: f (n,).
+        equations: G (m, n) and b (m,), if there are any.
 
     Raises:
         SimulationError: a motion that nothing forbids moves no mass.
     """
     require_numbers(mechanism, matrix, right, *(equations or ()))
     if equations is None:
-        return _solve(mechanism, matrix, right, None, order)
+        return _solve(mechanism, matrix, right, None)
     rows, values = equations
     with suppress(np.linalg.LinAlgError):
         factor = np.linalg.cholesky(matrix)
@@ -161,7 +160,7 @@ def constrained_accelerations(
                 udot = udot + np.linalg.solve(factor.T, push)
             return udot
     particular, free = solutions(rows, values)
-    reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free, order)
+    reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free)
     exact: Array = particular + free @ reduced
     return exact
 
@@ -202,16 +201,16 @@ def _projected(jacobians: Array, loads: Array) -> Array:
     return result
 
 
-def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array | None, order: Sequence[int]) -> Array:
-    """Solve with a positive definite matrix whose unknowns are motions along `directions` (k, f)."""
+def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array | None) -> Array:
+    """Solve with a positive definite matrix whose unknowns are motions along `directions` (n, f)."""
     if not len(right):
         return right
     try:
         pivots = np.linalg.cholesky(matrix).diagonal() ** 2
     except np.linalg.LinAlgError:
-        raise massless(_name_of_massless(mechanism, matrix, directions, order)) from None
+        raise massless(_name_of_massless(mechanism, matrix, directions)) from None
     if np.min(pivots / matrix.diagonal()) < 1e-13 or np.min(matrix.diagonal()) < 1.0 / LARGEST:
-        raise massless(_name_of_massless(mechanism, matrix, directions, order))
+        raise massless(_name_of_massless(mechanism, matrix, directions))
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
@@ -227,10 +226,10 @@ def massless(coordinate: str) -> SimulationError:
     )
 
 
-def _name_of_massless(mechanism: Mechanism, matrix: Array, directions: Array | None, order: Sequence[int]) -> str:
+def _name_of_massless(mechanism: Mechanism, matrix: Array, directions: Array | None) -> str:
     scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
     _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
     motion = vectors[:, 0] / scale
     if directions is not None:
         motion = directions @ motion
-    return mechanism.coordinates[order[int(np.argmax(np.abs(motion)))]].name
+    return mechanism.coordinates[int(np.argmax(np.abs(motion)))].name

@@ -183,10 +183,6 @@ class AccelerationErrorAngle(Function):
         hessian = self._curvature(arguments)[self.component]
         return 0.0, np.zeros(len(arguments)), 0.5 * (hessian + hessian.T)
 
-    def all_components(self, arguments: Array, rates: Array) -> Array:
-        """Second derivatives (3,) of this angle and the other two at arguments (k,) with these rates (k,)."""
-        return np.asarray(self._curvature(arguments) @ rates @ rates, dtype=np.float64)
-
     def _curvature(self, arguments: Array) -> Array:
         own = list(self.places)
         q = np.zeros(max(own, default=-1) + 1)

@@ -7,8 +7,9 @@ from functools import partial
 from math import inf, isfinite
 
 from osimlite.errors import SettingError
-from osimlite.simulation.stepper import Derivative, IntegrationError, Observer, Projection, Stepper, straight_line
+from osimlite.simulation.stepper import Derivative, IntegrationError, Observer, Stepper, straight_line
 
+Projected = Callable[[float, list[float], float], list[float] | None]
 FIXED_STEP_TOLERANCE = 1e-9
 """What constraints may be off after a fixed step, before they are mended."""
 
@@ -36,7 +37,7 @@ class SemiImplicitEuler(Stepper):
         rates: qdot as a function of (q, u); by default qdot = u.
         observe: called with (time, state) after each step taken.
         names: what the entries of y are called in messages.
-        projection: what moves the end of a step to where the constraints hold.
+        projected: gives the state nearest to one where the constraints hold to a tolerance, if there is one.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class SemiImplicitEuler(Stepper):
         rates: Callable[[list[float], list[float]], Sequence[float]] | None = None,
         observe: Observer | None = None,
         names: Sequence[str] | None = None,
-        projection: Projection | None = None,
+        projected: Projected | None = None,
     ) -> None:
         if not 0.0 < h < inf:
             raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
@@ -60,7 +61,7 @@ class SemiImplicitEuler(Stepper):
         self._nq = nq
         self._h = h
         self._rates = rates
-        self._projection = projection
+        self._projected = projected
         self._origin, self._since = t, 0
 
     def step(self, limit: float = inf) -> None:
@@ -80,15 +81,15 @@ class SemiImplicitEuler(Stepper):
         u = rest[: self._nq]
         rates = u if self._rates is None else self._rates(q, u)
         y = [x + h * v for x, v in zip(q, rates, strict=True)] + rest
-        if self._projection is not None:
-            found = self._projection.project(t, y, None, FIXED_STEP_TOLERANCE)
+        if self._projected is not None:
+            found = self._projected(t, y, FIXED_STEP_TOLERANCE)
             if found is None:
                 raise IntegrationError(
                     f"the constraints cannot be kept up at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
                     "or control the error (--accuracy)",
                     t,
                 )
-            y, _ = found
+            y = found
         if not isfinite(sum(y)):
             raise burst(t, self._h)
         try:

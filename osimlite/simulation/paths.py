@@ -16,13 +16,13 @@ from osimlite.multibody.mechanism import GROUND, Values
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath
-from osimlite.simulation.constrained import REDUNDANT
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.paths import LENGTH, SPEED
+from osimlite.simulation.kernels.projection import REDUNDANT
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 

@@ -19,7 +19,7 @@ from osimlite.multibody.dynamics import require_numbers
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell
 from osimlite.schema.model import Model
-from osimlite.simulation.constrained import Constrained, kept_state
+from osimlite.simulation.constrained import constraints_on, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
@@ -120,7 +120,7 @@ class Simulation:
             self.mechanism, self.forces, Settings(route=chosen.route, show=chosen.show, visuals=visuals)
         )
         self.state = self.engine.state
-        self.constraints = Constrained(self.mechanism, self.engine.order).names
+        self.constraints = [item.name for item in constraints_on(self.mechanism, self.engine.order)[0]]
         paths = [f"{info.path}/{what}" for info in self.mechanism.coordinates for what in ("value", "speed")]
         self.paths = in_model_order(model, paths + self.state.paths)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None

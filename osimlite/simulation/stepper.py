@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import inf, isfinite
-from typing import Any, Protocol
+from typing import Any
 
 from osimlite.errors import SimulationError
 
@@ -19,26 +19,6 @@ Derivative = Callable[[float, list[float]], Sequence[float]]
 Observer = Callable[[float, list[float]], object]
 Progress = Callable[[float, float], object]
 """Called now and then with the simulated time reached and the present length of the steps, both in s."""
-
-
-class Projection(Protocol):
-    """Moves states to where constraints hold."""
-
-    def project(
-        self, t: float, y: list[float], errors: list[float] | None, tolerance: float, limit: float = inf
-    ) -> tuple[list[float], list[float] | None] | None:
-        """The nearest state that fulfils the constraints, if it is near.
-
-        Args:
-            t: time, s.
-            y: a state.
-            errors: how far off each entry of it may be, or None.
-            tolerance: what the constraints may be off.
-            limit: what they may be off at most in y.
-
-        Returns:
-            The state, and the errors without what lies across the constraints; None if no such state is near.
-        """
 
 
 class NoSolution(SimulationError, ArithmeticError):
@@ -100,6 +80,11 @@ class Stepper(ABC):
     def name(self) -> str:
         """Of the method."""
         return type(self).__name__
+
+    @property
+    def attempted(self) -> int:
+        """Steps tried so far: more than were taken if steps are repeated smaller."""
+        return self.taken
 
     def catch_up(self) -> None:  # noqa: B027
         """Make the calls of `observe` that were put off, as a stepper may that computes many steps at once."""

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from osimlite.simulation.engines.protocol import Engine
-from osimlite.simulation.integrators import RungeKuttaMerson
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.stepper import Stepper
 
@@ -27,7 +26,7 @@ def integration_summary(stepper: Stepper, settings: Mapping[str, Any], wall: flo
         "integrator": stepper.name,
         "settings": dict(settings),
         "steps": stepper.taken,
-        "attempted_steps": stepper.attempted if isinstance(stepper, RungeKuttaMerson) else stepper.taken,
+        "attempted_steps": stepper.attempted,
         "evaluations": stepper.evaluations,
         "wall_time_s": wall,
         "interrupted": stepper.interrupted,

@@ -1,4 +1,4 @@
-"""RungeKuttaMerson over OpenSim's own accelerations takes the very steps of OpenSim's Manager.
+"""Runge-Kutta-Merson over OpenSim's own accelerations takes the very steps of OpenSim's Manager.
 
 Both run on one machine with one library, so nothing but a different method, or a different order of rounding, could
 make the steps differ: where the states are the same numbers, they are compared without tolerance.
@@ -11,7 +11,8 @@ import re
 
 import pytest
 
-from osimlite.simulation.integrators import RungeKuttaMerson
+from osimlite.simulation.engines.linking import COMPILED, PYTHON
+from tests.simulation.equations import runge_kutta_merson
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -65,14 +66,17 @@ def counts(integrator):
     return integrator.taken, integrator.attempted, integrator.evaluations
 
 
+@pytest.mark.parametrize("code", [COMPILED, PYTHON], ids=lambda code: code.name)
 @pytest.mark.parametrize(
     ("accuracy", "expected"),
     [(None, (135, 173, 828)), (1e-5, (360, 440, 2121)), (1e-8, (1799, 1972, 9688))],
 )
-def test_the_walkers_steps_are_opensims(walker, accuracy, expected):
+def test_the_walkers_steps_are_opensims(walker, accuracy, expected, code):
     times, last, measured = manager_run(walker, 2.0, accuracy)
     f, y0 = dynamics(walker, walker.initSystem())
-    integrator = RungeKuttaMerson(f, 0.0, y0, 8, **({} if accuracy is None else {"accuracy": accuracy}))
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    given = {} if accuracy is None else {"accuracy": accuracy}
+    integrator = runge_kutta_merson(f, 0.0, y0, 8, code=code, **given)
     steps = list(integrator.steps(2.0))
     assert counts(integrator) == measured == expected
     assert [t for t, _ in steps] == times[1:]
@@ -84,7 +88,7 @@ def test_recorded_steps(walker, shared):
     f, y0 = dynamics(walker, walker.initSystem())
     with (shared / "oracle" / "trajectory_default_internal_steps.csv").open() as text:
         rows = [[float(x) for x in row] for row in csv.reader(line for line in text if line[0] not in "#t")]
-    steps = list(RungeKuttaMerson(f, 0.0, y0, 8).steps(2.0))
+    steps = list(runge_kutta_merson(f, 0.0, y0, 8).steps(2.0))
     assert len(rows) == 1 + len(steps) == 136
     for row, (t, y) in zip(rows[1:], steps, strict=True):
         assert [t, *y] == pytest.approx(row[:17], rel=1e-9, abs=1e-9)
@@ -100,11 +104,11 @@ def test_a_locked_coordinate_left_out_but_counted(walker):
         return derivative[1:8] + derivative[9:]
 
     y = y0[1:8] + y0[9:]
-    integrator = RungeKuttaMerson(f, 0.0, y, 7, count_q=8, count_u=8)
+    integrator = runge_kutta_merson(f, 0.0, y, 7, counted=(8, 8))
     steps = list(integrator.steps(2.0))
     assert [t for t, _ in steps] == times[1:]
     assert steps[-1][1] == last[1:8] + last[9:]
-    uncounted = RungeKuttaMerson(f, 0.0, y, 7)
+    uncounted = runge_kutta_merson(f, 0.0, y, 7)
     assert [t for t, _ in uncounted.steps(2.0)] != times[1:]
 
 
@@ -115,7 +119,7 @@ def test_a_manager_that_is_stopped_often(walker, interval):
     f, y0 = dynamics(walker, opensim.State(state))
     manager = opensim.Manager(walker)
     manager.initialize(state)
-    integrator = RungeKuttaMerson(f, 0.0, y0, 8)
+    integrator = runge_kutta_merson(f, 0.0, y0, 8)
     for stop in range(interval, 150 * interval, interval):
         expected = manager.integrate(stop / 1000).getY()
         for _ in integrator.steps(stop / 1000):
@@ -132,7 +136,7 @@ def test_auxiliary_states(walker):
     state = walker.initSystem()
     assert (state.getNQ(), state.getNU(), state.getNZ()) == (8, 8, 2)
     f, y0 = dynamics(walker, state)
-    integrator = RungeKuttaMerson(f, 0.0, y0, 8, nu=8)
+    integrator = runge_kutta_merson(f, 0.0, y0, 8)
     steps = list(integrator.steps(2.0))
     assert counts(integrator) == measured
     assert [t for t, _ in steps] == times[1:]
@@ -159,7 +163,7 @@ def test_a_free_joint_counts_one_coordinate_more():
         derivative = whole(t, [*y[:6], 0.0, *y[6:]])
         return derivative[:6] + derivative[7:]
 
-    integrator = RungeKuttaMerson(f, 0.0, y0[:6] + y0[7:], 6, accuracy=1e-6, count_q=7)
+    integrator = runge_kutta_merson(f, 0.0, y0[:6] + y0[7:], 6, accuracy=1e-6, counted=(7, 6))
     steps = list(integrator.steps(1.0))
     assert counts(integrator)[:2] == measured[:2]
     # Simbody weights errors of q by way of those of u, which rounds.

@@ -1,8 +1,18 @@
-"""Equations of motion whose solution is known."""
+"""Equations of motion whose solution is known, and any others in the place of a mechanism."""
 
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from osimlite.simulation.engines.linking import PYTHON, Program
+from osimlite.simulation.engines.runge_kutta_merson import RungeKuttaMerson
+from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels.pack import Packed
+from osimlite.simulation.kernels.table import LAW_NUMBERS
 
 
 def oscillator(t, y):
@@ -37,3 +47,38 @@ class Counting:
         self.calls += 1
         self.latest = t, list(y)
         return self.f(t, y)
+
+
+class Equations:
+    """An engine whose derivatives come from a function of (t, y), with n values and n speeds and any further states."""
+
+    contacts = ()
+
+    def __init__(self, f, size, n, counted=None, names=None, code=PYTHON):
+        def evaluate(s, x, w, y, derivative, stage):
+            derivative[:size] = f(float(w[layout.TIME]), y[:size].tolist())
+
+        first = layout.WORK_HEAD
+        structure = np.zeros(layout.LAWS + len(LAW_NUMBERS), dtype=np.int64)
+        structure[[layout.FREEDOMS, layout.STATE_SIZE, layout.WORK_STATE]] = n, size, first
+        structure[layout.WORK_SIZE] = first + merson.STATES * size
+        kernels = {layout.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
+        packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, (), [], [])
+        self.program = Program(packed, code, ("run_several",))
+        self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n
+        self.counted = (n, n) if counted is None else counted
+        names = [f"state {k}" for k in range(size)] if names is None else names
+        self.state = SimpleNamespace(names=names, table=lambda rows: np.array(rows, dtype=float))
+        self.derivative = f
+
+    def projected(self, t, y, tolerance):
+        return y
+
+    def note_loads(self, forces):
+        pass
+
+
+def runge_kutta_merson(f, t: float, y: Any, n: int, *, observe: Any = None, accuracy: float = 1e-3, **options: Any):
+    """Runge-Kutta-Merson on any equations."""
+    engine: Any = Equations(f, len(y), n, **options)
+    return RungeKuttaMerson(engine, t, y, accuracy, observe)

@@ -11,34 +11,29 @@ from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.simulation.euler import SemiImplicitEuler
-from osimlite.simulation.integrators import RungeKuttaMerson, merson_step, next_step_size
+from osimlite.simulation.integrators import next_step_size
 from osimlite.simulation.stepper import IntegrationError
-from tests.simulation.equations import Counting, cannon, last, oscillator, pendulum
+from tests.simulation.equations import Counting, cannon, last, oscillator, pendulum, runge_kutta_merson
 
 # ------------------------------------------------------------------------------------------------- Merson's method
 
 
 def fixed_steps(f, y, until, n):
-    companions = []
+    """The state after n steps of equal length, which nothing but their ends decides."""
+    integrator = runge_kutta_merson(f, 0.0, y, len(y) // 2, accuracy=0.9)
     for i in range(n):
-        t0, t1 = until * i / n, until * (i + 1) / n
-        y, companion = merson_step(f, t0, y, f(t0, y), t1)
-        companions.append(max(abs(a - b) for a, b in zip(y, companion, strict=True)))
-    return y, max(companions)
+        integrator._next_step = until / n
+        integrator.step(until * (i + 1) / n)
+    assert integrator.attempted == n
+    return integrator.state
 
 
 @pytest.mark.parametrize("f", [pendulum, cannon])
 def test_fourth_order(f):
-    reference, _ = fixed_steps(f, [1.0, 0.0], 1.0, 4000)
-    errors = [abs(fixed_steps(f, [1.0, 0.0], 1.0, n)[0][0] - reference[0]) for n in (40, 80, 160)]
+    reference = fixed_steps(f, [1.0, 0.0], 1.0, 1000)
+    errors = [abs(fixed_steps(f, [1.0, 0.0], 1.0, n)[0] - reference[0]) for n in (40, 80, 160)]
     for coarse, fine in pairwise(errors):
         assert math.log2(coarse / fine) == pytest.approx(4.0, abs=0.35)
-
-
-def test_error_estimate_goes_with_the_fourth_power_of_the_step():
-    estimates = [fixed_steps(pendulum, [1.0, 0.0], 1.0, n)[1] for n in (40, 80, 160)]
-    for coarse, fine in pairwise(estimates):
-        assert math.log2(coarse / fine) == pytest.approx(4.0, abs=0.2)
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.1, 2.0), st.floats(-1.0, 1.0))
@@ -52,8 +47,11 @@ def test_exact_for_cubic_derivatives(coefficients, h, t0):
     def f(t, y):
         return [a + t * (b + t * (c + t * d))]
 
-    (y1,), _ = merson_step(f, t0, [0.0], f(t0, [0.0]), t0 + h)
-    assert y1 == pytest.approx(antiderivative(t0 + h) - antiderivative(t0), abs=1e-12 * (1 + h) ** 4 * 20)
+    integrator = runge_kutta_merson(f, t0, [0.0], 0, accuracy=0.9)
+    integrator._next_step = h
+    integrator.step()
+    wanted = antiderivative(integrator.time) - antiderivative(t0)
+    assert integrator.state[0] == pytest.approx(wanted, abs=1e-12 * (1 + h) ** 4 * 20)
 
 
 # ------------------------------------------------------------------------------------------------ error control
@@ -61,7 +59,7 @@ def test_exact_for_cubic_derivatives(coefficients, h, t0):
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7, 1e-9, 1e-11])
 def test_error_follows_the_accuracy(accuracy):
-    integrator = RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
+    integrator = runge_kutta_merson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
     t, y = last(integrator.steps(10.0))
     assert t == 10.0
     error = max(abs(y[0] - math.cos(10.0)), abs(y[1] + math.sin(10.0)))
@@ -73,7 +71,7 @@ def test_error_follows_the_accuracy(accuracy):
 def test_more_accuracy_costs_more_and_gains():
     errors, costs = [], []
     for accuracy in (1e-3, 1e-5, 1e-7, 1e-9):
-        integrator = RungeKuttaMerson(cannon, 0.0, [0.0, 0.0], 1, accuracy=accuracy)
+        integrator = runge_kutta_merson(cannon, 0.0, [0.0, 0.0], 1, accuracy=accuracy)
         _, y = last(integrator.steps(3.0))
         errors.append(abs(y[0] - math.log(math.cosh(3.0))))
         costs.append(integrator.evaluations)
@@ -82,30 +80,30 @@ def test_more_accuracy_costs_more_and_gains():
 
 
 def test_default_accuracy_and_first_step_are_opensims():
-    first = RungeKuttaMerson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
+    first = runge_kutta_merson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
     first.step()
     assert first.time == 0.01  # no error at all: taken as it is ...
     first.step()
     assert first.time == pytest.approx(0.06)  # ... and followed by one five times as large
-    by_default = list(RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0))
-    assert by_default == list(RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).steps(2.0))
+    by_default = list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0))
+    assert by_default == list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).steps(2.0))
 
 
 def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
     def exponential(t, y):
         return [4.0 * x for x in y]
 
-    def count(y, nq, **options):
-        integrator = RungeKuttaMerson(exponential, 0.0, y, nq, accuracy=1e-6, **options)
+    def count(y, n):
+        integrator = runge_kutta_merson(exponential, 0.0, y, n, accuracy=1e-6)
         last(integrator.steps(1.0))
         return integrator.attempted
 
-    assert count([1e3], 0) == count([1e6], 0)
-    assert count([1e6], 1) > 1.5 * count([1e3], 1)
+    assert count([0.0, 1e3], 1) == count([0.0, 1e6], 1)
+    assert count([1e6, 0.0], 1) > 1.5 * count([1e3, 0.0], 1)
     # Below 1, speeds count as they are.
-    assert count([1e-9], 0) < count([1e-3], 0) < count([1.0], 0) == count([1e3], 0)
+    assert count([0.0, 1e-9], 1) < count([0.0, 1e-3], 1) < count([0.0, 1.0], 1) == count([0.0, 1e3], 1)
     # Auxiliary states count as speeds do.
-    assert count([1e6], 0, nu=0) == count([1e6], 0)
+    assert count([1e6], 0) == count([0.0, 1e6], 1)
 
 
 def test_coordinates_left_out_may_be_counted():
@@ -114,10 +112,10 @@ def test_coordinates_left_out_may_be_counted():
     def locked(t, y):
         return [0.0, y[3], 0.0, -9.81 * math.sin(y[1])]
 
-    with_it = [t for t, _ in RungeKuttaMerson(locked, 0.0, [0.3, 1.0, 0.0, 0.0], 2).steps(2.0)]
-    counted = RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1, count_q=2, count_u=2)
+    with_it = [t for t, _ in runge_kutta_merson(locked, 0.0, [0.3, 1.0, 0.0, 0.0], 2).steps(2.0)]
+    counted = runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, counted=(2, 2))
     assert [t for t, _ in counted.steps(2.0)] == with_it
-    assert [t for t, _ in RungeKuttaMerson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0)] != with_it
+    assert [t for t, _ in runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0)] != with_it
 
 
 def test_the_worst_of_coordinates_speeds_and_auxiliary_states_decides():
@@ -126,8 +124,8 @@ def test_the_worst_of_coordinates_speeds_and_auxiliary_states_decides():
     def apart(t, y):
         return [math.cos(3 * t), math.cos(20 * t), math.cos(7 * t)]
 
-    together = RungeKuttaMerson(apart, 0.0, [0.0, 0.0, 0.0], 1, nu=1)
-    alone = RungeKuttaMerson(lambda t, y: [math.cos(20 * t)], 0.0, [0.0], 0)
+    together = runge_kutta_merson(apart, 0.0, [0.0, 0.0, 0.0], 1)
+    alone = runge_kutta_merson(lambda t, y: [math.cos(20 * t)], 0.0, [0.0], 0)
     assert [t for t, _ in together.steps(1.0)] == [t for t, _ in alone.steps(1.0)]
 
 
@@ -164,17 +162,16 @@ def test_next_step_after_a_failed_evaluation(error):
 
 def test_counts():
     f = Counting(pendulum)
-    integrator = RungeKuttaMerson(f, 0.0, [3.0, 0.0], 1)
+    integrator = runge_kutta_merson(f, 0.0, [3.0, 0.0], 1)
     steps = list(integrator.steps(10.0))
     assert len(steps) == integrator.taken
     assert integrator.attempted > integrator.taken
-    assert integrator.evaluations == f.calls == 1 + 4 * integrator.attempted + integrator.taken
-
-
-def test_largest_step():
-    integrator = RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, maximum_step=0.004)
-    times = [0.0, *(t for t, _ in integrator.steps(1.0))]
-    assert max(b - a for a, b in pairwise(times)) <= 0.004 * (1 + 1e-12)
+    assert integrator.evaluations == 1 + 4 * integrator.attempted + integrator.taken
+    # A step that is taken by itself looks at its start once more.
+    assert f.calls == integrator.evaluations + integrator.taken
+    together = Counting(pendulum)
+    runge_kutta_merson(together, 0.0, [3.0, 0.0], 1).table([10.0])
+    assert integrator.evaluations < together.calls < f.calls
 
 
 # -------------------------------------------------------------------------------------------------------- refusals
@@ -182,11 +179,12 @@ def test_largest_step():
 
 def test_a_derivative_that_is_no_number_at_the_start():
     with pytest.raises(IntegrationError, match=r"derivative of knee_speed is nan at t = 2\.5 s") as caught:
-        RungeKuttaMerson(lambda t, y: [0.0, math.nan], 2.5, [0.0, 1.0], 1, names=["knee", "knee_speed"])
+        runge_kutta_merson(lambda t, y: [0.0, math.nan], 2.5, [0.0, 1.0], 1, names=["knee", "knee_speed"])
     assert (caught.value.time, caught.value.index) == (2.5, 1)
     assert isinstance(caught.value, SimulationError) and isinstance(caught.value, OsimliteError)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_derivative_that_ceases_to_exist(bad):
     """The integrator creeps up to the place and names it."""
@@ -194,7 +192,7 @@ def test_a_derivative_that_ceases_to_exist(bad):
     def f(t, y):
         return [y[1], 0.0, bad if t > 0.7 else 1.0]
 
-    integrator = RungeKuttaMerson(f, 0.0, [0.0, 1.0, 0.0], 1)
+    integrator = runge_kutta_merson(f, 0.0, [0.0, 1.0, 0.0], 1)
     with pytest.raises(IntegrationError, match="derivative of state 2") as caught:
         list(integrator.steps(1.0))
     assert caught.value.time == pytest.approx(0.7)
@@ -208,7 +206,7 @@ def test_no_number_in_a_trial_step_only():
     def f(t, y):
         return [math.nan if y[0] > 1.1 else -400.0 * (y[0] - 1.0)]
 
-    integrator = RungeKuttaMerson(f, 0.0, [0.0], 0)
+    integrator = runge_kutta_merson(f, 0.0, [0.0], 0)
     _, y = last(integrator.steps(0.1))
     assert y[0] == pytest.approx(1.0, abs=1e-3)
     assert integrator.attempted > integrator.taken
@@ -224,7 +222,7 @@ def test_overflow_in_a_trial_step_only():
             failures.append(t)
             raise
 
-    integrator = RungeKuttaMerson(steep, 0.0, [8.0], 0)
+    integrator = runge_kutta_merson(steep, 0.0, [8.0], 0)
     _, y = last(integrator.steps(0.1))
     assert y[0] == pytest.approx(0.0, abs=5e-3)
     assert failures and integrator.attempted > integrator.taken
@@ -234,29 +232,30 @@ def test_overflow_for_good():
     def f(t, y):
         return [1.0 if t < 0.5 else math.exp(1e3)]
 
-    with pytest.raises(IntegrationError, match=r"cannot go on .* fails \(math range error\)") as caught:
-        list(RungeKuttaMerson(f, 0.0, [0.0], 0).steps(1.0))
+    with pytest.raises(IntegrationError, match=r"cannot be computed at t = 0\.5 s: math range error") as caught:
+        list(runge_kutta_merson(f, 0.0, [0.0], 0).steps(1.0))
     assert isinstance(caught.value.__cause__, OverflowError)
     assert caught.value.time == pytest.approx(0.5)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_states_that_leave_the_range_of_numbers():
     def f(t, y):
         return [0.0, 1e308 if t > 0.5 else 0.0]
 
     with pytest.raises(IntegrationError, match="leaves the range of numbers in state 1") as caught:
-        list(RungeKuttaMerson(f, 0.0, [0.0, 1.7e308], 0).steps(3.0))
+        list(runge_kutta_merson(f, 0.0, [0.0, 1.7e308], 0).steps(3.0))
     assert caught.value.index == 1
 
 
 def test_failing_at_the_first_state():
     with pytest.raises(IntegrationError, match="cannot be computed at t = 0 s"):
-        RungeKuttaMerson(lambda t, y: [1.0 / y[0]], 0.0, [0.0], 1)
+        runge_kutta_merson(lambda t, y: [1.0 / y[0]], 0.0, [0.0], 1)
 
 
 def test_no_step_small_enough():
     """y' = y^2 leaves every bound at t = 1."""
-    integrator = RungeKuttaMerson(lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"])
+    integrator = runge_kutta_merson(lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"])
     with pytest.raises(IntegrationError) as caught:
         list(integrator.steps(2.0))
     assert caught.value.time == pytest.approx(1.0, abs=1e-3)
@@ -264,39 +263,19 @@ def test_no_step_small_enough():
     assert "speed of q" in str(caught.value)
 
 
-def test_smallest_step_of_the_user():
-    def jump(t, y):
-        return [0.0 if t < 0.5 else 1e6]
-
-    def first_trouble(**options):
-        integrator = RungeKuttaMerson(jump, 0.0, [0.0], 1, **options)
-        with pytest.raises(
-            IntegrationError, match=r"smallest step of 1e-06 s misses the accuracy .* state 0"
-        ) as caught:
-            list(integrator.steps(1.0))
-        return caught.value.time
-
-    assert first_trouble(minimum_step=1e-6) == pytest.approx(0.5, abs=1e-2)
-    _, y = last(RungeKuttaMerson(jump, 0.0, [0.0], 1).steps(0.6))
+def test_a_jump_is_passed():
+    _, y = last(runge_kutta_merson(lambda t, y: [0.0 if t < 0.5 else 1e6], 0.0, [0.0], 0).steps(0.6))
     assert y[0] == pytest.approx(1e5, rel=1e-6)
 
 
 @pytest.mark.parametrize("accuracy", [0.0, 1.0, -1e-3, math.nan])
 def test_impossible_accuracies(accuracy):
     with pytest.raises(SimulationError, match="accuracy"):
-        RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
-
-
-@pytest.mark.parametrize("options", [{"minimum_step": -1.0}, {"minimum_step": 0.1, "maximum_step": 0.01}])
-def test_impossible_step_bounds(options):
-    with pytest.raises(SimulationError, match="step"):
-        RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, **options)
+        runge_kutta_merson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
 
 
 def test_sizes_that_do_not_fit():
     with pytest.raises(ValueError, match="1 derivatives of 2 states"):
-        RungeKuttaMerson(lambda t, y: [0.0], 0.0, [1.0, 0.0], 1)
-    with pytest.raises(ValueError, match="do not fit"):
-        RungeKuttaMerson(oscillator, 0.0, [1.0, 0.0], 1, nu=2)
+        runge_kutta_merson(lambda t, y: [0.0], 0.0, [1.0, 0.0], 1)
     with pytest.raises(ValueError, match="2 coordinates and as many speeds do not fit"):
         SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 2, 1e-3)

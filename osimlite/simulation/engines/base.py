@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import Self
 
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.simulation.constrained import Constrained
-from osimlite.simulation.elements import Forces
-from osimlite.simulation.engines.motion import CompiledMerson
 from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.runge_kutta_merson import RungeKuttaMerson
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.pack_chain import Chain
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
 
@@ -31,9 +28,14 @@ class KernelEngine(System):
 
     entries = ("evaluate", "run_several")
 
-    def __init__(self, mechanism: Mechanism, forces: Forces, chain: Chain | None = None) -> None:
-        super().__init__(mechanism, forces, chain)
-        self.constrained = Constrained(mechanism, self.order)
+    @property
+    def counted(self) -> tuple[int, int]:
+        """What the sums of the squared errors of values and of speeds are divided by.
+
+        Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
+        """
+        count = len(self.mechanism.coordinates)
+        return count + sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies), count
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
@@ -63,9 +65,19 @@ class KernelEngine(System):
                 rates=rates,
                 observe=observe,
                 names=self.state.names,
-                projection=self.constrained,
+                projected=self.projected,
             )
-        return CompiledMerson(self, t, y, settings.accuracy, observe, self.state.names)
+        return RungeKuttaMerson(self, t, y, settings.accuracy, observe)
+
+    def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
+        """The state (y,) nearest to one where the constraints hold to a tolerance; None if none is near."""
+        if not self.structure[layout.CONSTRAINED]:
+            return list(y)
+        self._set(t, y)
+        self._w[layout.SCRATCH : layout.SCRATCH + 2] = tolerance, inf
+        entry = self.program.code.entry("project")
+        status = entry(self.program.ints, self.numbers, self._w, self._y, self._f, 0)
+        return self._y.tolist() if status == layout.OK else None
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
         # They depend on nothing else.

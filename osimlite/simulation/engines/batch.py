@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +43,7 @@ class Batch:
         peaks: largest force of each contact and its time (W, P, 2).
         log: of each step time, state and derivative.
         forces: of each step the force of each contact.
+        errors: of the step that was tried last (y,).
     """
 
     def __init__(
@@ -65,17 +65,13 @@ class Batch:
         self._engine, self._kinds, self._levels = engine, kinds, levels
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
-        # Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
-        coordinates = len(engine.mechanism.coordinates)
         event = 3 + size * options.event_states
-        spare = sum(not body.mobilizer.speeds_are_rates for body in engine.mechanism.bodies)
         self._sizes, self._settings = (
             np.zeros(merson.SIZES, dtype=np.int64),
-            np.array((options.to, options.accuracy, inf, 0.0)),
+            np.array((options.to, options.accuracy)),
         )
         self._sizes[: merson.START_HOLDS] = (
-            coordinates + spare,
-            coordinates,
+            *engine.counted,
             options.most_tries,
             len(self._times),
             options.most_events,
@@ -93,12 +89,15 @@ class Batch:
         self._room = int(engine.structure[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
 
     def allow(self, steps: int) -> None:
-        """Let the next call end after so many steps, for which the log must have room."""
-        self._sizes[merson.MOST_LOGGED] = steps
+        """Let the next call end after so many steps, or when the log is full."""
+        self._sizes[merson.MOST_LOGGED] = min(steps, len(self.log))
 
     def run(self, first: int = 0, last: int | None = None) -> None:
         """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
         vectors, room = self._vectors, np.zeros(self._room)
+        size = self.states.shape[1]
+        first_error = int(self._engine.structure[layout.WORK_STATE]) + merson.ERRORS * size
+        self.errors = room[first_error : first_error + size]
         program = self._engine.program
         program.run(
             program.code.entry("run_several"),

@@ -1,6 +1,6 @@
 """A whole motion in one call: Runge-Kutta-Merson with Simbody's error control, reports, events.
 
-The steps are those of :class:`osimlite.simulation.integrators.RungeKuttaMerson`, rounding for rounding.
+The rules are those of Simbody's RungeKuttaMersonIntegrator and AbstractIntegratorRep, rounding for rounding.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
-from osimlite.simulation.integrators import next_step_size, shortest_step
+from osimlite.simulation.integrators import next_step_size, shortest_step, weight
 from osimlite.simulation.kernels.layout import (
     ACCELERATION_STAGE,
     CONSTRAINED,
@@ -21,7 +21,6 @@ from osimlite.simulation.kernels.layout import (
     POSITION_STAGE,
     PROJECT,
     SCRATCH,
-    SINGULAR_MASS,
     STATE_SIZE,
     TIME,
     WORK_CONTACT,
@@ -44,15 +43,15 @@ TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS = 0, 1, 2, 3, 4, 5
 COORDINATE, HEIGHT, TOUCH = 0, 1, 2
 """Kinds of watches: on the value of a coordinate, on how far a point lies along a direction, on a contact."""
 
-STATES = 9
+STATES, ERRORS = 8, 4
 """Room for so many states that a run needs at WORK_STATE, and two numbers for each contact and watch after them."""
 
-LIMIT, ACCURACY, LARGEST_STEP, SMALLEST_STEP = 0, 1, 2, 3
-"""Places of the settings: last time (s), and as `RungeKuttaMerson` has them."""
+LIMIT, ACCURACY = 0, 1
+"""Places of the settings: last time (s), and what the norm of the error of a step may be."""
 
 COUNT_Q, COUNT_U, MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5, 6, 7
-"""Places of the sizes: as `RungeKuttaMerson` has the first two, steps that may be tried, how many rows there are and
-how long the row of an event is."""
+"""Places of the sizes: what the sums of the squared errors of values and of speeds are divided by, steps that may be
+tried, how many rows there are and how long the row of an event is."""
 START_HOLDS, SIZES = 8, 9
 """Place of whether the constraints hold at the start, and the count of the sizes."""
 
@@ -194,6 +193,8 @@ def run(m: Motion, y: Floats) -> int:
             return FAILED if t1 < t0 else TOO_MANY
         counts[EVALUATIONS] += 1
         if evaluated(m, t1, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
+            clock[0] = t1
+            copy(size, y1, y)
             return FAILED
         counts[TAKEN] += 1
         clock[0] = t1
@@ -230,9 +231,8 @@ def run(m: Motion, y: Floats) -> int:
 def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
     counts, clock, settings, sizes, size = m.counts, m.clock, m.settings, m.sizes, m.s[STATE_SIZE]
-    companion = at(m.w, m.s[WORK_STATE] + 8 * size)
-    limit, accuracy = settings[LIMIT], settings[ACCURACY]
-    smallest = max(settings[SMALLEST_STEP], shortest_step(t0))
+    errors = at(m.w, m.s[WORK_STATE] + ERRORS * size)
+    limit, accuracy, smallest = settings[LIMIT], settings[ACCURACY], shortest_step(t0)
     while True:
         if counts[ATTEMPTED] >= sizes[MOST_TRIES]:
             return t0
@@ -242,17 +242,11 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         cut = limit < t0 + 0.95 * h
         counts[ATTEMPTED] += 1
         counts[EVALUATIONS] += 4
-        status = merson(m, t0, t1, y0, f0, y1)
-        if status == SINGULAR_MASS:
-            return t0 - 1.0
-        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
-        for k in range(size):
-            companion[k] = 0.2 * (y1[k] - companion[k])
-        error = norm(m, y0, companion) if status == OK else inf
+        error = norm(m, y0, errors) if merson(m, t0, t1, y0, f0, y1, errors) == OK else inf
         # As in Simbody: what half a step would not mend, neither does the projection.
         if m.s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(m, t1, y0, y1, companion)
-        clock[1] = min(next_step_size(h, error, accuracy, cut), settings[LARGEST_STEP])
+            error = projected_error(m, t1, y0, y1, errors)
+        clock[1] = next_step_size(h, error, accuracy, cut)
         if error <= accuracy:
             return t1
         if h <= smallest:
@@ -270,16 +264,14 @@ def projected_error(m: Motion, t1: float, y0: Floats, y1: Floats, errors: Floats
     return norm(m, y0, errors)
 
 
-def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) -> int:
-    """One step of Merson's method; the companion of y1 is the last of the stages."""
+def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats, ya: Floats) -> int:
+    """One step of Merson's method to y1; `ya`, which has room for the stages after it, holds its errors then."""
     size = m.s[STATE_SIZE]
-    room = at(m.w, m.s[WORK_STATE] + 4 * size)
-    ya, fa, fb, fc, companion = room, at(room, size), at(room, 2 * size), at(room, 3 * size), at(room, 4 * size)
+    fa, fb, fc = at(ya, size), at(ya, 2 * size), at(ya, 3 * size)
     h = t1 - t0
-    status = OK
     for stage in range(4):
         # Where the next evaluation is to be.
-        y, f, t = ya, fa, t1
+        f, t = fa, t1
         if stage == 0:
             c = h / 3.0
             t = t0 + c
@@ -294,19 +286,19 @@ def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats) 
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] + 3.0 * fb[k])
         else:
-            c, y = h / 2.0, companion
+            # Its error is of one order less than that of y1.
+            c = h / 2.0
             for k in range(size):
-                companion[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
-        status = evaluated(m, t, y, f, ACCELERATION_STAGE)
-        if status != OK and stage < 3:
-            break
-    if status == SINGULAR_MASS and not is_finite(size, companion if stage == 3 else ya):
-        # A state that is not finite only makes the step smaller.
-        status = -1
+                ya[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
+        status = evaluated(m, t, ya, f, ACCELERATION_STAGE)
+        if status != OK:
+            return status
     c = h / 6.0
     for k in range(size):
         y1[k] = y0[k] + c * (f0[k] + 4.0 * fc[k] + fa[k])
-    return status
+        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
+        ya[k] = 0.2 * (y1[k] - ya[k])
+    return OK
 
 
 def norm(m: Motion, y0: Floats, errors: Floats) -> float:
@@ -325,11 +317,6 @@ def norm(m: Motion, y0: Floats, errors: Floats) -> float:
     of_u /= max(m.sizes[COUNT_U], 1)
     of_z /= max(size - 2 * n, 1)
     return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf
-
-
-def weight(value: float) -> float:
-    """What the error of a number counts that is as large as this at the start of the step."""
-    return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
 
 def inside(

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import UnsupportedError
+from osimlite.multibody.constraints import Constraint
 from osimlite.multibody.functions import IDENTITY
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyAccelerationError, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
-from osimlite.simulation.constrained import Constrained, free_coordinates
+from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import ForceElement, Placement, Places
 from osimlite.simulation.kernels import layout as at
@@ -250,7 +251,7 @@ class Packer:
         above = self.link_records()
         self.freedom_records(above)
         self.operation_records()
-        self.constraint_records(Constrained(self.places.mechanism, order))
+        self.constraint_records(*constraints_on(self.places.mechanism, order))
         if self.chain is not None:
             pack_chain(self, self.chain)
         found = self.item_records()
@@ -341,15 +342,15 @@ class Packer:
             record = [item.kind, _kind_of(item.before), freedom, law, arguments, len(freedoms), extra, gradient]
             self.ints[start + at.OPERATION_INTS * number : start + at.OPERATION_INTS * (number + 1)] = record
 
-    def constraint_records(self, constrained: Constrained) -> None:
+    def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
         """Write what constraints need, if there are any."""
-        if not constrained.constraints:
+        if not kept:
             return
         start, size = len(self.ints), self.ints[at.FREEDOMS]
         head = [0] * at.CONSTRAINED_INTS
         self.ints[at.CONSTRAINED] = start
         self.ints += head
-        constraints = [constraint_record(item, self.places, self.balls) for item in constrained.constraints]
+        constraints = [constraint_record(item, self.places, self.balls) for item in kept]
         records: list[int] = []
         equations = 0
         for constraint in constraints:
@@ -368,7 +369,7 @@ class Packer:
         head[at.BALLS], head[at.BALL_AT] = len(self.balls), len(self.ints)
         self.ints += self.balls.values()
         head[at.EQUATIONS], head[at.POSITIONS] = equations, sum(constraint.positions for constraint in constraints)
-        head[at.LOCKS], head[at.ENTRIES] = constrained.locks, self.entries
+        head[at.LOCKS], head[at.ENTRIES] = locks, self.entries
         for place, count in room_for(equations, size, self.entries).items():
             head[place] = self.room(count)
         self.ints[start : start + at.CONSTRAINED_INTS] = head
