@@ -25,6 +25,7 @@ from _pair import pair, report
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, FreeJoint, HuntCrossleyForce, Model, PinJoint
 from osimlite.errors import OsimliteError
 from osimlite.schema.forces import Force
+from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.kind import kind_of_class
@@ -81,7 +82,7 @@ def models(folder: Path) -> Iterator[tuple[str, Path]]:
     for number, (name, model) in enumerate(found):
         for force in model.components(Force):
             known = kind_of_class(type(force)) is not None
-            if not known or isinstance(force, PathSpring):
+            if not known or isinstance(force, PathSpring | Muscle):
                 force.appliesForce = False
         path = folder / f"{number}.osim"
         osimlite.write(model, path)

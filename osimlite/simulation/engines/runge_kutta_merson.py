@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from osimlite.errors import SettingError
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP, shortest_step, weight
-from osimlite.simulation.kernels import merson
+from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.states import cubic
 from osimlite.simulation.many import BatchOptions
@@ -172,11 +172,12 @@ class RungeKuttaMerson(Stepper):
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])
         off = [abs(e) * (weight(y) if k >= size else 1.0) for k, (e, y) in enumerate(zip(errors, y0, strict=True))]
         index = max(range(len(off)), key=lambda k: off[k] if isfinite(off[k]) else inf)
-        what = (
-            f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._name(index)}"
-            if isfinite(off[index])
-            else f"leaves the range of numbers in {self._name(index)}"
-        )
+        if not isfinite(off[index]):
+            what = f"leaves the range of numbers in {self._name(index)}"
+        elif off[index] > self._accuracy or not self._engine.structure[layout.CONSTRAINED]:
+            what = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._name(index)}"
+        else:
+            what = "ends too far from where the constraints hold"
         raise IntegrationError(
             f"The integrator cannot go on at t = {t0:.9g} s: even its shortest step of {h:.3g} s {what}. "
             "Something changes too abruptly there, such as a very stiff contact or a sharp limit: soften it, or "
