@@ -65,6 +65,7 @@ class Paths:
         self.names = tuple(builder.path(owner) for owner in owners)
         self._coordinates = [info.path for info in self.mechanism.coordinates]
         elements = [_Measured(name, PATH.read(builder, owner)) for name, owner in zip(self.names, owners, strict=True)]
+        self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
         infos = tuple(replace(info, locked=False) for info in self.mechanism.coordinates)
         free = replace(self.mechanism, coordinates=infos, constraints=())
@@ -92,11 +93,11 @@ class Paths:
         is its rate.
         """
         values = self.mechanism.values(q)
-        forces = self._system.pulled(values)
-        arms = (forces @ self._coupling(values)).tolist()
+        arms = self._system.pulled(values)
+        arms[self._coupled] = arms[self._coupled] @ self._coupling(values)
         return {
             name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if not abs(arm) <= ROUNDING}
-            for name, row in zip(self.names, arms, strict=True)
+            for name, row in zip(self.names, arms.tolist(), strict=True)
         }
 
     def _coupling(self, q: Array) -> Array:

@@ -28,8 +28,10 @@ from osimlite.schema.contact_forces import MeyerFregly2016Force, SmoothSphereHal
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.functions import (
     Constant,
+    ExpressionBasedFunction,
     LinearFunction,
     MultiplierFunction,
+    MultivariatePolynomialFunction,
     PiecewiseLinearFunction,
     PolynomialFunction,
     SimmSpline,
@@ -39,7 +41,14 @@ from osimlite.schema.functions import (
 from osimlite.schema.markers import Station
 from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
-from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
+from osimlite.schema.paths import (
+    ConditionalPathPoint,
+    FunctionBasedPath,
+    GeometryPath,
+    MovingPathPoint,
+    PathPoint,
+    PathWrap,
+)
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.springs import (
     BushingForce,
@@ -238,6 +247,27 @@ FORCES = {
         ),
     ),
     "path around surfaces": lambda: PathSpring(name="a", **SPRING, geometry_path=around(straight(), "bar", "ball")),
+    "path of functions": lambda: (
+        PathSpring(
+            name="a",
+            **SPRING,
+            geometry_path=FunctionBasedPath(
+                coordinate_paths=("/jointset/j2/q2_0", "/jointset/j3/q3_0", "/jointset/j0/q0_3"),
+                length_function=MultivariatePolynomialFunction(
+                    dimension=3, order=2, coefficients=(0.3, 0.2, -0.1, 0.4, 0.1, 0.2, 0.3, -0.2, 0.1, 0.5)
+                ),
+            ),
+        ),
+        PathSpring(
+            name="b",
+            **SPRING,
+            geometry_path=FunctionBasedPath(
+                coordinate_paths=("/jointset/j2/q2_0",),
+                length_function=Sine(amplitude=0.2, omega=2.0, phase=0.3, offset=0.6),
+                lengthening_speed_function=ExpressionBasedFunction(expression="q*v+1", variables=("q", "v")),
+            ),
+        ),
+    ),
     "path by a formula": lambda: ExpressionBasedPathForce(
         name="a", resting_length=0.4, clamp_stretch=True, expression="30*s^2 + ldot*s", geometry_path=straight()
     ),

@@ -112,3 +112,25 @@ def test_no_text_does_worse_than_a_model_error(text):
 
 def test_every_function_is_a_law():
     assert set(FUNCTIONS.values()) <= set(STEPS)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_derivatives_of_functions(name):
+    inner = "0.3*q-0.1*u*q"
+    text = f"{name}({inner})" if name not in ("min", "max") else f"{name}({inner},u)*{name}(q,{inner})"
+    assert_derivatives(text)
+
+
+@pytest.mark.parametrize("text", ["q", "u", "3", "q-q*u", "-q/u", "q^3+(q+1)^(u*q)", "a*q;a=q*u", "2^(q*u)"])
+def test_derivatives(text):
+    assert_derivatives(text)
+
+
+def assert_derivatives(text, q=0.7, u=-1.3, step=1e-6):
+    formula = Formula.parse(text, ("q", "u"), "the expression")
+    for variable, (dq, du) in enumerate(((step, 0.0), (0.0, step))):
+        steps, constants = program(formula.derivative(variable))
+        count = len(steps) // 3
+        found = of_two(q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count))
+        expected = (value(text, q + dq, u + du) - value(text, q - dq, u - du)) / (2 * step)
+        assert found == pytest.approx(expected, rel=1e-8, abs=1e-9)

@@ -45,6 +45,39 @@ FUNCTIONS = {
 """The law for each of Lepton's functions."""
 
 OF_TWO = ("min", "max")
+DERIVATIVES = {
+    "+": ("1", "1"),
+    "-": ("1", "-1"),
+    "*": ("y", "x"),
+    "negative": ("-1",),
+    "divide": ("1/y", "-x/(y*y)"),
+    "power": ("y*x^(y-1)", "log(x)*x^y"),
+    "smaller": ("1-step(x-y)", "step(x-y)"),
+    "larger": ("step(x-y)", "1-step(x-y)"),
+    "square_root": ("0.5/sqrt(x)",),
+    "exponential": ("exp(x)",),
+    "logarithm": ("1/x",),
+    "sine": ("cos(x)",),
+    "cosine": ("-sin(x)",),
+    "secant": ("sec(x)*tan(x)",),
+    "cosecant": ("-csc(x)*cot(x)",),
+    "tangent": ("square(sec(x))",),
+    "cotangent": ("-square(csc(x))",),
+    "arcsine": ("1/sqrt(1-x*x)",),
+    "arccosine": ("-1/sqrt(1-x*x)",),
+    "arctangent": ("1/(1+x*x)",),
+    "hyperbolic_sine": ("cosh(x)",),
+    "hyperbolic_cosine": ("sinh(x)",),
+    "hyperbolic_tangent": ("1-square(tanh(x))",),
+    "error_function": ("1.1283791670955126*exp(-x*x)",),
+    "complementary_error_function": ("-1.1283791670955126*exp(-x*x)",),
+    "square": ("2*x",),
+    "cube": ("3*x*x",),
+    "reciprocal": ("-1/(x*x)",),
+    "magnitude": ("2*step(x)-1",),
+}
+"""The derivatives of a law by its arguments x and y; steps have none."""
+
 LAWS = {"/": "divide", "^": "power"}
 """The law for a sign, where that is not called like it."""
 PRECEDENCE = {"+": 0, "-": 0, "*": 1, "/": 1, "^": 3}
@@ -105,9 +138,25 @@ class Formula:
             result = reader.read(main)
         except _Wrong as wrong:
             raise ModelError(f"{where} is '{text}': {wrong}") from None
-        if result < len(variables) + len(reader.steps) - 1 or not reader.steps:
-            reader.add("+", result, reader.add("number", value=0.0))
-        return cls(tuple(variables), tuple(reader.steps))
+        return cls(tuple(variables), reader.ending_with(result))
+
+    def derivative(self, variable: int) -> Formula:
+        """The derivative by one of the variables."""
+        reader = _Reader(self.variables)
+        reader.steps += self.steps
+        first = len(self.variables)
+        derivatives = {variable: reader.add("number", value=1.0)}
+        for place, step in enumerate(self.steps, start=first):
+            reader.known = dict(zip("xy", step.arguments, strict=False))
+            for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
+                if argument in derivatives:
+                    part = reader.add("*", reader.read(rule), derivatives[argument])
+                    derivatives[place] = reader.add("+", derivatives[place], part) if place in derivatives else part
+        last = first + len(self.steps) - 1
+        return Formula(
+            self.variables,
+            reader.ending_with(derivatives[last] if last in derivatives else reader.add("number", value=0.0)),
+        )
 
 
 class _Wrong(Exception):
@@ -144,6 +193,12 @@ class _Reader:
         """Add a step: its register."""
         self.steps.append(Step(law, arguments, value))
         return self._first + len(self.steps) - 1
+
+    def ending_with(self, result: int) -> tuple[Step, ...]:
+        """The steps, the last of which gives a result."""
+        if result < self._first + len(self.steps) - 1 or not self.steps:
+            self.add("+", result, self.add("number", value=0.0))
+        return tuple(self.steps)
 
     def read(self, text: str) -> int:
         """The register of a formula."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -100,6 +100,8 @@ class ThroughPoints:
     path: str
     points: tuple[Node, ...]
     surfaces: tuple[Surface, ...] = ()
+
+    coupled: ClassVar[bool] = True
 
     def items(self, places: Places) -> list[Item]:
         """What pulls, the surfaces, and the path."""
