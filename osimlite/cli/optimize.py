@@ -67,6 +67,7 @@ def optimize(
     ] = Path("optimum"),
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted or finished search.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace what another search found.")] = False,
+    equilibrate: options.Equilibrate = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Look for the start, or the numbers, with which a model does best; writes it with them, ready to simulate.
@@ -79,7 +80,8 @@ def optimize(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, is_planted=planted, feet=tuple(foot) if foot else None, skip_unsupported=skip_unsupported,
+        accuracy=accuracy, is_planted=planted, feet=tuple(foot) if foot else None, equilibrate=equilibrate,
+        skip_unsupported=skip_unsupported,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
         found = search(

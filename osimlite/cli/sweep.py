@@ -61,6 +61,7 @@ def sweep(
     ] = Path("results.parquet"),
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted sweep.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace results that were made with other settings.")] = False,
+    equilibrate: options.Equilibrate = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Simulate a model from many starts, or with many values of its numbers: one row of the results for each run.
@@ -76,7 +77,8 @@ def sweep(
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, measures=tuple(measure) if measure else None, to=to,
         engine=engine, accuracy=accuracy, report_interval=report_interval, is_planted=planted,
-        feet=tuple(foot) if foot else None, skip_unsupported=skip_unsupported,
+        feet=tuple(foot) if foot else None, equilibrate=equilibrate,
+        skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)
     with progress_bar("sweeping", chosen.count) as progress:

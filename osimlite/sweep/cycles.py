@@ -248,7 +248,7 @@ class CycleSearch:
         states, vectors, fractions = states[made], vectors[made], fractions[made]
         if not len(states):
             return []
-        states = self.variants.started(variants, planted(engine, self.footing, states, numbers=vectors))
+        states = self.variants.started(engine, variants, planted(engine, self.footing, states, numbers=vectors))
         walks = walk_many(
             engine, states, FIRST_SECONDS, footing=self.footing, numbers=vectors, accuracy=1e-3,
             most_tries=MOST_TRIES, threads=self.threads,

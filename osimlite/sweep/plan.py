@@ -62,6 +62,7 @@ class Plan:
         is_planted: whether the walker is put on the ground with the deeper foot, at rest there, before each run.
         feet: contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out.
         report_interval: time between the moments that a measure of one's own can look at (s), None for none.
+        equilibrate: start muscles where fiber and tendon are in equilibrium.
         skip_unsupported: leave out forces that cannot be computed.
         make: makes the model from parameters, where some of them are varied.
         folder: of the model's file, where the files are that it names.
@@ -77,6 +78,7 @@ class Plan:
     is_planted: bool = False
     feet: tuple[str, ...] | None = None
     report_interval: float | None = None
+    equilibrate: bool = False
     skip_unsupported: bool = False
     make: Maker | None = None
     folder: str | None = None
@@ -141,6 +143,7 @@ class Plan:
             "planted": self.is_planted,
             "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
+            **({"equilibrate": True} if self.equilibrate else {}),
             "skip_unsupported": self.skip_unsupported,
         }
 

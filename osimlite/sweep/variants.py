@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.errors import OsimliteError, SettingError
+from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.schema.base import Component
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
@@ -119,7 +120,7 @@ class Variants:
         """Initial state of a sample (y,).
 
         Raises:
-            OsimliteError: the model has no such coordinate, or holds it.
+            OsimliteError: the model has no such coordinate, or holds it, or a muscle has no equilibrium.
         """
         # An engine of its own is only made where the coordinates may be others.
         engine = (self.given if variant.structure == self.given.structure else variant).engine
@@ -138,14 +139,30 @@ class Variants:
                     raise SettingError(f"'{target.coordinate}' is locked in this model, so that it has no start")
                 number = engine.order.index(coordinate)
                 row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
-        started: Floats = variant.state.started(row[None])[0]
+        started: Floats = self.started(engine, [variant], row[None])[0]
         return started
 
-    @staticmethod
-    def started(variants: Sequence[Variant], states: Floats) -> Floats:
-        """States (k, y) of as many models, with the auxiliary ones where they start from the values and speeds."""
-        rows = [variant.state.started(row[None]) for variant, row in zip(variants, states, strict=True)]
-        return np.concatenate(rows)
+    def started(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
+        """States (k, y) of as many models, with the auxiliary ones where they start from the values and speeds.
+
+        Args:
+            engine: of any model of the structure that these have.
+            variants: the models (k).
+            states: what values and speeds are taken of (k, y).
+
+        Raises:
+            SimulationError: they are to start in equilibrium, and a muscle has none.
+        """
+        rows = np.concatenate([variant.state.started(row[None]) for variant, row in zip(variants, states, strict=True)])
+        if self._plan.equilibrate:
+            for row, variant in zip(rows, variants, strict=True):
+                # An engine of its own is only made where it must be, and to tell why there is no equilibrium.
+                y, found = row.tolist(), None
+                if len(variant.numbers):
+                    with suppress(SimulationError):
+                        found = engine.equilibrated(0.0, y, variant.numbers)
+                row[:] = variant.engine.equilibrated(0.0, y) if found is None else found
+        return rows
 
     def placed(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
         """Initial states (k, y), put on their feet if the plan says so.
@@ -165,7 +182,7 @@ class Variants:
         footing = self._footing(engine)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
         resting = planted(engine, footing, starts, numbers=numbers)
-        return self.started(variants, stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
+        return self.started(engine, variants, stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""

@@ -15,6 +15,7 @@ from osimlite.sweep.run import Interrupted, sweep
 from osimlite.sweep.runner import Runner
 from osimlite.sweep.sampling import samples
 from tests.oracle.random_models import RandomModel
+from tests.simulation.elements.muscle_rows import hung, muscle
 
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
@@ -65,3 +66,29 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
         assert theirs[path][0] == pytest.approx(alone[path][-1], rel=1e-6, abs=1e-9)
     sums = np.sum([table[path] for path in paths], axis=0)
     assert np.allclose(table[f"{__name__}:all_of_them"], sums) and (sums > 0.0).any()
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_runs_may_start_in_equilibrium(engine):
+    """Each from its own place, and with the numbers of its own muscle; where there is none, it is told."""
+    model = hung(muscle("thelen_default"), [0.3, 0.3])
+    slack = "/forceset/mu/tendon_slack_length"
+    made = plan(
+        model,
+        {"x": (0.3, 0.34, 2), slack: (0.26, 0.28, 2), "/forceset/mu/default_activation": 0.2},
+        measures=("/forceset/mu/fiber_length",),
+        to=0.02,
+        accuracy=1e-6,
+        engine=engine,
+        equilibrate=True,
+    )
+    values = np.array([[0.3, 0.26, 0.2], [0.34, 0.28, 0.2], [0.3, 0.28, 0.2], [5.0, 0.27, 0.2]])
+    block = Runner(made).run(values)
+    assert block.status == ["done"] * 3 + ["failed"]
+    assert "no equilibrium was found of '/forceset/mu', whose path of 5 m is 4.68 m longer" in block.reasons[3]
+    for place, (x, length, activation) in enumerate(values[:3]):
+        force = muscle("thelen_default", tendon_slack_length=length, default_activation=activation)
+        with Simulation(hung(force, [0.3, 0.3]), engine) as simulation:
+            alone = simulation.run(0.02, accuracy=1e-6, initial={"x": x}, equilibrate=True)
+        found = alone.auxiliary["/forceset/mu/fiber_length"][-1]
+        assert block.measures["/forceset/mu/fiber_length"][place] == pytest.approx(found, rel=1e-12)
