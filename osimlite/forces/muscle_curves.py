@@ -14,17 +14,23 @@ from osimlite.forces.bezier import curve, curve_size
 ACTIVE_SIZE, VELOCITY_SIZE, PASSIVE_SIZE, TENDON_SIZE = map(curve_size, (5, 4, 2, 2))
 COMPRESSIVE_SIZE = curve_size(1)
 """How many numbers each curve has."""
+NEAREST = 2.0**-26
+"""Lengths as near as that to each other count as one."""
 
 
 def active_force_length(shortest: float, transition: float, longest: float, slope: float, least: float) -> list[float]:
     """Active force over fiber length; it is 1 at 1, where the curve is flat.
 
     Raises:
-        ValueError: there is no such curve; likewise for those below. The message names a property.
+        ValueError: there is no such curve; likewise for those below. The message begins with "its" and a property, or
+            tells which slopes make no corner.
     """
-    _require(0.0 <= shortest < transition < 1.0 < longest, "its lengths do not rise: 0, min, transition, 1, max")
+    _require(
+        shortest >= 0.0 and min(transition - shortest, 1.0 - transition, longest - 1.0) > NEAREST,
+        "its min_norm_active_fiber_length, transition_norm_fiber_length, 1, max_norm_active_fiber_length do not rise",
+    )
     _require(least >= 0.0, "its minimum_value is negative")
-    _require(0.0 <= slope < (1.0 - least) / (1.0 - transition), "its shallow_ascending_slope is negative or too steep")
+    _below(slope, (1.0 - least) / (1.0 - transition), "shallow_ascending_slope")
     half = 0.05
     knee = 1.0 - slope * (1.0 - half - transition)
     top = 1.0 + half
@@ -55,13 +61,14 @@ def force_velocity(
 ) -> list[float]:
     """Factor of the active force over fiber velocity, or the velocity over that factor."""
     _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
+    _below(concentric_end, concentric_near, "concentric_slope_at_vmax")
     _require(
-        0.0 <= concentric_end < concentric_near <= 1.0, "its concentric slopes are not from 0 to 1, or do not rise"
+        concentric_near < 1.0 or (concentric_near == 1.0 and not inverse),
+        "its concentric_slope_near_vmax is not less than 1",
     )
     _require(isometric > 1.0, "its isometric_slope is not above 1")
-    _require(
-        0.0 <= eccentric_end <= eccentric_near < most - 1.0, "its eccentric slopes are not from 0 on, or are too steep"
-    )
+    _require(0.0 <= eccentric_end <= eccentric_near, "its eccentric_slope_at_vmax is not from 0 to the slope near vmax")
+    _below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
     points = [
         (-1.0, 0.0, concentric_end),
         (-0.9, 0.5 * concentric_near * (-0.9 + 1.0) + 0.5 * concentric_end * (-0.9 + 1.0), concentric_near),
@@ -78,12 +85,13 @@ def fiber_force_length(
     zero: float, one: float, low: float | None = None, stiffness: float | None = None, curviness: float | None = None
 ) -> list[float]:
     """Passive force over fiber length."""
-    _require(one > zero, "its strain_at_one_norm_force is not above its strain_at_zero_force")
+    _require(one > zero, f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}")
     low, stiffness, curviness = _given_or(
-        (low, stiffness, curviness), (0.2, 2.0 / (one - zero), 0.75), "stiffnesses and curviness"
+        (low, stiffness, curviness), (0.2, 2.0 / (one - zero), 0.75), "stiffness_at_low_force"
     )
-    _require(stiffness > 1.0 / (one - zero), "its stiffness_at_one_norm_force is too small")
-    _require(0.0 < low < 1.0 / (one - zero), "its stiffness_at_low_force is not positive, or too large")
+    mean = 1.0 / (one - zero)
+    _above(stiffness, mean, "stiffness_at_one_norm_force")
+    _below(low, mean, "stiffness_at_low_force")
     start, end = 1.0 + zero, 1.0 + one
     foot = start + min(0.1 / stiffness, 0.1 * (end - start))
     middle = start + 0.5 * (foot - start)
@@ -96,10 +104,10 @@ def tendon_force_length(
     """Force over tendon length."""
     _require(one > 0.0, "its strain_at_one_norm_force is not positive")
     stiffness, toe, curviness = _given_or(
-        (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness, toe and curviness"
+        (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness_at_one_norm_force"
     )
     _require(0.0 < toe < 1.0, "its norm_force_at_toe_end is not between 0 and 1")
-    _require(stiffness > 1.0 / one, "its stiffness_at_one_norm_force is too small")
+    _above(stiffness, 1.0 / one, "stiffness_at_one_norm_force")
     end = (toe - 1.0) / stiffness + 1.0 + one
     foot, middle = 1.0 + (end - 1.0) / 10.0, (0.5 * toe - 1.0) / stiffness + 1.0 + one
     slope = 0.5 * toe / (middle - foot)
@@ -112,8 +120,8 @@ def fiber_compressive_force_length(
 ) -> list[float]:
     """Force against short fibers over their length."""
     _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
-    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.5), "stiffness and curviness")
-    _require(stiffness < -1.0 / zero, "its stiffness_at_zero_length is not negative enough")
+    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length")
+    _require(stiffness < -1.0 / zero, f"its stiffness_at_zero_length is not less than {-1.0 / zero:.4g}")
     return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
@@ -123,8 +131,8 @@ def fiber_compressive_force_cos_pennation(
     """Force against steep fibers over the cosine of pennation; the angle of engagement is in degrees."""
     zero = cos(radians(angle))
     _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
-    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.1), "stiffness and curviness")
-    _require(stiffness < -1.0 / zero, "its stiffness_at_perpendicular is not negative enough")
+    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.1), "stiffness_at_perpendicular")
+    _require(stiffness < -1.0 / zero, f"its stiffness_at_perpendicular is not less than {-1.0 / zero:.4g}")
     return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
@@ -133,8 +141,16 @@ def _require(holds: bool, otherwise: str) -> None:
         raise ValueError(otherwise)
 
 
-def _given_or(given: tuple[float | None, ...], usual: tuple[float, ...], what: str) -> tuple[float, ...]:
-    """What is given, or the usual if nothing is."""
+def _below(slope: float, limit: float, name: str) -> None:
+    _require(0.0 <= slope < limit, f"its {name} is not from 0 to less than {limit:.4g}")
+
+
+def _above(slope: float, limit: float, name: str) -> None:
+    _require(slope > limit, f"its {name} is not above {limit:.4g}")
+
+
+def _given_or(given: tuple[float | None, ...], usual: tuple[float, ...], first: str) -> tuple[float, ...]:
+    """What is given, or the usual if nothing is; the first property is that of `given`."""
     found = [x for x in given if x is not None]
-    _require(len(found) in (0, len(usual)), f"only some of {what} are given; give all, or none")
+    _require(len(found) in (0, len(usual)), f"its {first} and what follows it are neither all given nor all left out")
     return tuple(found) or usual

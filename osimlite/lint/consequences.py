@@ -122,6 +122,7 @@ STRICTER: Final = {
         for what in ("stiffness", "damping")
     },
     ("DeGrooteFregly2016Muscle", "default_activation"): "> 0",
+    ("DeGrooteFregly2016Muscle", "default_normalized_tendon_force"): "0 to 5",
     ("ForceVelocityCurve", "concentric_slope_near_vmax"): "> 1.49e-8",
     ("ForceVelocityCurve", "eccentric_slope_near_vmax"): "> 1.49e-8",
     ("ClutchedPathSpring", "initial_stretch"): ">= 0",

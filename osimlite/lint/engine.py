@@ -58,6 +58,7 @@ _MODULES = (
     "space",
     "functions",
     "paths",
+    "wraps",
     "muscles",
     "files",
 )

@@ -69,10 +69,10 @@ def test_the_integral_has_the_curve_as_its_slope(low, curviness, x):
     [
         (lambda: muscle_curves.active_force_length(0.5, 0.4, 1.8, 0.8, 0.0), "do not rise"),
         (lambda: muscle_curves.active_force_length(0.4, 0.7, 1.8, 4.0, 0.0), "shallow_ascending_slope"),
-        (lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.5, 1.4, 0.6, 0.9), "eccentric slopes"),
+        (lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.5, 1.4, 0.6, 0.9), "eccentric_slope_near_vmax"),
         (lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.1, 1.4, 0.6, 1.1), "curviness is not from 0 to 1"),
         (lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2, 1.0, 0.5), "stiffness_at_one_norm_force"),
-        (lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2), "only some of stiffnesses and curviness are given"),
+        (lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2), "stiffness_at_low_force and what follows"),
         (lambda: muscle_curves.tendon_force_length(0.05, 40.0, 1.0, 0.5), "norm_force_at_toe_end"),
         (lambda: muscle_curves.fiber_compressive_force_length(0.5, -1.0, 0.5), "stiffness_at_zero_length"),
         (lambda: muscle_curves.fiber_compressive_force_cos_pennation(95.0), "engagement_angle_in_degrees"),

@@ -86,7 +86,7 @@ def impossible_value(subject: Subject, found: Found) -> None:
     </CoordinateLimitForce>
     ```
     """
-    for item, spec, value, verdict in _outside(subject):
+    for item, spec, value, verdict in outside(subject):
         if verdict.known:
             _report_domain(subject, found, item, spec, value, verdict)
 
@@ -112,7 +112,7 @@ def doubtful_value(subject: Subject, found: Found) -> None:
     <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.05</radius> </ContactSphere>
     ```
     """
-    for item, spec, value, verdict in _outside(subject):
+    for item, spec, value, verdict in outside(subject):
         if not verdict.known:
             _report_domain(subject, found, item, spec, value, verdict)
 
@@ -173,7 +173,7 @@ _NAN_FATE = "what is computed with it becomes NaN, without a message"
 _Outside = tuple[Object, FieldSpec, Any, Verdict]
 
 
-def _outside(subject: Subject) -> list[_Outside]:
+def outside(subject: Subject) -> list[_Outside]:
     """Every number outside its domain; they are looked for once."""
     if "outside domains" not in subject.kept:
         subject.kept["outside domains"] = list(_find_outside(subject))

@@ -137,7 +137,7 @@ def defaults_block(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim cannot read in the
-    objects that belong to tools, a ControlLinear or a CMC_Joint, is an error: it refuses to load the file.
+    objects that belong to tools, a CMC_Joint, is an error: it refuses to load the file.
 
     ## Why is this bad
     Each object inside replaces the defaults of its class in the whole running program, for this file and for all that
@@ -306,9 +306,6 @@ def not_upgradable(subject: Subject, found: Found) -> None:
 def _unread(source: Source, number: int, kind: str) -> str:
     """What an element should hold; empty if it does."""
     span, inside = source.spans[number], source.children(number)
-    if kind == "nodes":
-        wrong = any(source.spans[child].tag != "ControlLinearNode" for child in inside)
-        return "a list of ControlLinearNode objects" if wrong else ""
     pieces = [piece for piece in _COMMENT.split(source.text[span.tag_end : span.inner_end]) if piece.strip()]
     if inside or len(pieces) > 1:
         return "a value"
@@ -332,9 +329,6 @@ _OF_TOOLS = {
     "CMC_Joint": dict.fromkeys(["on", "wrt_body", "express_body", "active", "coordinate"], "text")
     | dict.fromkeys(["weight", "kp", "kv", "ka", "r0", "r1", "r2"], "numbers")
     | {"limit": "number"},
-    "ControlLinear": dict.fromkeys(["is_model_control", "extrapolate", "filter_on", "use_steps"], "text")
-    | dict.fromkeys(["default_min", "default_max", "kp", "kv"], "number")
-    | dict.fromkeys(["x_nodes", "min_nodes", "max_nodes"], "nodes"),
 }
 """Classes that are no part of a model and that old files hold defaults of: how OpenSim reads what they say."""
 _KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag"))

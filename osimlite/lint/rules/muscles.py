@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.placement import Vector, default_poses, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 
 PENNATION = Threshold("largest-pennation", math.pi / 2, "rad", "fibres that turn as far pull on nothing")
 SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fibre starts shorter")
@@ -130,12 +134,91 @@ def control_below_activation(subject: Subject, found: Found) -> None:
     ```
     """
     for muscle in subject.named("Muscle"):
-        if "minimum_activation" not in type(muscle).model_fields or "min_control" not in muscle.model_fields_set:
-            continue
-        if muscle.min_control < muscle.minimum_activation:
+        if muscle.min_control < getattr(muscle, "minimum_activation", -math.inf):
             found(
                 f"min_control of {called(muscle)} is {quantity(muscle.min_control)}, less than its minimum_activation, "
                 f"{quantity(muscle.minimum_activation)}: OpenSim refuses the model",
                 muscle,
-                tag="min_control",
+                tag="min_control" if "min_control" in muscle.model_fields_set else "minimum_activation",
             )
+
+
+@rule("OSIM623", "out-of-reach", severity=WARNING, thresholds=(LONGEST,))
+def out_of_reach(subject: Subject, found: Found) -> None:
+    """The path of a muscle leaves its fibres no length that they could have.
+
+    ## What it does
+    Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer than it by more than 2
+    optimal fibre lengths. Paths that wrap around surfaces count as if they were straight, which is the least they can
+    be; those through moving points, or points whose place cannot be told without a simulation, are not looked at.
+
+    ## Why is this bad
+    A slack muscle bears no force, and fibres are torn at twice their optimal length. OpenSim finds no equilibrium of
+    such muscles, or computes NaN; where it computes on, the forces are those of no muscle. Often the lengths are those
+    of another muscle, or were not scaled with the bones.
+
+    ## Example
+    ```xml
+    <Millard2012EquilibriumMuscle name="soleus">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+        <tendon_slack_length>0.03</tendon_slack_length>
+    </Millard2012EquilibriumMuscle>
+    ```
+
+    ## Use instead
+    ```xml
+    <Millard2012EquilibriumMuscle name="soleus">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+        <tendon_slack_length>0.34</tendon_slack_length>
+    </Millard2012EquilibriumMuscle>
+    ```
+    """
+    longest = subject.config.value_of(LONGEST)
+    for muscle in subject.named("Muscle"):
+        path, slack, optimal = muscle.geometry_path, muscle.tendon_slack_length, muscle.optimal_fiber_length
+        points = _in_ground(subject, path) if isinstance(path, GeometryPath) and optimal > 0 else []
+        if len(points) < 2:
+            continue
+        length = sum(math.dist(*pair) for pair in pairwise(points))
+        tells = f"the path of {called(muscle)} is {length:.4g} m long in the default pose"
+        if length < slack and not path.path_wrap_set.objects:
+            found(f"{tells}, less than its tendon_slack_length, {slack:.4g} m", muscle, tag="tendon_slack_length")
+        elif (ratio := (length - slack) / optimal) > longest:
+            found(
+                f"{tells}, which leaves its fibres {ratio:.3g} optimal lengths beyond the slack tendon",
+                muscle,
+                tag="optimal_fiber_length",
+            )
+
+
+def _in_ground(subject: Subject, path: GeometryPath) -> list[Vector]:
+    """Where the points of a path are in the default pose that belong to it there; none if one of them is not known."""
+    poses, places = default_poses(subject), []
+    for point in path.path_point_set.objects:
+        placed = on_base(subject, subject.target_of(point, "socket_parent_frame"))
+        if not isinstance(point, PathPoint) or placed is None or id(placed[0]) not in poses:
+            return []
+        if isinstance(point, ConditionalPathPoint):
+            coordinate = subject.target_of(point, "socket_coordinate")
+            if not isinstance(coordinate, Coordinate):
+                return []
+            if not point.range[0] <= coordinate.default_value <= point.range[1]:
+                continue
+        places.append(poses[id(placed[0])].of(placed[1].of(point.location)))
+    return places

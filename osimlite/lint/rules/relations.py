@@ -6,12 +6,34 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
+from osimlite.forces.muscle_curves import (
+    active_force_length,
+    fiber_compressive_force_cos_pennation,
+    fiber_compressive_force_length,
+    fiber_force_length,
+    force_velocity,
+    tendon_force_length,
+)
 from osimlite.lint.consequences import REFUSED
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.rules.domains import outside
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
-from osimlite.schema.base import Object
-from osimlite.text import listed
+from osimlite.lint.words import called, quantity, times
+from osimlite.schema.functions import (
+    Constant,
+    ExpressionBasedFunction,
+    GCVSpline,
+    LinearFunction,
+    MultiplierFunction,
+    MultivariatePolynomialFunction,
+    PiecewiseConstantFunction,
+    PiecewiseLinearFunction,
+    PolynomialFunction,
+    SimmSpline,
+    Sine,
+    StepFunction,
+)
+from osimlite.schema.tree import is_a
 
 
 @rule("OSIM209", "contradicting-values", severity=ERROR)
@@ -19,8 +41,9 @@ def contradicting_values(subject: Subject, found: Found) -> None:
     """Numbers of one object contradict each other.
 
     ## What it does
-    Reports curves of muscles whose numbers make no curve, a torus without a hole, and `optimal_force` of muscles that
-    have only `max_isometric_force`.
+    Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or cannot compute with
+    (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of 1, `optimal_force` beside
+    `max_isometric_force`), a torus without a hole, and a path given by functions that do not take its coordinates.
 
     ## Why is this bad
     OpenSim refuses the model, and its message names neither the muscle nor the property.
@@ -75,12 +98,14 @@ def contradicting_values(subject: Subject, found: Found) -> None:
     </PathSpring>
     ```
     """
+    strange = {id(item) for item, *_ in outside(subject)}
     for cls, items in subject.by_class.items():
-        for base in cls.__mro__:
-            for item in items if base.__name__ in _RELATIONS else ():
-                for tag, message in _RELATIONS[base.__name__](item):
-                    owner = "" if item.name else f" of {called(subject.owner(item))}"
-                    found(f"{called(item)}{owner}: {message}: {REFUSED}", item, tag=tag)
+        for relation in [_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS]:
+            for item in [item for item in items if id(item) not in strange]:
+                owner = subject.owner(item)
+                for tag, message in relation(item, owner):
+                    of = "" if item.name and item is owner else f" of {called(owner)}"
+                    found(f"{called(item)}{of}: {message}: {REFUSED}", item, tag=tag)
 
 
 @rule("OSIM510", "controls-swapped", severity=WARNING)
@@ -121,108 +146,132 @@ def controls_swapped(subject: Subject, found: Found) -> None:
             )
 
 
-_Contradiction = tuple[str, str]
+_Contradiction = tuple[str | None, str]
 """The property that is best changed, and what is wrong."""
+_Relation = Callable[[Any, Any], Iterator[_Contradiction]]
+"""Gives the contradictions of an object, from it and the component that it belongs to."""
 
 
-def _active_force_length(curve: Any) -> Iterator[_Contradiction]:
-    low, middle, high = "min_norm_active_fiber_length", "transition_norm_fiber_length", "max_norm_active_fiber_length"
-    turn = curve.transition_norm_fiber_length
-    if getattr(curve, low) >= turn:
-        yield low, f"{low}, {quantity(getattr(curve, low))}, should be less than {middle}, {quantity(turn)}"
-    if getattr(curve, high) <= 1:
-        yield high, f"{high}, {quantity(getattr(curve, high))}, should be more than 1"
-    if turn >= 1:
-        yield middle, f"{middle}, {quantity(turn)}, should be less than 1"
-    elif curve.shallow_ascending_slope >= (steepest := 1 / (1 - turn)):
+def _is_classic(muscle: Any) -> bool:
+    """Whether it is an equilibrium muscle without damping, whose equations are singular where no force is left."""
+    return not muscle.ignore_tendon_compliance and muscle.fiber_damping < 0.001
+
+
+def _curve(make: Callable[..., object]) -> _Relation:
+    """The contradiction of a curve of a muscle; `make` takes the properties of the curve and raises what is wrong."""
+
+    def contradiction(curve: Any, owner: Any) -> Iterator[_Contradiction]:
+        used = {name: getattr(curve, name) for name in type(curve).__annotations__}
+        if not all(value is None or math.isfinite(value) for value in used.values()):
+            return
+        if is_a(owner, "Millard2012EquilibriumMuscle"):
+            # OpenSim overwrites what would make its equations singular, or would keep them from that.
+            overwritten = dict.fromkeys(("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0)
+            if _is_classic(owner):
+                overwritten = {"minimum_value": max(used.get("minimum_value", 0.0), 0.1)}
+            used |= {name: overwritten[name] for name in used.keys() & overwritten.keys()}
+        try:
+            make(*used.values())
+        except ValueError as error:
+            word = str(error).split()[1].rstrip(",")
+            yield word if word in used else None, str(error)
+
+    return contradiction
+
+
+def _thelen(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
+    for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
+        if getattr(muscle, flag):
+            yield flag, f"{flag} is true, which this class does not have"
+    if muscle.fv_linear_extrap_threshold <= (least := 1 / muscle.Flen):
+        yield "fv_linear_extrap_threshold", f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}"
+    yield from _activation(muscle, owner)
+
+
+def _millard(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
+    if _is_classic(muscle) and muscle.minimum_activation < 0.01:
         yield (
-            "shallow_ascending_slope",
-            f"shallow_ascending_slope, {quantity(curve.shallow_ascending_slope)}, should be less than "
-            f"1/(1 - {middle}), {steepest:.4g}",
+            "minimum_activation",
+            f"its minimum_activation, {quantity(muscle.minimum_activation)}, is below 0.01, which an elastic tendon "
+            "without fiber damping needs",
         )
+    if muscle.force_velocity_curve.concentric_slope_near_vmax == 1:
+        yield None, "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1"
+    yield from _activation(muscle, owner)
 
 
-def _force_velocity(curve: Any) -> Iterator[_Contradiction]:
-    if curve.isometric_slope <= 1:
-        yield "isometric_slope", f"isometric_slope, {quantity(curve.isometric_slope)}, should be more than 1"
-    if curve.concentric_slope_near_vmax >= 1:
-        slope = quantity(curve.concentric_slope_near_vmax)
-        yield "concentric_slope_near_vmax", f"concentric_slope_near_vmax, {slope}, should be less than 1"
-    limit = curve.max_eccentric_velocity_force_multiplier - 1
-    if curve.eccentric_slope_near_vmax >= limit > 0:
-        yield (
-            "eccentric_slope_near_vmax",
-            f"eccentric_slope_near_vmax, {quantity(curve.eccentric_slope_near_vmax)}, should be less than "
-            f"max_eccentric_velocity_force_multiplier - 1, {limit:.4g}",
-        )
+def _activation(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
+    if muscle.minimum_activation == 1:
+        yield "minimum_activation", "its minimum_activation is not less than 1"
 
 
-def _fiber_force_length(curve: Any) -> Iterator[_Contradiction]:
-    start, end = curve.strain_at_zero_force, curve.strain_at_one_norm_force
-    if start >= end:
-        yield (
-            "strain_at_zero_force",
-            f"strain_at_zero_force, {quantity(start)}, should be less than strain_at_one_norm_force, {quantity(end)}",
-        )
-        return
-    yield from _all_or_none(curve, "stiffness_at_low_force", "stiffness_at_one_norm_force", "curviness")
-    mean = 1 / (end - start)
-    chord = f"1/(strain_at_one_norm_force - strain_at_zero_force), {mean:.4g}"
-    low, high = curve.stiffness_at_low_force, curve.stiffness_at_one_norm_force
-    if low is not None and low >= mean:
-        yield "stiffness_at_low_force", f"stiffness_at_low_force, {quantity(low)}, should be less than {chord}"
-    if high is not None and high <= mean:
-        yield (
-            "stiffness_at_one_norm_force",
-            f"stiffness_at_one_norm_force, {quantity(high)}, should be more than {chord}",
-        )
-
-
-def _tendon_force_length(curve: Any) -> Iterator[_Contradiction]:
-    yield from _all_or_none(curve, "stiffness_at_one_norm_force", "norm_force_at_toe_end", "curviness")
-    strain, stiffness, toe = (
-        curve.strain_at_one_norm_force,
-        curve.stiffness_at_one_norm_force,
-        curve.norm_force_at_toe_end,
-    )
-    if stiffness is not None and strain > 0 and stiffness <= 1 / strain:
-        yield (
-            "stiffness_at_one_norm_force",
-            f"stiffness_at_one_norm_force, {quantity(stiffness)}, should be more than 1/strain_at_one_norm_force, "
-            f"{1 / strain:.4g}",
-        )
-    if toe is not None and toe >= 1:
-        yield "norm_force_at_toe_end", f"norm_force_at_toe_end, {quantity(toe)}, should be less than 1"
-
-
-def _all_or_none(curve: Any, *names: str) -> Iterator[_Contradiction]:
-    given = [name for name in names if getattr(curve, name) is not None]
-    missing = [name for name in names if name not in given]
-    if given and missing:
-        yield given[0], f"{listed(given)} need{'s' * (len(given) == 1)} {listed(missing)} beside"
-
-
-def _torus(torus: Any) -> Iterator[_Contradiction]:
+def _torus(torus: Any, owner: Any) -> Iterator[_Contradiction]:
     inner, outer = torus.inner_radius, torus.outer_radius
-    if 0 < outer <= inner < math.inf:
+    if outer <= inner < math.inf:
         yield (
             "outer_radius",
             f"outer_radius, {quantity(outer, 'm')}, should be more than inner_radius, {quantity(inner, 'm')}",
         )
 
 
-def _no_optimal_force(muscle: Any) -> Iterator[_Contradiction]:
+def _no_optimal_force(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
     if "optimal_force" in muscle.model_fields_set:
         yield "optimal_force", "optimal_force may not be given, only max_isometric_force"
 
 
-_RELATIONS: Final[dict[str, Callable[[Object], Iterator[_Contradiction]]]] = {
-    "ActiveForceLengthCurve": _active_force_length,
+def _function_based_path(path: Any, owner: Any) -> Iterator[_Contradiction]:
+    coordinates = path.coordinate_paths
+    if not coordinates:
+        yield None, "coordinate_paths is empty"
+    for name in sorted({name for name in coordinates if coordinates.count(name) > 1}):
+        yield "coordinate_paths", f"coordinate_paths names '{name}' twice"
+    arms, count = path.moment_arm_functions, len(coordinates)
+    if arms and len(arms) != count:
+        yield "moment_arm_functions", f"moment_arm_functions has {len(arms)} functions for {times(count, 'coordinate')}"
+    functions = [("length_function", path.length_function, count)]
+    functions += [("moment_arm_functions", arm, count) for arm in arms]
+    functions.append(("lengthening_speed_function", path.lengthening_speed_function, 2 * count))
+    for tag, function, wanted in functions:
+        found = _arguments(function)
+        if found is not None and found != wanted:
+            yield tag, f"a function of its {tag} takes {times(found, 'argument')} instead of {wanted}"
+
+
+def _arguments(function: Any) -> int | None:
+    """How many arguments OpenSim says that a function takes; None where that is not known."""
+    if isinstance(function, MultiplierFunction):
+        return _arguments(function.function)
+    if isinstance(function, MultivariatePolynomialFunction):
+        return function.dimension
+    if isinstance(function, LinearFunction):
+        return len(function.coefficients) - 1
+    if isinstance(function, ExpressionBasedFunction):
+        return len(function.variables)
+    return 0 if isinstance(function, Constant) else 1 if isinstance(function, _OF_ONE) else None
+
+
+_OF_ONE = (
+    PiecewiseConstantFunction,
+    PiecewiseLinearFunction,
+    PolynomialFunction,
+    SimmSpline,
+    GCVSpline,
+    Sine,
+    StepFunction,
+)
+
+_RELATIONS: Final[dict[str, _Relation]] = {
+    "ActiveForceLengthCurve": _curve(active_force_length),
     "DeGrooteFregly2016Muscle": _no_optimal_force,
-    "FiberForceLengthCurve": _fiber_force_length,
-    "ForceVelocityCurve": _force_velocity,
+    "FiberCompressiveForceCosPennationCurve": _curve(fiber_compressive_force_cos_pennation),
+    "FiberCompressiveForceLengthCurve": _curve(fiber_compressive_force_length),
+    "FiberForceLengthCurve": _curve(fiber_force_length),
+    "ForceVelocityCurve": _curve(force_velocity),
+    "FunctionBasedPath": _function_based_path,
     "MeyerFregly2016Muscle": _no_optimal_force,
-    "TendonForceLengthCurve": _tendon_force_length,
+    "Millard2012EquilibriumMuscle": _millard,
+    "TendonForceLengthCurve": _curve(tendon_force_length),
+    "Thelen2003Muscle": _thelen,
     "WrapTorus": _torus,
 }
 """What OpenSim 4.6 refuses, measured like the consequences of single numbers."""

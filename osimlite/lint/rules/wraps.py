@@ -1,0 +1,204 @@
+"""OSIM616 and on: paths that wrap around surfaces."""
+
+from __future__ import annotations
+
+import math
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.placement import Pose, Vector, fixed, on_base
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, times
+from osimlite.schema.base import Component
+from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
+
+
+@rule("OSIM616", "swallowed-point", severity=WARNING)
+def swallowed_point(subject: Subject, found: Found) -> None:
+    """A point of a path lies inside a surface that the path wraps around.
+
+    ## What it does
+    Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an ellipsoid, and inside it,
+    within the `range` of the wrap.
+
+    ## Why is this bad
+    OpenSim lets no piece of a path wrap that begins or ends inside: the path goes straight through the surface, in
+    every pose and without a message. A point may be inside by less than a millimetre, after scaling for instance.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+        <WrapObjectSet name="wrapobjectset">
+            <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
+        </WrapObjectSet>
+    </Body>
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>0.02 0 0.02</location> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+            <PathWrapSet>
+                <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
+            </PathWrapSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+        <WrapObjectSet name="wrapobjectset">
+            <objects> <WrapSphere name="condyle"> <radius>0.028</radius> </WrapSphere> </objects>
+        </WrapObjectSet>
+    </Body>
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>0.02 0 0.02</location> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+            <PathWrapSet>
+                <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
+            </PathWrapSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+    """
+    for path in subject.each(GeometryPath):
+        points = path.path_point_set.objects
+        for wrap in path.path_wrap_set.objects:
+            surface = subject.target_of(wrap, "wrap_object")
+            base = _base(subject, surface) if isinstance(surface, WrapObject) and surface.active else None
+            if base is None:
+                continue
+            assert isinstance(surface, WrapObject)
+            body, pose = base
+            first, last = wrap.range
+            for point in points[max(first, 1) - 1 : last if last > 0 else None]:
+                placed = on_base(subject, subject.target_of(point, "socket_parent_frame"))
+                if not isinstance(point, PathPoint) or placed is None or placed[0] is not body:
+                    continue
+                depth = _depth(surface, pose.inverse().of(placed[1].of(point.location)))
+                if depth > 0:
+                    owner = subject.tree.parent_of(path)
+                    found(
+                        f"{called(point)} of {called(owner or path)} is {1000 * depth:.3g} mm inside "
+                        f"{called(surface)}: the path does not wrap between it and its neighbours",
+                        point,
+                        tag="location",
+                    )
+
+
+@rule("OSIM617", "wrap-range", severity=WARNING)
+def wrap_range(subject: Subject, found: Found) -> None:
+    """The range of a wrap holds no piece of the path.
+
+    ## What it does
+    Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends beyond the last
+    point is an error.
+
+    ## Why is this bad
+    The path never wraps around the surface; where the range ends before it begins, OpenSim leaves out all wraps of the
+    path that follow as well. Beyond the last point it fails as soon as it computes a length, and its message names no
+    wrap. Points count from 1, and -1 stands for either end.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+        <WrapObjectSet name="wrapobjectset">
+            <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
+        </WrapObjectSet>
+    </Body>
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>0.05 0 0</location> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+            <PathWrapSet>
+                <objects>
+                    <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
+                </objects>
+            </PathWrapSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+        <WrapObjectSet name="wrapobjectset">
+            <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
+        </WrapObjectSet>
+    </Body>
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>0.05 0 0</location> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+            <PathWrapSet>
+                <objects>
+                    <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>1 2</range> </PathWrap>
+                </objects>
+            </PathWrapSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+    """
+    for path in subject.each(GeometryPath):
+        count = len(path.path_point_set.objects)
+        for wrap in path.path_wrap_set.objects:
+            first, last = wrap.range
+            tells = f"the range of {called(wrap)} of {called(subject.tree.parent_of(path) or path)}, {first} {last},"
+            start, end = max(first, 1), last if last > 0 else count
+            if end > count:
+                fate = "OpenSim fails when it computes its length"
+                found(
+                    f"{tells} ends beyond the {times(count, 'point')} of the path: {fate}",
+                    wrap,
+                    tag="range",
+                    severity=ERROR,
+                )
+            elif start >= end:
+                others = " and OpenSim leaves out the wraps after it" if start > end else ""
+                found(f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range")
+
+
+def _base(subject: Subject, surface: WrapObject) -> tuple[Component, Pose] | None:
+    """The body that a surface is fixed to, and where it is on it."""
+    holder = subject.tree.parent_of(surface)
+    placed = on_base(subject, subject.tree.parent_of(holder) if holder is not None else None)
+    return placed and (placed[0], placed[1].then(fixed(surface.xyz_body_rotation, surface.translation)))
+
+
+def _depth(surface: WrapObject, place: Vector) -> float:
+    """How deep a place in the frame of a surface is inside it, m; 0 where OpenSim would let a path wrap."""
+    x, y, z = place
+    match surface:
+        case WrapCylinder():
+            return surface.radius - math.hypot(x, y)
+        case WrapSphere():
+            return surface.radius - math.hypot(x, y, z)
+        case WrapEllipsoid() if min(surface.dimensions) > 0:
+            size = math.hypot(*(part / half for part, half in zip(place, surface.dimensions, strict=True)))
+            if size * size < 1 - 1e-4:
+                return math.hypot(x, y, z) * (1 / size - 1) if size > 0 else min(surface.dimensions)
+    return 0.0
