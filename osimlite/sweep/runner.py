@@ -238,12 +238,13 @@ class Runner:
             infos = [simulation.mechanism.coordinates[place] for place in order]
             may = [k for k, info in enumerate(infos) if info.prescribed is None and not info.locked]
             row = starts[number].tolist()
+            auxiliary = dict(zip(simulation.state.paths, simulation.state.auxiliary(row), strict=True))
             try:
                 trajectory = simulation.run(
                     plan.to,
                     accuracy=plan.accuracy,
                     report_interval=plan.report_interval or plan.to,
-                    initial={infos[k].path: row[k] for k in may},
+                    initial={infos[k].path: row[k] for k in may} | auxiliary,
                     initial_speeds={infos[k].path: row[count + k] for k in may},
                 )
             except OsimliteError as error:
