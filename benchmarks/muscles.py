@@ -2,11 +2,11 @@
 
     python benchmarks/muscles.py [NAME=FILE ...]
 
-Without files: models of the shared corpus, if that stands beside the repository. An evaluation is that of the derivative
-of a state, in turn of 16 poses; OpenSim's goes through its Python binding, which adds about a microsecond. Motions start
-from the equilibrium of the muscles and go 0.1 s at accuracy 1e-5. "apart" is the largest difference of a coordinate (rad
-or m) between the programs at the end of the motion, "steps" how many each took. "First use" is a new process with an
-empty cache of machine code, then one that has it, less what reading the model takes.
+Without files: models of the shared corpus, if that stands beside the repository. An evaluation is that of the
+derivative of a state, in turn of 16 poses; OpenSim's goes through its Python binding, which adds about a microsecond.
+Motions start from the equilibrium of the muscles and go 0.1 s at accuracy 1e-5. "apart" is the largest difference of a
+coordinate (rad or m) between the programs at the end of the motion, "steps" how many each took. "First use" is a new
+process with an empty cache of machine code, then one that has it, less what reading the model takes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import opensim
@@ -32,6 +32,7 @@ from _corpus import CORPUS
 from _pair import Pair, pair, report
 from osimlite.simulation import Simulation
 from osimlite.simulation.kernels import layout
+from osimlite.simulation.system import System
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
 from osimlite.sweep.sampling import samples
@@ -114,10 +115,11 @@ def evaluations(simulation: Simulation) -> Callable[[], None]:
     states = np.repeat(start[None], POSES, axis=0)
     count = len(simulation.state.order)
     states[:, :count] += poses(count)
+    engine = cast(System, simulation.engine)
 
     def run() -> None:
         for y in states:
-            simulation.engine.realize(0.0, y, layout.ACCELERATION_STAGE)
+            engine.realize(0.0, y, layout.ACCELERATION_STAGE)
 
     return run
 
@@ -191,7 +193,7 @@ def their_moment_arms(model: Any) -> Callable[[], None]:
 
 
 def equilibria(simulation: Simulation) -> Callable[[], object]:
-    y = np.array(simulation.initial_state({}, {}))
+    y = simulation.initial_state({}, {})
     return lambda: simulation.engine.equilibrated(0.0, y)
 
 
