@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from osimlite.text import brief, visible
 
@@ -75,9 +75,14 @@ class MissingNameError(ModelError, AttributeError):
 
 
 class SimulationError(OsimliteError):
-    """The motion cannot be computed any further."""
+    """The motion cannot be computed any further.
+
+    Attributes:
+        trajectory: what was recorded up to there, an :class:`osimlite.simulation.Trajectory`; None before any step.
+    """
 
     exit_code = 1
+    trajectory: Any = None
 
 
 class SettingError(SimulationError):

@@ -65,13 +65,14 @@ def simulate(
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
-    Nothing is written if the simulation fails. Ctrl-C ends it and keeps what was recorded, without pictures.
+    Where the motion cannot be computed any further, or Ctrl-C ends it, what was
+    recorded is kept, without pictures.
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """
     from osimlite._require import require
     from osimlite.document.reader import read
-    from osimlite.errors import OsimliteError
+    from osimlite.errors import OsimliteError, SimulationError
 
     if accuracy is not None and (fixed_step is not None or gui):
         raise OsimliteError("--accuracy does not go with fixed steps (--fixed-step, --gui); take one of them")
@@ -112,13 +113,17 @@ def simulate(
                     controls=words_to_controls(controls) if controls else None,
                     progress=progress,
                 )
-        except Interrupted as stopped:
+        except (Interrupted, SimulationError) as stopped:
             trajectory = stopped.trajectory
+            if trajectory is None:
+                raise
+            is_failure = isinstance(stopped, SimulationError)
+            how = "stopped" if is_failure else "interrupted"
             # After many steps, it takes a while to work out what is written.
-            complain(
-                f"interrupted at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'"
-            )
+            complain(f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'")
             _told(trajectory, _write(model, trajectory, results, plot=False, animate=False)).show()
+            if is_failure:
+                raise
             raise typer.Exit(130) from None
         files = _write(model, trajectory, results, plot=plot, animate=animate)
         _told(trajectory, files).show()

@@ -54,8 +54,9 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
         Interrupted: Ctrl-C ended the motion; it has the trajectory up to there.
         ModelError: the model is not a mechanism, or a name does not exist.
         UnsupportedError: the model has a joint, constraint or force that cannot be computed.
-        SimulationError: the motion cannot be computed any further, no pose or speeds fulfil the constraints with what
-            was set, or a coordinate that was set is locked or prescribed.
+        SimulationError: the motion cannot be computed any further (`trajectory` is what was recorded up to there), no
+            pose or speeds fulfil the constraints with what was set, or a coordinate that was set is locked or
+            prescribed.
         SettingError: there is no such option, or a setting has no meaning.
         MissingDependency: what the engine works with is not installed.
     """
@@ -163,7 +164,7 @@ class Simulation:
         recorder, stepper, states = self._moved(y, settings, times, chosen.progress)
         times = times[: len(states)]
         if times[-1] < stepper.time:
-            # Where Ctrl-C ended it, which somebody may want to go on from.
+            # Where it was ended, which somebody may want to go on from.
             times, states = [*times, stepper.time], [*states, stepper.state]
         if not isfinite(sum(states[-1])):
             raise SimulationError("the motion is not finite any more; ask for more accuracy")
@@ -180,7 +181,10 @@ class Simulation:
             **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }
         trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall, controls)
-        if stepper.interrupted:
+        if isinstance(stepper.ended, SimulationError):
+            stepper.ended.trajectory = trajectory if stepper.taken else None
+            raise stepper.ended
+        if stepper.ended is not None:
             raise Interrupted(trajectory)
         return trajectory
 

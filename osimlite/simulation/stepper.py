@@ -51,10 +51,10 @@ class Stepper(ABC):
         derivative: f(time, state).
         evaluations: calls of f so far.
         taken: steps taken so far.
-        interrupted: whether Ctrl-C ended a table.
+        ended: what ended a table before its last time, Ctrl-C or an error of the motion.
     """
 
-    interrupted = False
+    ended: KeyboardInterrupt | SimulationError | None = None
 
     def __init__(
         self,
@@ -123,7 +123,7 @@ class Stepper(ABC):
             yield t, self.at(t)
 
     def table(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
-        """The states at times that do not decrease (s), one row for each, or for those reached when Ctrl-C came.
+        """The states at times that do not decrease (s), one row for each, or for those reached when it was `ended`.
 
         Args:
             times: of the rows, s.
@@ -137,9 +137,9 @@ class Stepper(ABC):
                     if progress is not None:
                         progress(self.time, self.time - self._previous[0])
                 rows.append(self.at(t))
-        except KeyboardInterrupt:
-            self.interrupted = True
-            # It may have come after a step and before its rows.
+        except (KeyboardInterrupt, SimulationError) as ended:
+            self.ended = ended
+            # Ctrl-C may have come after a step and before its rows.
             rows += [self.at(t) for t in times[len(rows) : bisect_right(times, self.time)]]
         return rows
 
@@ -183,8 +183,8 @@ class Stepper(ABC):
         for index, value in enumerate(derivative):
             if not isfinite(value):
                 raise IntegrationError(
-                    f"The derivative of {self._name(index)} is {value} at t = {t:.9g} s; check the masses, "
-                    "inertias and force parameters that it depends on.",
+                    f"The derivative of {self._name(index)} is {value} at t = {t:.9g} s; check the masses, inertias "
+                    "and parameters of forces that it depends on, of a muscle also whether it starts in equilibrium.",
                     t,
                     index,
                 )

@@ -29,7 +29,7 @@ def integration_summary(stepper: Stepper, settings: Mapping[str, Any], wall: flo
         "attempted_steps": stepper.attempted,
         "evaluations": stepper.evaluations,
         "wall_time_s": wall,
-        "interrupted": stepper.interrupted,
+        "interrupted": stepper.ended is not None,
         "time_reached_s": stepper.time,
     }
 

@@ -103,7 +103,6 @@ def test_fixed_step(walker, tmp_path):
         (["--set", "RHip_rz=3cm"], 2, "deg or rad"),
         (["--set", "platform_rz=0"], 1, "is locked"),
         (["--to", "-1"], 2, "positive time"),
-        (["--fixed-step", "0.1"], 1, "shorter fixed step"),
         (["--fixed-step", "0.1", "--accuracy", "1e-3"], 2, "take one of them"),
         (["--engine", "bulet"], 2, "did you mean 'bullet'"),
         (["--gui"], 1, "no screen"),
@@ -116,6 +115,15 @@ def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, argument
     assert found == code and out == ""
     assert len(err.splitlines()) == 1 and words in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_failure_on_the_way_keeps_what_was_recorded(walker, tmp_path):
+    code, out, err = run("simulate", walker, "--fixed-step", "0.1", "-o", "r", folder=tmp_path)
+    kept, said = err.splitlines()
+    assert code == 1 and "stopped at" in kept and "recorded goes into 'r'" in kept and "shorter fixed step" in said
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert read_sto(tmp_path / "r" / "states.sto").times[-1] == summary["time_reached_s"] > 0.0
+    assert "steps" in out
 
 
 def test_unsupported_force(walker, tmp_path):

@@ -162,6 +162,24 @@ def test_what_was_recorded_before_ctrl_c_is_kept(pendulum, engine, choices, afte
         assert part.summary["energy_J"]["end"]["total"] == part.energy["total"][-1]
 
 
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+@pytest.mark.parametrize("choices", [{"accuracy": 1e-6}, {"fixed_step": 7e-3}])
+def test_what_was_recorded_before_a_failure_is_kept(pendulum, engine, choices):
+    """A force that is no number beyond half a radian."""
+    (angle,) = pendulum.components(Coordinate)
+    pendulum.add(osimlite.ExpressionBasedCoordinateForce(coordinate=angle.name, expression="sqrt(0.5-q)"))
+    with Simulation(pendulum, engine) as simulation:
+        with pytest.raises(SimulationError) as failed:
+            simulation.run(2.0, initial={angle.name: 0.0}, initial_speeds={angle.name: 3.0}, **choices)
+        part = failed.value.trajectory
+        assert 0.0 < part.times[-1] < 2.0 and len(part.times) == len(part.values) > 3
+        assert 0.4 < part.values[-1, 0] < 0.52
+        assert part.summary["interrupted"] is True and part.summary["time_reached_s"] == part.times[-1]
+        with pytest.raises(SimulationError) as failed:
+            simulation.run(2.0, initial={angle.name: 0.6}, **choices)
+        assert failed.value.trajectory is None
+
+
 def test_ctrl_c_before_the_first_step(pendulum, monkeypatch):
     """Within machine code, which is heard only when it ends."""
     with Simulation(pendulum, "compiled") as simulation:

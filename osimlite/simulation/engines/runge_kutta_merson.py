@@ -8,7 +8,7 @@ from math import inf, isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from osimlite.errors import SettingError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP, shortest_step, weight
 from osimlite.simulation.kernels import layout, merson
@@ -97,8 +97,8 @@ class RungeKuttaMerson(Stepper):
             for step in self._calls(batch):
                 if progress is not None:
                     progress(self.time, step)
-        except KeyboardInterrupt:
-            self.interrupted = True
+        except (KeyboardInterrupt, SimulationError) as ended:
+            self.ended = ended
         table: Any = batch.reports[0, : bisect_right(times, self.time)]
         return table  # type: ignore[no-any-return]
 
