@@ -4,7 +4,7 @@ A section is a corner: it leaves its first end along one line and reaches its se
 it is, the nearer it comes to where the lines meet (M. Millard et al., Journal of Biomechanical Engineering 135, 2013,
 appendix A). Along it, x and y are polynomials in u, from 0 to 1.
 
-A curve is numbers, for `curve_value`: HEAD of all, and SECTION of each section.
+A curve is numbers, for `curve_value`: HEAD of all, where each section ends, and SECTION of each.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ROUNDS, NEAR = 20, 3e-6
 
 def curve_size(sections: int) -> int:
     """How many numbers a curve of some sections has."""
-    return HEAD + SECTION * sections
+    return HEAD + (1 + SECTION) * sections
 
 
 def curve(points: Sequence[Point], curviness: Sequence[float]) -> list[float]:
@@ -39,7 +39,8 @@ def curve(points: Sequence[Point], curviness: Sequence[float]) -> list[float]:
         ValueError: the lines through two points do not meet in a corner between them.
     """
     sections = zip(points, points[1:], curviness, strict=False)
-    return [float(len(curviness)), *points[0], *points[-1], *(x for item in sections for x in _section(*item))]
+    numbers = [x for item in sections for x in _section(*item)]
+    return [float(len(curviness)), *points[0], *points[-1], *(x for x, _, _ in points[1:]), *numbers]
 
 
 @lru_cache(maxsize=1024)
@@ -109,9 +110,10 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
 
 def place_on(c: Sequence[float], x: float) -> tuple[int, float]:
     """The section of a curve that has x, by the place of its numbers, and u there: the root is unique."""
-    k, last = HEAD, HEAD + SECTION * (int(c[SECTIONS]) - 1)
-    while k < last and x >= c[k + SECTION]:
-        k += SECTION
+    count, number = int(c[SECTIONS]), 0
+    while number < count - 1 and x >= c[HEAD + number]:
+        number += 1
+    k = HEAD + count + SECTION * number
     rest = x - c[k + START]
     part = rest * c[k + SCALE]
     node = min(int(part), NODES - 1)
@@ -143,7 +145,7 @@ def curve_integral(c: Sequence[float], x: float) -> float:
     if off <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
     at, u = place_on(c, min(x, c[LAST]))
-    for k in range(HEAD, at, SECTION):
+    for k in range(HEAD + int(c[SECTIONS]), at, SECTION):
         total += _area(c, k, 1.0)
     total += _area(c, at, u)
     off = max(x - c[LAST], 0.0)

@@ -9,7 +9,7 @@ tendon slack length. The curves are those of :mod:`osimlite.forces.muscle_curves
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isnan, nan, sqrt
+from math import isnan, nan
 from typing import NamedTuple
 
 from osimlite.forces.bezier import curve_integral, curve_value
@@ -263,6 +263,6 @@ def imbalance(
     tendon, tendon_slope = curve_value(tendon_curve, (length - fiber * cos) / m.slack)
     borne = m.strength * (active * by_length) + m.strength * elastic
     sin = m.height / fiber
-    turn = sin * sin / sqrt(1.0 - sin * sin)
+    turn = sin * sin / cos
     along = m.strength * (active * active_slope + passive_slope) / m.optimal * cos + borne * turn / fiber
     return borne * cos - tendon * m.strength, along + tendon_slope * m.strength / m.slack * (cos + turn)

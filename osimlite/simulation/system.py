@@ -6,7 +6,7 @@ The stages are those of Simbody: where the links are (position), how they move (
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,7 @@ class System:
         self._controls = forces.controls
 
     def _bind(self) -> None:
+        self._equilibrate: Callable[[int], int] | None = None
         self._evaluate = self.program.code.bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
 
     def drive(self, controls: Controls) -> None:
@@ -105,7 +106,10 @@ class System:
             OsimliteError: the state has a wrong length, or a part in Python has raised.
         """
         self._set(t, y)
-        status = self.program.run(self._evaluate, stage)
+        return self._run(self._evaluate, stage)
+
+    def _run(self, function: Callable[..., int], *parts: Any) -> int:
+        status = self.program.run(function, *parts)
         if status == layout.FAILED:
             raise self.program.failures.pop()
         return status
@@ -146,20 +150,23 @@ class System:
         Raises:
             SimulationError: a force has no equilibrium, or the rates of coordinates are not defined there.
         """
-        count = self.structure[layout.EQUILIBRIA]
-        if not count:
+        if not self.structure[layout.EQUILIBRIA]:
             return list(y)
-        equilibrate = self.program.equilibrate
+        code, ints, room = self.program.code, self.program.ints, (self._w, self._y, self._f)
+        if self._equilibrate is None:
+            self.program.link_equilibria()
+            self._equilibrate = code.bound("equilibrate", ints, self.numbers, *room)
         self._set(t, y)
-        x = self.numbers if numbers is None else numbers
-        status = self.program.run(equilibrate, self.program.ints, x, self._w, self._y, self._f, layout.VELOCITY_STAGE)
+        if numbers is None:
+            status = self._run(self._equilibrate, layout.VELOCITY_STAGE)
+        else:
+            status = self._run(code.entry("equilibrate"), ints, numbers, *room, layout.VELOCITY_STAGE)
+        if status == layout.UNSOLVED:
+            place = self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * int(self._f[0])
+            muscle = self._told(self.structure[place + 1])
+            raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
         if status != layout.OK:
             raise self.refusal(status, t, y)
-        for number in np.flatnonzero(self._f[:count]).tolist():
-            place = self.structure[self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * number + 1]
-            raise SimulationError(
-                f"no equilibrium was found of {self._told(place)}; start elsewhere, or without an equilibrium"
-            )
         row: list[float] = self._y.tolist()
         return row
 

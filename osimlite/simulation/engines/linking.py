@@ -6,7 +6,7 @@ import ctypes
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import cache, cached_property, lru_cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from inspect import signature
 from typing import Any
@@ -197,13 +197,11 @@ class Program:
         self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
         self._kept.append(kept)
 
-    @cached_property
-    def equilibrate(self) -> Callable[..., int]:
-        """What brings states into equilibrium, which is made ready when it is first asked for."""
+    def link_equilibria(self) -> None:
+        """Make ready what brings states into equilibrium, which not everybody asks for."""
         self.code.make_ready(("equilibrate", *dict.fromkeys(self._equilibria.values())))
         for place, kernel in self._equilibria.items():
-            self.ints[place] = self.code.address(kernel)
-        return self.code.entry("equilibrate")
+            self._link(place, kernel)
 
     def run(self, function: Callable[..., int], *parts: Any) -> int:
         """Call a function of the kernels.

@@ -48,6 +48,7 @@ from osimlite.simulation.kernels.layout import (
     ROW,
     SINGULAR_MASS,
     STATE_SIZE,
+    UNSOLVED,
     VELOCITY,
     VELOCITY_STAGE,
     WORK_COLUMN,
@@ -98,14 +99,19 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) ->
 
 
 def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
-    """Bring what can be into equilibrium: changes auxiliary states in y, and f[k] says how it went with the k-th."""
+    """Bring what can be into equilibrium: changes auxiliary states in y, also after one has failed.
+
+    Returns:
+        OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no equilibrium.
+    """
     status = call(s[LAWS], s, x, w, y, f, stage)
     if status != OK:
         return status
-    for k in range(s[EQUILIBRIA]):
+    for k in range(s[EQUILIBRIA] - 1, -1, -1):
         j = at(s, s[EQUILIBRIUM_AT] + EQUILIBRIUM_INTS * k)
-        f[k] = call(j[0], s, x, w, y, f, j[1])
-    return OK
+        if call(j[0], s, x, w, y, f, j[1]) != OK:
+            status, f[0] = UNSOLVED, k
+    return status
 
 
 def momentum(

@@ -136,7 +136,7 @@ def test_numbers_of_another_model_of_the_structure():
             "millard_damped",
             "tendon_force_length_curve",
             TendonForceLengthCurve(stiffness_at_one_norm_force=20.0),
-            "makes no curve: only some of stiffness, toe and curviness are given",
+            "makes no curve: its stiffness_at_one_norm_force and what follows it are neither all given nor all left",
         ),
         (
             "millard_damped",
