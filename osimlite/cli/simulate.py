@@ -130,8 +130,8 @@ def simulate(
         simulation.hold()
 
 
-PICTURES = {"coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}
-"""What --plot and --animate draw."""
+SOME = {"probes.sto", "coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}
+"""What not every simulation writes: --plot and --animate draw pictures."""
 
 
 def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool) -> list[Path]:
@@ -161,8 +161,8 @@ def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, an
                 written.append(draw(model, trajectory, beside / "animation.gif", progress=progress))
         for path in written:
             path.replace(folder / path.name)
-        # Pictures of an earlier simulation would be taken for those of this one.
-        for name in PICTURES - {path.name for path in written}:
+        # Files of an earlier simulation would be taken for those of this one.
+        for name in SOME - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
     except BaseException:
         shutil.rmtree(folder if is_new else beside, ignore_errors=True)

@@ -7,6 +7,7 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 from osimlite.simulation.engines.protocol import Engine
+from osimlite.simulation.probed import Moment, has_memory
 from osimlite.simulation.stepper import Stepper
 
 TIME_OF_EVENT = 1e-9
@@ -47,6 +48,8 @@ class Recorder:
         self._numbers: dict[int, tuple[int, ...]] = {0: ()}
         self._largest = [(0.0, 0.0)] * len(engine.contacts)
         self._stepper: Stepper | None = None
+        self._keeps_steps = has_memory(engine.probes)
+        self._steps: list[Moment] = []
 
     def begin(self, stepper: Stepper) -> None:
         """Note the state that the stepper starts from, just after it was made."""
@@ -54,6 +57,7 @@ class Recorder:
         self._start = self._last = stepper.time
         self._touching = self._loads[-1]
         self.initially = self._touching
+        self._steps = [(stepper.time, stepper.state)]
         self._note_forces(stepper.time)
 
     def observe(self, t: float, y: list[float]) -> None:
@@ -67,6 +71,13 @@ class Recorder:
         self._last = t
         if touching:
             self._note_forces(t)
+        if self._keeps_steps:
+            self._steps.append((t, y))
+
+    def steps(self) -> list[Moment]:
+        """The start and the ends of all steps, if a probe must know them; the start if not."""
+        self._catch_up()
+        return self._steps
 
     def largest_forces(self) -> dict[str, tuple[float, float]]:
         """By contact that ever touched, its largest force (N) and when that was (s)."""

@@ -26,6 +26,7 @@ from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.given_controls import driven, told
 from osimlite.simulation.options import Options
+from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
@@ -123,7 +124,8 @@ class Simulation:
         self.state = self.engine.state
         self.constraints = [item.name for item in constraints_on(self.mechanism, self.engine.order)[0]]
         paths = [f"{info.path}/{what}" for info in self.mechanism.coordinates for what in ("value", "speed")]
-        self.paths = in_model_order(model, paths + self.state.paths)
+        named = [variable.path for variable in self.state.variables if variable.is_named]
+        self.paths = in_model_order(model, paths + named)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._has_inertia = False
 
@@ -293,6 +295,10 @@ class Simulation:
         report = Report(
             lambda: (self.engine.columns, list(map(engine().force_records, times, states))),
             lambda: list(map(engine().energies, times, states)),
+            lambda: (
+                probe_labels(self.engine.probes),
+                list(probe_rows(engine(), list(zip(times, states, strict=True)), recorder.steps())),
+            ),
             summary,
         )
         values, speeds = self.state.histories(states)

@@ -32,11 +32,13 @@ class StateVariable:
         path: as OpenSim has it.
         start: where it starts.
         is_simbody: whether Simbody keeps it, in OpenSim: such states stand behind all others.
+        is_named: whether OpenSim has a name for it, so that it is in files of states.
     """
 
     path: str
     start: Start = 0.0
     is_simbody: bool = False
+    is_named: bool = True
 
 
 def states_of(element: Any) -> tuple[StateVariable, ...]:

@@ -19,6 +19,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.items import ForceElement
+from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
@@ -46,6 +47,7 @@ class System:
         placements: link of each body (-1 for ground), and the body's frame in it.
         contacts: names of the contacts, by number.
         columns: labels of the force records.
+        probes: of the model.
         loads: after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N,
             in ground) of contact i if it does.
 
@@ -70,6 +72,9 @@ class System:
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.program = Program(packed, best() if code is None else code, self.entries)
         self._items, self._owners = packed.items, packed.owners
+        places = {owner: place for place, owner in packed.owners.items()}
+        probes = [(item, places.get(k, 0)) for k, item in enumerate(forces.elements) if isinstance(item, DeclaredProbe)]
+        self.probes, self._probe_places = tuple(probe for probe, _ in probes), [place for _, place in probes]
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
@@ -200,6 +205,19 @@ class System:
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
 
     # ---------------------------------------------------------------------------------------------- reports
+    def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
+        """What each probe gives at a state, before its operation: one number for each of its labels."""
+        self.applied(t, y)
+        found = []
+        for probe, place in zip(self.probes, self._probe_places, strict=True):
+            if probe.kind.measure is not None:
+                found.append(list(probe.kind.measure(probe, self, t, y)))
+                continue
+            self.program.code.entry(probe.kind.name)(self.program.ints, self.numbers, self._w, self._y, self._f, place)
+            first = self.structure[place + layout.RECORD]
+            found.append(self._w[first : first + len(probe.reading.labels)].tolist())
+        return found
+
     def controls(self) -> list[float]:
         """The controls of all actuators after an evaluation, in the order of `Controls.names`."""
         first = self.structure[layout.WORK_CONTROL]

@@ -53,7 +53,8 @@ class Trajectory:
         self.speeds: Array = np.array(speeds, dtype=float).reshape(len(self.times), count)
         own = [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
         self.paths = tuple(paths) or (*own, *auxiliary)
-        ordered = sorted(auxiliary, key=self.paths.index)
+        rank = {path: number for number, path in enumerate(self.paths)}
+        ordered = sorted(auxiliary, key=lambda path: rank.get(path, len(rank)))
         self.auxiliary: dict[str, Array] = {path: np.array(auxiliary[path], dtype=float) for path in ordered}
         self._report: Report | None = report
 
@@ -65,7 +66,7 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         # What the report needs to work anything out cannot go to another process.
-        _ = self.forces, self.energy, self.summary
+        _ = self.forces, self.energy, self.probes, self.summary
         return {**self.__dict__, "_report": None}
 
     @cached_property
@@ -83,6 +84,18 @@ class Trajectory:
     def _force_table(self) -> tuple[Sequence[str], Array]:
         assert self._report is not None
         labels, rows = self._report.forces()
+        return labels, np.array(rows, dtype=float).reshape(len(self.times), len(labels))
+
+    @cached_property
+    def probes(self) -> Mapping[str, Array]:
+        """Columns (n,) of what the model's probes report, by the labels of OpenSim's ProbeReporter."""
+        labels, table = self._probe_table
+        return {label: table[:, place] for place, label in enumerate(labels)}
+
+    @cached_property
+    def _probe_table(self) -> tuple[Sequence[str], Array]:
+        assert self._report is not None
+        labels, rows = self._report.probes()
         return labels, np.array(rows, dtype=float).reshape(len(self.times), len(labels))
 
     @cached_property
@@ -139,8 +152,15 @@ class Trajectory:
         labels = ["PotentialEnergy" if label.endswith(".PotentialEnergy") else label for label in labels]
         return sto_text("ModelForces", self.times.tolist(), labels, table.tolist())
 
+    def probes_text(self) -> str:
+        """The text of probes.sto, with the labels of OpenSim's ProbeReporter; empty if there are no probes."""
+        labels, table = self._probe_table
+        return sto_text("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
+
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``states.sto``, ``forces.sto`` and ``summary.json`` into a folder, which is made if it is not there.
+        """Write ``states.sto``, ``forces.sto``, ``summary.json`` and, if the model has probes, ``probes.sto``.
+
+        The folder is made if it is not there.
 
         Raises:
             OsimliteError: the folder cannot be made or a file cannot be written.
@@ -149,6 +169,7 @@ class Trajectory:
         texts = {
             "states.sto": self.states_text(),
             "forces.sto": self.forces_text(),
+            **({"probes.sto": text} if (text := self.probes_text()) else {}),
             "summary.json": json.dumps(self.summary, indent=2) + "\n",
         }
         make_folder(base)
@@ -175,6 +196,7 @@ class Report:
     Args:
         forces: labels, and one row for each moment.
         energies: kinetic energy, potential energy of gravity and stored energy at each moment, J.
+        probes: labels, and one row for each moment.
         summary: what goes into summary.json.
     """
 
@@ -182,8 +204,10 @@ class Report:
         self,
         forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]],
         energies: Callable[[], Sequence[Sequence[float]]],
+        probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]],
         summary: Callable[[], dict[str, Any]],
     ) -> None:
         self.forces = forces
         self.energies = energies
+        self.probes = probes
         self.summary = summary

@@ -69,7 +69,7 @@ NO_CONTROLS = Controls()
 
 
 class Reflex(NamedTuple):
-    """A control in proportion to how fast a muscle lengthens, s/m."""
+    """A control in proportion to how fast a muscle lengthens, over its greatest contraction velocity."""
 
     gain: float
 
@@ -139,7 +139,9 @@ class ModelControls:
 
     def gain(self, builder: ElementBuilder, actuator: Any) -> float:
         """What reflexes add to the control of a muscle, for how fast it lengthens, s/m."""
-        return self._gains[builder.path(actuator)]
+        fastest = actuator.optimal_fiber_length * actuator.max_contraction_velocity
+        gain = self._gains[builder.path(actuator)]
+        return gain / fastest if gain else 0.0
 
 
 def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:

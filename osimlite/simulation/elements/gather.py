@@ -31,7 +31,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Forces:
-    """The force elements of a model in its order, those left out, as ``path (class)``, and the controls of all."""
+    """The force elements of a model, then its probes; forces that were left out, as ``path (class)``; all controls."""
 
     elements: tuple[ForceElement, ...]
     skipped: tuple[str, ...] = ()
@@ -84,6 +84,9 @@ def force_elements(
         from osimlite.simulation.elements.external_loads import read_external_loads
 
         elements += read_external_loads(mechanism, external_loads)
+    from osimlite.simulation.elements.probe import probe_elements
+
+    elements += probe_elements(builder, elements)
     return Forces(tuple(elements), tuple(skipped), builder.controls.controls)
 
 

@@ -20,6 +20,9 @@ class Placement(NamedTuple):
     frame: Array
 
 
+CONTROLS = ""
+
+
 @dataclass(frozen=True)
 class Item:
     """One item.
@@ -32,6 +35,8 @@ class Item:
         is_contact: whether its record is that of a contact.
         is_part: whether another item of the element calls its kernel.
         states: places among its integers where those of its element's states in y are put, in their order.
+        looks_at: which of its integers are places in the record of another element, which comes before, and the path of
+            that; or CONTROLS for the record of the controls.
         equilibrium: name of the kernel that brings its states into equilibrium, if they have one.
         python: what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays.
     """
@@ -43,6 +48,7 @@ class Item:
     is_contact: bool = False
     is_part: bool = False
     states: tuple[int, ...] = ()
+    looks_at: tuple[tuple[int, str], ...] = ()
     equilibrium: str = ""
     python: Callable[..., None] | None = None
 

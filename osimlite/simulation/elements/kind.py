@@ -36,7 +36,7 @@ ENERGY, SOLVED = "energy", "solved"
 without the first stores none that is known, the law of one without the other has always a solution."""
 
 
-NAMES = "NUMBERS", "RECORD", "FREEDOMS", "TIME", "WORK_CONTROL", "OK", "UNSOLVED"
+NAMES = "NUMBERS", "RECORD", "OWN", "FREEDOMS", "TIME", "WORK_CONTROL", "OK", "UNSOLVED"
 """What the code of kernels uses of the layout."""
 
 
@@ -147,7 +147,9 @@ class Kind:
     def recorded(self) -> dict[str, int]:
         """Place in the record of all that is kept there."""
         others = {SOLVED, *(state.rate for state in self.states)}
-        names = *(name for name in self.outputs if name not in others), *self.kept
+        names = [name for name in self.outputs if name not in others] + list(self.kept)
+        if self.geometry.speed and issubclass(self.component, Actuator):
+            names.append(self.geometry.speed)
         return {name: place for place, name in enumerate(dict.fromkeys(names))}
 
     # ------------------------------------------------------------------------------------------ the kernels
@@ -167,20 +169,8 @@ class Kind:
         return self._written(self.name + EQUILIBRIUM, self.equilibrium, self.equilibrium_source)
 
     def _written(self, name: str, law: Callable[..., Any] | None, source: str) -> Callable[..., int]:
-        scope: dict[str, Any] = {
-            **self.geometry.functions(),
-            **{name: value for term in self.terms for name, value in term.functions().items()},
-            **{name: getattr(layout, name) for name in NAMES},
-            "at": pointers.at,
-            "law": law,
-            "__name__": f"{__package__}.kinds.{self.name}",
-        }
-        file = f"<kernel {name}>"
-        exec(compile(source, file, "exec", dont_inherit=True), scope)
-        # Tracebacks and `inspect.getsource` show it as they show a file.
-        linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-        kernel: Callable[..., int] = scope[name]
-        return kernel
+        scope = {name: value for term in self.terms for name, value in term.functions().items()}
+        return written(name, f"{__package__}.kinds.{self.name}", source, law=law, **self.geometry.functions(), **scope)
 
     @property
     def source(self) -> str:
@@ -380,6 +370,24 @@ class ForceOff(DeclaredForce):
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """None."""
         return 0.0
+
+
+def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
+    """A kernel that was written.
+
+    Args:
+        name: of it.
+        module: that it belongs to.
+        source: its text.
+        scope: what this uses, besides the layout.
+    """
+    known = {**{name: getattr(layout, name) for name in NAMES}, "at": pointers.at, "__name__": module, **scope}
+    file = f"<kernel {name}>"
+    exec(compile(source, file, "exec", dont_inherit=True), known)
+    # Tracebacks and `inspect.getsource` show it as they show a file.
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    kernel: Callable[..., int] = known[name]
+    return kernel
 
 
 def _function(lines: Sequence[str]) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
@@ -54,6 +55,7 @@ class Engine(Protocol):
         state: what the numbers of a state are.
         contacts: names of the contacts, by number.
         columns: labels of the force records.
+        probes: of the model.
         loads: after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N,
             in ground) of contact i if it does.
     """
@@ -65,6 +67,7 @@ class Engine(Protocol):
     state: StateLayout
     contacts: tuple[str, ...]
     columns: tuple[str, ...]
+    probes: tuple[DeclaredProbe, ...]
     loads: list[object]
 
     def derivative(self, t: float, y: list[float]) -> list[float]:
@@ -97,6 +100,9 @@ class Engine(Protocol):
 
     def force_records(self, t: float, y: list[float]) -> list[float]:
         """One number for each of the columns. Works when the engine is closed."""
+
+    def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
+        """What each probe gives at a state, before its operation. Works when the engine is closed."""
 
     def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J. Works when the engine is closed."""

@@ -19,6 +19,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.kind import kind_of_class
+from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
@@ -73,7 +74,7 @@ class NumbersOnly:
         Args:
             owners: forces, bodies and the model itself, if a property of theirs has changed.
         """
-        made = {}
+        made: dict[str, Any] = {}
         sharing = {type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)}
         for force in (*owners, *(other for each in sharing for other in self._model.components(each))):
             if isinstance(force, Force):
@@ -81,10 +82,15 @@ class NumbersOnly:
                 made[element.path] = element
         if not made.keys() <= self._items.keys():
             return None
+        only_forces = all(isinstance(owner, Force) for owner in owners)
+        if any(isinstance(element, DeclaredProbe) for element in self._forces.elements):
+            if not only_forces:
+                # The mass of the model has a say in what muscles use.
+                return None
+            made |= {probe.path: probe for probe in probe_elements(self._builder, self._forces.elements)}
         forces = replace(
             self._forces, elements=tuple(made.get(element.path, element) for element in self._forces.elements)
         )
-        only_forces = all(isinstance(owner, Force) for owner in owners)
         mechanism = self._mechanism if only_forces else self._with_masses()
         if mechanism is None:
             return None

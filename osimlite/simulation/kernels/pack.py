@@ -17,7 +17,7 @@ from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyAcceler
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.items import ForceElement, Placement, Places
+from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.merson import STATES
@@ -254,6 +254,7 @@ class Packer:
         self.constraint_records(*constraints_on(self.places.mechanism, order))
         if self.chain is not None:
             pack_chain(self, self.chain)
+        ints[at.WORK_CONTROL] = self.room(len(self.controls.names))
         found = self.item_records()
         self.control_record()
         ints[at.STATE_SIZE] = self.state.size
@@ -383,6 +384,7 @@ class Packer:
         pairs: list[int] = []
         settling: dict[int, str] = {}
         found: list[list[tuple[int, int]]] = []
+        places = {CONTROLS: self.ints[at.WORK_CONTROL]}
         for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
             found.append([])
             first = len(pairs)
@@ -400,6 +402,9 @@ class Packer:
                 own = list(item.ints)
                 for number, at_state in enumerate(item.states):
                     own[at_state] = self.state.first_of(element) + number
+                for number, path in item.looks_at:
+                    own[number] += places[path]
+                places[element.path] = place
                 self.ints += [0, len(self.numbers), place, first, *own]
                 self.numbers += item.numbers
         self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)
@@ -414,10 +419,9 @@ class Packer:
 
     def control_record(self) -> None:
         """Write the controls, if there are any, behind all else: some motions have others there."""
-        count = len(self.controls.names)
-        if not count:
+        if not self.controls.names:
             return
-        self.ints[at.CONTROLS], self.ints[at.WORK_CONTROL] = len(self.ints), self.room(count)
+        self.ints[at.CONTROLS] = len(self.ints)
         own, numbers, self.kernels[len(self.ints)] = self.controls.record()
         self.ints += [0, len(self.numbers), self.ints[at.WORK_CONTROL], 0, *own]
         self.numbers += numbers

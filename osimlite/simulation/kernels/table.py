@@ -3,6 +3,7 @@
 Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; the kernel of
 a kind of force is written from its declaration, and has the name of the module that declares it; so are the one that
 brings such a force into equilibrium, with EQUILIBRIUM behind the name, and that of a force that is off, with OFF.
+Kernels of probes are written likewise.
 """
 
 from __future__ import annotations
@@ -65,6 +66,8 @@ def law_function(name: str) -> Callable[..., Any]:
     function: Callable[..., Any]
     if name in LAW_MODULES:
         function = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
+    elif name.endswith("_probe"):
+        function = import_module(f"osimlite.simulation.elements.probes.{name}").PROBE.kernel
     else:
         module = name.removesuffix(EQUILIBRIUM).removesuffix(OFF)
         kind = import_module(f"osimlite.simulation.elements.kinds.{module}").KIND

@@ -22,5 +22,4 @@ def drives(builder: ElementBuilder, controller: ToyReflexController) -> Iterator
             raise ModelError(
                 f"'{builder.path(controller)}' drives '{builder.path(muscle)}', which is no muscle; name muscles only"
             )
-        fastest = muscle.optimal_fiber_length * muscle.max_contraction_velocity
-        yield Drive(muscle, Reflex(controller.gain / fastest))
+        yield Drive(muscle, Reflex(controller.gain))

@@ -14,7 +14,7 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import apply_force, apply_torque, direction, station, velocity
+from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
 
 
 def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:
@@ -24,11 +24,26 @@ def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:
     apply_torque(s, w, g[1], -torque * ax, -torque * ay, -torque * az)
 
 
+def turning_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
+    """How fast a body turns against another about an axis (rad/s), which OpenSim takes for one of ground."""
+    ax, ay, az = angular_velocity(s, w, g[0])
+    bx, by, bz = angular_velocity(s, w, g[1])
+    speed: float = gp[3] * (ax - bx) + gp[4] * (ay - by) + gp[5] * (az - bz)
+    return speed
+
+
 def push_along(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     """Push a body along a direction at a point."""
     px, py, pz = station(s, w, g[1], gp[0], gp[1], gp[2])
-    ax, ay, az = direction(s, w, g[2], gp[3], gp[4], gp[5])
+    ax, ay, az = direction(s, w, g[3], gp[6], gp[7], gp[8])
     apply_force(s, w, g[0], px, py, pz, force * ax, force * ay, force * az)
+
+
+def station_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
+    """How fast a station moves (m/s), in whatever direction, which is what OpenSim takes."""
+    px, py, pz = station(s, w, g[2], gp[3], gp[4], gp[5])
+    vx, vy, vz = velocity(s, w, g[2], px, py, pz)
+    return sqrt(vx * vx + vy * vy + vz * vz)
 
 
 def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
@@ -40,6 +55,17 @@ def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     size = force / length if length > 0.0 else 0.0
     apply_force(s, w, g[0], ax, ay, az, size * dx, size * dy, size * dz)
     apply_force(s, w, g[1], ax, ay, az, -size * dx, -size * dy, -size * dz)
+
+
+def parting_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
+    """How fast two points part, m/s."""
+    ax, ay, az = station(s, w, g[2], gp[0], gp[1], gp[2])
+    bx, by, bz = station(s, w, g[3], gp[3], gp[4], gp[5])
+    dx, dy, dz = ax - bx, ay - by, az - bz
+    ux, uy, uz = velocity(s, w, g[2], ax, ay, az)
+    vx, vy, vz = velocity(s, w, g[3], bx, by, bz)
+    length = sqrt(dx * dx + dy * dy + dz * dz)
+    return ((ux - vx) * dx + (uy - vy) * dy + (uz - vz) * dz) / length if length > 0.0 else 0.0
 
 
 def push_body(
@@ -101,25 +127,31 @@ class OnBodies(Geometry):
 class AboutAxis(OnBodies):
     """An axis of ground or of the first of two bodies: the output `torque` (N.m) turns the first against the other."""
 
+    inputs = ("speed",)
+    speed = "speed"
+    before = ("speed = turning_speed(s, w, g, gp)",)
     after = ("turn_bodies(s, w, g, gp, torque)",)
-    calls = (turn_bodies,)
+    calls = (turning_speed, turn_bodies)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
         """The bodies and the axis of an actuator."""
         (one, placed), (two, _) = (
             builder.placement(builder.target(force, field, getattr(force, field))) for field in ("bodyA", "bodyB")
         )
-        axis = _unit(builder, force, force.axis)
+        axis = as_given = _unit(builder, force, force.axis)
         if not force.torque_is_global:
             axis = triple(placed[:3, :3] @ axis)
-        return Anchors((one, two), (), ((GROUND if force.torque_is_global else one, axis),))
+        return Anchors((one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given)))
 
 
 class AtPoint(OnBodies):
     """A point of a body and a direction: the output `force` (N) pushes the body."""
 
+    inputs = ("speed",)
+    speed = "speed"
+    before = ("speed = station_speed(s, w, g, gp)",)
     after = ("push_along(s, w, g, gp, force)",)
-    calls = (push_along,)
+    calls = (station_speed, push_along)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
         """The body, the point and the direction of an actuator, the last two fixed in ground or in the body."""
@@ -127,14 +159,18 @@ class AtPoint(OnBodies):
         builder.check(force, force.point)
         point = GROUND if force.point_is_global else body, triple(force.point)
         along = GROUND if force.force_is_global else body, _unit(builder, force, force.direction)
-        return Anchors((body,), (point,), (along,))
+        # OpenSim's speed is that of the same numbers as a station of the body.
+        return Anchors((body,), (point, (body, triple(force.point))), (along,))
 
 
 class ApartPoints(OnBodies):
     """Two points: the output `force` (N) pushes them apart."""
 
+    inputs = ("speed",)
+    speed = "speed"
+    before = ("speed = parting_speed(s, w, g, gp)",)
     after = ("push_apart(s, w, g, gp, force)",)
-    calls = (push_apart,)
+    calls = (parting_speed, push_apart)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
         """The bodies and the points of an actuator, fixed in ground or in the bodies."""

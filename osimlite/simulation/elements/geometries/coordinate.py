@@ -31,6 +31,7 @@ class OnCoordinate(Geometry):
     field: str = "coordinate"
 
     inputs = ("q", "u")
+    speed = "u"
     before = ("q, u = coordinate(s, y, g, gp)",)
     after = ("if g[0] >= 0:", "    f[s[FREEDOMS] + g[0]] += force")
     calls = (coordinate,)

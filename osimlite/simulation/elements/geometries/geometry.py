@@ -18,11 +18,13 @@ class Geometry:
     Attributes:
         inputs: what it computes for a law, in the code before the law is called.
         before: that code.
+        speed: name of the input with which an actuator's force, or its negative, makes a power.
         after: the code that applies the outputs of the law.
         calls: the functions that both call.
     """
 
     inputs: ClassVar[tuple[str, ...]] = ()
+    speed: ClassVar[str] = ""
     before: ClassVar[tuple[str, ...]] = ()
     after: ClassVar[tuple[str, ...]] = ()
     calls: ClassVar[tuple[Callable[..., Any], ...]] = ()

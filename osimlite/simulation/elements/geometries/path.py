@@ -29,6 +29,7 @@ class AlongPath(Geometry):
     """A path: length (m) and rate (m/s); the output `tension` (N) pulls along it."""
 
     inputs = ("length", "rate")
+    speed = "rate"
     before = ("length, rate = path_length(s, x, w, y, f, item - g[0])",)
     after = ("pull_path(s, x, w, y, f, item - g[0], tension)",)
     calls = (path_length, pull_path)

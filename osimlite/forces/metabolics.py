@@ -1,0 +1,183 @@
+"""Metabolic power of muscles, W: heat of activation, maintenance and shortening, and work.
+
+As OpenSim 4.6 computes it, whose probes are told about in T. Uchida et al., "Stretching your energetic budget: how
+tendon compliance affects the metabolic cost of running", PLoS ONE 11, 2016.
+"""
+
+from __future__ import annotations
+
+from math import cos, nan, pi, sin
+from typing import NamedTuple
+
+
+class Umberger2010(NamedTuple):
+    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no.
+
+    Attributes:
+        max_contraction_velocity: optimal fiber lengths a second.
+        optimal_fiber_length: m.
+        mass: kg.
+        ratio_slow_twitch_fibers: part of the fibers.
+        muscle_effort_scaling_factor: of excitation, activation and active force.
+        aerobic_factor: of all heat.
+    """
+
+    max_contraction_velocity: float
+    optimal_fiber_length: float
+    mass: float
+    ratio_slow_twitch_fibers: float
+    muscle_effort_scaling_factor: float
+    aerobic_factor: float
+    activation_maintenance_rate_on: float
+    shortening_rate_on: float
+    mechanical_work_rate_on: float
+    enforce_minimum_heat_rate_per_muscle: float
+    use_Bhargava_recruitment_model: float
+    include_negative_mechanical_work: float
+    forbid_negative_total_power: float
+
+
+def umberger2010(
+    activation: float,
+    excitation: float,
+    active_force: float,
+    fiber_length: float,
+    fiber_velocity: float,
+    force_length: float,
+    m: Umberger2010,
+) -> float:
+    """The power by the model of B. Umberger et al. (2003) with the changes of B. Umberger (2010) and T. Uchida (2016).
+
+    Args:
+        activation: of the fibers.
+        excitation: the control.
+        active_force: of the fibers, N.
+        fiber_length: m.
+        fiber_velocity: m/s, negative where they shorten.
+        force_length: factor of the active force by length.
+        m: the muscle.
+    """
+    forbids = m.forbid_negative_total_power
+    activation *= m.muscle_effort_scaling_factor
+    excitation *= m.muscle_effort_scaling_factor
+    active_force *= m.muscle_effort_scaling_factor
+    length, velocity = fiber_length / m.optimal_fiber_length, fiber_velocity / m.optimal_fiber_length
+    effort = excitation if excitation > activation else (excitation + activation) / 2.0
+    slow = m.ratio_slow_twitch_fibers
+    if m.use_Bhargava_recruitment_model:
+        of_slow, of_fast = recruited(excitation, slow)
+        slow = 1.0 if excitation == 0.0 else of_slow / (of_slow + of_fast)
+    upkeep = shortening = work = 0.0
+    if forbids or m.activation_maintenance_rate_on:
+        unscaled = 128.0 * (1.0 - slow) + 25.0
+        # A negative number has no such power.
+        upkeep = m.aerobic_factor * (effort**0.6 if effort >= 0.0 else nan)
+        upkeep *= unscaled if length <= 1.0 else 0.4 * unscaled + 0.6 * unscaled * force_length
+    if forbids or m.shortening_rate_on:
+        of_fast, of_slow = 153.0 / m.max_contraction_velocity, 100.0 / (m.max_contraction_velocity / 2.5)
+        if velocity <= 0.0:
+            heat = min(-of_slow * velocity, 100.0) * slow - of_fast * velocity * (1.0 - slow)
+            shortening = m.aerobic_factor * effort * effort * heat
+        else:
+            heat = (4.0 if m.include_negative_mechanical_work else 0.3) * of_slow * velocity
+            shortening = m.aerobic_factor * effort * heat
+        if length > 1.0:
+            shortening *= force_length
+    if (forbids or m.mechanical_work_rate_on) and (m.include_negative_mechanical_work or fiber_velocity <= 0.0):
+        work = -max(active_force, 0.0) * fiber_velocity / m.mass
+    if forbids:
+        shortening -= min(upkeep + shortening + work, 0.0)
+    heat = (upkeep if m.activation_maintenance_rate_on else 0.0) + (shortening if m.shortening_rate_on else 0.0)
+    if m.activation_maintenance_rate_on and m.shortening_rate_on and m.enforce_minimum_heat_rate_per_muscle:
+        heat = max(heat, 1.0)
+    return (heat + (work if m.mechanical_work_rate_on else 0.0)) * m.mass
+
+
+class Bhargava2004(NamedTuple):
+    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no.
+
+    Attributes:
+        max_isometric_force: N.
+        optimal_fiber_length: m.
+        mass: kg.
+        ratio_slow_twitch_fibers: part of the fibers.
+        activation_constant_slow_twitch: W/kg, and likewise of fast fibers, and of maintenance.
+        muscle_effort_scaling_factor: of excitation, activation and active force.
+    """
+
+    max_isometric_force: float
+    optimal_fiber_length: float
+    mass: float
+    ratio_slow_twitch_fibers: float
+    activation_constant_slow_twitch: float
+    activation_constant_fast_twitch: float
+    maintenance_constant_slow_twitch: float
+    maintenance_constant_fast_twitch: float
+    muscle_effort_scaling_factor: float
+    activation_rate_on: float
+    maintenance_rate_on: float
+    shortening_rate_on: float
+    mechanical_work_rate_on: float
+    enforce_minimum_heat_rate_per_muscle: float
+    use_force_dependent_shortening_prop_constant: float
+    include_negative_mechanical_work: float
+    forbid_negative_total_power: float
+
+
+def bhargava2004(
+    activation: float,
+    excitation: float,
+    active_force: float,
+    passive_force: float,
+    fiber_velocity: float,
+    force_length: float,
+    maintained: float,
+    m: Bhargava2004,
+) -> float:
+    """The power by the model of L. Bhargava et al. (2004).
+
+    Args:
+        activation: of the fibers.
+        excitation: the control.
+        active_force: of the fibers, N.
+        passive_force: of the fibers, N.
+        fiber_velocity: m/s, negative where they shorten.
+        force_length: factor of the active force by length.
+        maintained: factor of the heat of maintenance by length.
+        m: the muscle.
+    """
+    forbids = m.forbid_negative_total_power
+    active_force *= m.muscle_effort_scaling_factor
+    total = active_force + passive_force
+    slow, fast = recruited(m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers)
+    starting = keeping = shortening = work = 0.0
+    if forbids or m.activation_rate_on:
+        starting = m.mass * (m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast)
+    if forbids or m.maintenance_rate_on:
+        keeping = m.maintenance_constant_slow_twitch * slow + m.maintenance_constant_fast_twitch * fast
+        keeping *= m.mass * maintained
+    if forbids or m.shortening_rate_on:
+        if not m.use_force_dependent_shortening_prop_constant:
+            factor = 0.25 * total if fiber_velocity <= 0.0 else 0.0
+        elif fiber_velocity <= 0.0:
+            isometric = m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
+            factor = 0.16 * isometric + 0.18 * total
+        else:
+            factor = 0.157 * total
+        shortening = -factor * fiber_velocity
+    if (forbids or m.mechanical_work_rate_on) and (m.include_negative_mechanical_work or fiber_velocity <= 0.0):
+        work = -active_force * fiber_velocity
+    if forbids:
+        shortening -= min(starting + keeping + shortening + work, 0.0)
+    heat = (starting if m.activation_rate_on else 0.0) + (keeping if m.maintenance_rate_on else 0.0)
+    heat += shortening if m.shortening_rate_on else 0.0
+    all_on = m.activation_rate_on and m.maintenance_rate_on and m.shortening_rate_on
+    if all_on and m.enforce_minimum_heat_rate_per_muscle:
+        heat = max(heat, m.mass)
+    return heat + (work if m.mechanical_work_rate_on else 0.0)
+
+
+def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float, float]:
+    """Which part of all fibers is excited, of slow and of fast ones."""
+    angle = 0.5 * pi * excitation
+    return ratio_slow_twitch_fibers * sin(angle), (1.0 - ratio_slow_twitch_fibers) * (1.0 - cos(angle))

@@ -1,0 +1,308 @@
+"""One declaration for each kind of probe; packing, kernel, integrals and columns follow from it.
+
+A probe adds up, or lists, what a law gives for each of its subjects: actuators or muscles. The law is a scalar function
+of floats; it is given what the record of the subject has, a curve if there is one, and a named tuple of numbers. The
+kernel of a kind is written from this. It runs with the forces where the probe integrates, since the integrals are
+states then, and otherwise when somebody asks.
+
+The integers of the item are: count of the subjects, place among the results of the first (-1 if there is only the sum),
+count of the integrals, the first of them in y, place of the curve, and for each subject the places in the work vector
+of what the law is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.multibody.functions import Function
+from osimlite.quantity import tell
+from osimlite.schema.probes import Probe
+from osimlite.simulation.elements.gather import ElementBuilder, module_name
+from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places
+from osimlite.simulation.elements.kind import DeclaredForce, written
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.functions import table_of_one
+from osimlite.simulation.states import StateVariable
+from osimlite.text import did_you_mean
+
+HEAD = layout.OWN + 5
+"""Where the integers of the subjects begin."""
+
+INTEGRATE = "integrate"
+
+
+class Subject(NamedTuple):
+    """One actuator, and the numbers that the law is given with it."""
+
+    actuator: Any
+    numbers: Any
+
+
+class Reading(NamedTuple):
+    """What a probe reads.
+
+    Attributes:
+        labels: of its results.
+        subjects: what the law is called for.
+        first: place among the results of that of the first subject; -1 if the sum is all there is. The sum is the first
+            result unless the subjects begin there.
+        constant: that the sum begins with; it is the second result if the subjects begin after it.
+        curve: that the law is given.
+        details: what a measure must know.
+    """
+
+    labels: tuple[str, ...]
+    subjects: tuple[Subject, ...] = ()
+    first: int = -1
+    constant: float = 0.0
+    curve: Function | None = None
+    details: Any = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ProbeKind:
+    """A kind of probe.
+
+    Attributes:
+        component: class of the probes.
+        read: what one reads; raises an UnsupportedError for one that cannot be computed.
+        law: gives the quantity of one subject.
+        reads: names of what it is given of a subject: of its record, or "actuation", "speed" and "control".
+        numbers: the tuple that it is given last.
+        measure: computes the results in the place of a law, from the probe, the system after its forces were evaluated,
+            and for what time (s) and state that was.
+        has_curve: whether the law is given a curve.
+    """
+
+    component: type
+    read: Callable[[ElementBuilder, Any], Reading]
+    law: Callable[..., float] | None = None
+    reads: tuple[str, ...] = ()
+    numbers: Any = tuple
+    measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
+    has_curve: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of its kernel, and of the module that declares it."""
+        return module_name(self.component)
+
+    @cached_property
+    def kernel(self) -> Callable[..., int]:
+        """The function that computes one probe."""
+        scope = {"law": self.law, self.numbers.__name__: self.numbers}
+        return written(self.name, f"{__package__}.probes.{self.name}", self.source, **scope)
+
+    @property
+    def source(self) -> str:
+        """The text of the kernel."""
+        size, count = len(self.numbers._fields), len(self.reads)
+        given = [f"w[a[{k}]]" for k in range(count)]
+        given += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
+        given.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
+        lines = [
+            f'def {self.name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
+            "i = at(s, item)",
+            "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
+            "first, total = i[OWN + 1], p[0]",
+            "for k in range(i[OWN]):",
+            f"    a, b = at(i, {HEAD} + {count} * k), at(p, 1 + {size} * k)",
+            f"    value = law({', '.join(given)})",
+            "    total += value",
+            "    if first >= 0:",
+            "        found[first + k] = value",
+            "if first != 0:",
+            "    found[0] = total",
+            "if first == 2:",
+            "    found[1] = p[0]",
+            "for k in range(i[OWN + 2]):",
+            "    f[i[OWN + 3] + k] = found[k]",
+        ]
+        return "\n    ".join([*lines, "return OK"]) + "\n"
+
+
+@dataclass(frozen=True)
+class DeclaredProbe:
+    """One probe; see :class:`osimlite.simulation.elements.items.ForceElement` for what it is to the kernels.
+
+    Attributes:
+        component: its class.
+        path: of the component.
+        name: of the component.
+        operation: what is made of its results: "value", "integrate" and so on.
+        gain: factor of what is reported.
+        initial: where integrals start.
+        reading: what it reads.
+        places: for each subject and each thing that it reads, the element whose record has it, and where there.
+        numbers: that the law is given of each subject.
+    """
+
+    component: type
+    path: str
+    name: str
+    operation: str
+    gain: float
+    initial: tuple[float, ...]
+    reading: Reading
+    places: tuple[tuple[tuple[str, int], ...], ...] = ()
+    numbers: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def kind(self) -> ProbeKind:
+        """The declaration."""
+        kind: ProbeKind = kind_of_probe(self.component)
+        return kind
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Of force records it has none."""
+        return ()
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """Its integrals."""
+        labels = self.reading.labels if self.operation == INTEGRATE else ()
+        return tuple(StateVariable(f"{self.path}/{label}", is_named=False) for label in labels)
+
+    def items(self, places: Places) -> list[Item]:
+        """What the kernels compute."""
+        if self.kind.law is None:
+            return []
+        reading, integrals = self.reading, len(self.states)
+        numbers = [reading.constant, *(number for row in self.numbers for number in row)]
+        ints = [len(self.places), reading.first, integrals, 0, len(numbers)]
+        reads = [read for row in self.places for read in row]
+        looks_at = tuple((len(ints) + number, owner) for number, (owner, _) in enumerate(reads))
+        ints += [place for _, place in reads]
+        if reading.curve is not None:
+            numbers += table_of_one(reading.curve, f"the curve of '{self.path}'")
+        return [
+            Item(
+                self.kind.name,
+                tuple(ints),
+                tuple(numbers),
+                room=len(reading.labels),
+                is_part=not integrals,
+                states=(3,) if integrals else (),
+                looks_at=looks_at,
+            )
+        ]
+
+    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+        """Of force records it has none."""
+        return []
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """It stores none."""
+        return 0.0
+
+
+def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) -> list[DeclaredProbe]:
+    """The probes of a model that are enabled, in its order; those that cannot be computed are told of and left out.
+
+    Args:
+        builder: of the elements.
+        elements: the forces of the model.
+
+    Raises:
+        ModelError: a probe names what does not exist, where OpenSim stops too.
+    """
+    by_path = {element.path: element for element in elements}
+    found = []
+    for probe in builder.model.probe_set.objects:
+        kind = kind_of_probe(type(probe))
+        if kind is None or not probe.enabled:
+            continue
+        try:
+            found.append(_made(kind, builder, probe, by_path))
+        except UnsupportedError as error:
+            tell(f"{error.message} is left out of the probes")
+    return found
+
+
+def _made(
+    kind: ProbeKind, builder: ElementBuilder, probe: Probe, elements: Mapping[str, ForceElement]
+) -> DeclaredProbe:
+    path, reading = builder.path(probe), kind.read(builder, probe)
+    if probe.probe_operation == INTEGRATE and kind.law is None:
+        raise builder.unsupported(probe, ", whose integral osimlite does not compute")
+    initial: tuple[float, ...] = tuple(probe.initial_conditions_for_integration)
+    if len(initial) != len(reading.labels):
+        # As in OpenSim, which says that it is an error.
+        initial = (0.0,) * len(reading.labels)
+    subjects = [_subject(kind, builder, probe, subject, elements) for subject in reading.subjects]
+    builder.check(probe, [probe.gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)])
+    return DeclaredProbe(
+        type(probe),
+        path,
+        probe.name,
+        probe.probe_operation,
+        float(probe.gain),
+        initial,
+        reading,
+        tuple(places for places, _ in subjects),
+        tuple(numbers for _, numbers in subjects),
+    )
+
+
+def _subject(
+    kind: ProbeKind, builder: ElementBuilder, probe: Probe, subject: Subject, elements: Mapping[str, ForceElement]
+) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
+    """Where what the law is given of a subject stands, and its numbers."""
+    actuator, numbers = subject
+    path = builder.path(actuator)
+    control = CONTROLS, builder.controls.first_of(builder, actuator)
+    element = elements.get(path)
+    if not actuator.appliesForce and "factor" in numbers._fields:
+        # Its force is 0.
+        return (control,) * len(kind.reads), tuple(map(float, numbers._replace(factor=0.0)))
+    if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
+        raise builder.unsupported(probe, f" of '{path}', which applies no force that is computed")
+    recorded = element.kind.recorded
+    actuation = (element.kind.labels or {}).get("{name}", "")
+    known = {**recorded, "actuation": recorded.get(actuation), "speed": recorded.get(element.kind.geometry.speed)}
+    places = []
+    for name in kind.reads:
+        place = known.get(name)
+        if place is None and name != "control":
+            raise builder.unsupported(probe, f" of '{path}', of which no {name.replace('_', ' ')} is known")
+        places.append(control if place is None else (path, place))
+    return tuple(places), tuple(map(float, numbers))
+
+
+def kind_of_probe(component: type) -> Any:
+    """The declaration of a class of probes, None if there is none."""
+    name = f"{__package__}.probes.{module_name(component)}"
+    return import_module(name).PROBE if find_spec(name) is not None else None
+
+
+def members_of(builder: ElementBuilder, probe: Any, words: Sequence[Any], path: str, kind: str) -> list[Any]:
+    """The components in a set that a probe names; the one word `all` means all.
+
+    Args:
+        builder: of the elements.
+        probe: that names them.
+        words: names, or components.
+        path: of the set.
+        kind: class of the components.
+
+    Raises:
+        ModelError: there is none of a name.
+    """
+    known = builder.tree.members(path, kind)
+    names = [word if isinstance(word, str) else word.name for word in words]
+    if names and names[0].upper() == "ALL":
+        return list(known.values())
+    for name in names:
+        if name not in known:
+            raise ModelError(
+                f"'{builder.path(probe)}' names the {kind.lower()} '{name}', which the model does not have"
+                f"{did_you_mean(name, known)}"
+            )
+    return [known[name] for name in names]

@@ -1,0 +1,63 @@
+"""Metabolic power by the model of Bhargava."""
+
+from __future__ import annotations
+
+from osimlite.forces.metabolics import Bhargava2004, bhargava2004
+from osimlite.schema.metabolics import Bhargava2004MuscleMetabolicsProbe
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.metabolic import metabolic
+from osimlite.simulation.elements.probe import ProbeKind, Reading
+from osimlite.simulation.kernels.functions import value_at
+from osimlite.simulation.kernels.pointers import Floats
+
+
+def _law(
+    activation: float,
+    excitation: float,
+    active_force: float,
+    passive_force: float,
+    fiber_length: float,
+    fiber_velocity: float,
+    force_length: float,
+    curve: Floats,
+    m: Bhargava2004,
+) -> float:
+    maintained, _, _ = value_at(curve, fiber_length / m.optimal_fiber_length)
+    return bhargava2004(
+        activation, excitation, active_force, passive_force, fiber_velocity, force_length, maintained, m
+    )
+
+
+def _read(builder: ElementBuilder, probe: Bhargava2004MuscleMetabolicsProbe) -> Reading:
+    name = "normalized_fiber_length_dependence_on_maintenance_rate"
+    of_muscle, of_probe = Bhargava2004._fields[3:8], [getattr(probe, name) for name in Bhargava2004._fields[8:]]
+    return metabolic(
+        builder,
+        probe,
+        lambda item, muscle, mass: Bhargava2004(
+            muscle.max_isometric_force,
+            muscle.optimal_fiber_length,
+            mass,
+            *(getattr(item, name) for name in of_muscle),
+            *of_probe,
+        ),
+        builder.function(probe, getattr(probe, name), name),
+    )
+
+
+PROBE = ProbeKind(
+    Bhargava2004MuscleMetabolicsProbe,
+    _read,
+    _law,
+    (
+        "activation",
+        "control",
+        "active_fiber_force",
+        "passive_fiber_force",
+        "fiber_length",
+        "fiber_velocity",
+        "active_force_length",
+    ),
+    Bhargava2004,
+    has_curve=True,
+)

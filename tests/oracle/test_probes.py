@@ -1,0 +1,265 @@
+"""Probes against a live OpenSim 4.6: what they read at any state, and what its ProbeReporter writes along a motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.multibody import build_mechanism
+from osimlite.schema.actuators import (
+    ActivationCoordinateActuator,
+    CoordinateActuator,
+    PointActuator,
+    PointToPointActuator,
+    TorqueActuator,
+)
+from osimlite.schema.functions import PiecewiseLinearFunction, Sine
+from osimlite.schema.metabolics import (
+    Bhargava2004MuscleMetabolicsProbe,
+    Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
+    Umberger2010MuscleMetabolicsProbe,
+    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
+)
+from osimlite.schema.muscles import DeGrooteFregly2016Muscle, RigidTendonMuscle, Thelen2003Muscle
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.probe_types import (
+    ActuatorForceProbe,
+    ActuatorPowerProbe,
+    JointInternalPowerProbe,
+    SystemEnergyProbe,
+)
+from osimlite.simulation import Simulation
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.probed import probe_labels, probe_rows
+from osimlite.simulation.system import System
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
+pytestmark = pytest.mark.oracle
+
+from tests.oracle.force_carrier import JOINTS, STATES, TIME, along, carrier, drive  # noqa: E402
+from tests.oracle.opensim_runs import put  # noqa: E402
+from tests.simulation.elements.muscle_rows import hung, line  # noqa: E402
+
+OPERATIONS = "value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs"
+
+
+@pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
+def model(request):
+    return carrier(request.param)
+
+
+def opened(model, tmp_path):
+    opensim.Logger.setLevelString("off")
+    osimlite.write(model, tmp_path / "model.osim")
+    return opensim.Model(str(tmp_path / "model.osim"))
+
+
+def compare(model, tmp_path, tolerance=1e-9):
+    """What all probes read at some states, auxiliary ones too."""
+    theirs = opened(model, tmp_path)
+    state = theirs.initSystem()
+    mechanism = build_mechanism(model)
+    system = System(mechanism, force_elements(model, mechanism))
+    names = mechanism.coordinate_names
+    rng = np.random.default_rng(7)
+    for _ in range(STATES):
+        q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
+        put(map(theirs.getCoordinateSet().get, names), state, q, u)
+        z = rng.uniform(0.2, 0.8, len(system.state.variables))
+        for path, value in zip(system.state.paths, z.tolist(), strict=True):
+            theirs.setStateVariableValue(state, path, value)
+        state.setTime(TIME)
+        theirs.realizeReport(state)
+        probes = [theirs.getProbeSet().get(number) for number in range(theirs.getProbeSet().getSize())]
+        expected = [probe.getProbeOutputs(state).to_numpy().tolist() for probe in probes if probe.isEnabled()]
+        found = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist(), z.tolist()))
+        found = [[probe.gain * x for x in row] for probe, row in zip(system.probes, found, strict=True)]
+        assert [len(row) for row in found] == [len(row) for row in expected]
+        for ours, row in zip(found, expected, strict=True):
+            scale = max([1.0, *(abs(x) for x in row if np.isfinite(x))])
+            assert ours == pytest.approx(row, rel=tolerance, abs=tolerance * scale, nan_ok=True)
+
+
+def add_actuators(model):
+    """One of each class that has one control and pushes bodies or coordinates."""
+    bodies = {"bodyA": "b2", "bodyB": "b0"}
+    for there in (False, True):
+        model.add(
+            PointActuator(name=f"point{there:d}", body="b1", point=(0.1, 0.2, 0.3), point_is_global=there),
+            PointToPointActuator(name=f"points{there:d}", pointA=(0.1, 0.2, 0.3), points_are_global=there, **bodies),
+            TorqueActuator(name=f"torque{there:d}", axis=(1.0, 2.0, -0.5), torque_is_global=there, **bodies),
+        )
+    model.add(
+        TorqueActuator(name="turned", bodyA="/bodyset/b2/f2", bodyB="b1", axis=(1.0, 0.0, 0.5), torque_is_global=False),
+        CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0),
+        CoordinateActuator(name="off", coordinate="q0_0", appliesForce=False),
+        ActivationCoordinateActuator(name="slow", coordinate="q2_0"),
+        *along(PathActuator, optimal_force=30.0),
+    )
+    muscles = along(Thelen2003Muscle, optimal_fiber_length=0.4)
+    for muscle in muscles:
+        muscle.name = f"muscle_{muscle.name}"
+    model.add(*muscles)
+    names = [force.name for force in model.force_set.objects]
+    drive(model, *names)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 0.5, -2.0])
+def test_forces_and_powers_of_actuators(model, exponent, tmp_path):
+    add_actuators(model)
+    for is_sum in (False, True):
+        kinds = {"sum_forces_together": is_sum}, {"sum_powers_together": is_sum}
+        for kind, more in zip((ActuatorForceProbe, ActuatorPowerProbe), kinds, strict=True):
+            model.add(
+                kind(name=f"{kind.__name__}{is_sum}", actuator_names=("all",), exponent=exponent, gain=3.0, **more)
+            )
+    model.add(ActuatorPowerProbe(name="some", actuator_names=("slow", "motor"), exponent=exponent))
+    model.add(ActuatorForceProbe(name="disabled", actuator_names=("slow",), enabled=False))
+    compare(model, tmp_path)
+
+
+MUSCLES = {
+    "thelen": (Thelen2003Muscle, {}),
+    "degroote": (DeGrooteFregly2016Muscle, {"tendon_compliance_dynamics_mode": "implicit"}),
+    "rigid": (RigidTendonMuscle, {}),
+}
+SWITCHES: tuple[dict[str, object], ...] = (
+    {},
+    {"report_total_metabolics_only": False},
+    {"forbid_negative_total_power": False, "report_total_metabolics_only": False},
+    {"forbid_negative_total_power": False, "include_negative_mechanical_work": False, "gain": 2.0},
+    {"forbid_negative_total_power": False, "enforce_minimum_heat_rate_per_muscle": False, "basal_rate_on": False},
+    {"shortening_rate_on": False, "muscle_effort_scaling_factor": 0.7, "basal_exponent": 0.5},
+    {"mechanical_work_rate_on": False, "basal_coefficient": 2.0},
+)
+OF_UMBERGER = (
+    {"use_Bhargava_recruitment_model": False, "aerobic_factor": 1.0},
+    {"activation_maintenance_rate_on": False, "forbid_negative_total_power": False},
+)
+OF_BHARGAVA = (
+    {"use_force_dependent_shortening_prop_constant": True, "forbid_negative_total_power": False},
+    {"activation_rate_on": False, "forbid_negative_total_power": False},
+    {"maintenance_rate_on": False},
+)
+
+
+def add_metabolics(model, names, kinds=(Umberger2010MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe)):
+    """Probes with all switches on and off, of some muscles that differ."""
+    for kind in kinds:
+        is_umberger = kind is Umberger2010MuscleMetabolicsProbe
+        parameter = (
+            Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter
+            if is_umberger
+            else Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter
+        )
+        for number, switches in enumerate((*SWITCHES, *(OF_UMBERGER if is_umberger else OF_BHARGAVA))):
+            probe = kind(name=f"{kind.__name__}{number}", **switches)
+            if not is_umberger:
+                probe.normalized_fiber_length_dependence_on_maintenance_rate = PiecewiseLinearFunction(
+                    name="normalized_fiber_length_dependence_on_maintenance_rate",
+                    x=(0.0, 0.5, 1.0, 1.5, 10.0),
+                    y=(0.5, 0.5, 1.0, 0.1, 0.0),
+                )
+            for name, ratio, provided in zip(names, (0.5, 0.2), (False, True), strict=False):
+                of_muscle = parameter(name=name, ratio_slow_twitch_fibers=ratio, specific_tension=3e5, density=1100.0)
+                of_muscle.use_provided_muscle_mass, of_muscle.provided_muscle_mass = provided, 0.3
+                probe.metabolic_muscle_parameter_set.objects.append(of_muscle)
+            model.add(probe)
+
+
+@pytest.mark.parametrize("muscle", MUSCLES)
+def test_metabolic_powers(model, muscle, tmp_path):
+    kind, more = MUSCLES[muscle]
+    muscles = along(kind, **more)
+    # One that shortens where the other lengthens, each on its side of the optimal length.
+    muscles[0].optimal_fiber_length, muscles[1].optimal_fiber_length = 0.2, 2.0
+    model.add(*muscles)
+    drive(model, "along0", "along1")
+    add_metabolics(model, ("along0", "along1"))
+    compare(model, tmp_path)
+
+
+def reported(model, tmp_path, to, accuracy):
+    """Labels, times and rows of OpenSim's ProbeReporter along a motion."""
+    theirs = opened(model, tmp_path)
+    theirs.addAnalysis(opensim.ProbeReporter(theirs))
+    state = theirs.initSystem()
+    manager = opensim.Manager(theirs)
+    manager.setIntegratorAccuracy(accuracy)
+    manager.initialize(state)
+    manager.integrate(to)
+    storage = theirs.getAnalysisSet().get(0).getStorageList().get(0)
+    rows = [storage.getStateVector(number) for number in range(storage.getSize())]
+    labels = storage.getColumnLabels()
+    return (
+        [labels.get(number) for number in range(1, labels.getSize())],
+        [row.getTime() for row in rows],
+        [[row.getData().get(number) for number in range(row.getData().getSize())] for row in rows],
+    )
+
+
+def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
+    """Steps, labels and all that probes report at the ends of the steps."""
+    labels, times, rows = reported(model, tmp_path, to, accuracy)
+    with Simulation(model, "compiled") as ready:
+        steps = []
+        stepper = ready.engine.stepper(
+            0.0, ready.initial_state({}, {}), Settings(accuracy=accuracy), lambda t, y: steps.append((t, y))
+        )
+        steps.append((stepper.time, stepper.state))
+        stepper.table([to])
+        stepper.catch_up()
+        found = np.array(list(probe_rows(ready.engine, steps, steps)))
+        assert probe_labels(ready.engine.probes) == labels
+        assert [t for t, _ in steps] == pytest.approx(times, abs=1e-9)
+        # A rate of second order is twice a difference of neighbours, less the rate before.
+        scale = np.maximum(1.0, np.abs(rows).max(axis=0))
+        assert np.abs((found - rows) / scale).max() <= 1e-9
+        trajectory = ready.run(to, accuracy=accuracy)
+        assert list(trajectory.probes) == labels
+        ends = np.array([column[[0, -1]] for column in trajectory.probes.values()])
+        assert np.abs((ends - np.array(rows)[[0, -1]].T) / scale[:, None]).max() <= 1e-9
+
+
+@pytest.mark.parametrize("operation", OPERATIONS)
+def test_operations_along_a_motion(model, operation, tmp_path):
+    """The energy cannot be integrated here."""
+    model.add(*(CoordinateActuator(name=f"on_{name}", coordinate=name) for name in ("q0_0", "q1_0")))
+    drive(model, "on_q0_0", "on_q1_0")
+    for number, start in enumerate(((3.0, 2.0), (), (1.0,))):
+        probe = ActuatorPowerProbe(name=f"p{number}", actuator_names=("all",), probe_operation=operation, gain=2.0)
+        probe.initial_conditions_for_integration = start
+        model.add(probe)
+    if operation != "integrate":
+        model.add(SystemEnergyProbe(name="all", probe_operation=operation))
+        model.add(SystemEnergyProbe(name="kinetic", compute_potential_energy=False, probe_operation=operation))
+    compare_motion(model, tmp_path)
+
+
+@pytest.mark.parametrize("operation", ["value", "integrate", "differentiate"])
+def test_metabolic_powers_along_a_motion(operation, tmp_path):
+    """Integrals are states, whose errors take part in the control of the steps."""
+    numbers = {"max_isometric_force": 546.0, "optimal_fiber_length": 0.0535, "tendon_slack_length": 0.272}
+    more = {"default_activation": 0.4, "default_fiber_length": 0.05, "geometry_path": line()}
+    model = hung(Thelen2003Muscle(name="mu", **numbers, **more), (0.4, 0.4), gravity=9.80665)
+    model.find("/jointset/slide/x").default_value = 0.33
+    add_metabolics(model, ("mu",))
+    for probe in model.probe_set.objects:
+        probe.probe_operation = operation
+    compare_motion(model, tmp_path)
+
+
+@pytest.mark.parametrize("is_sum", [False, True])
+def test_powers_of_prescribed_motions(is_sum, tmp_path):
+    model = carrier(JOINTS["pin, slider, universal"])
+    for name, joint in (("q0_0", "j0"), ("q2_1", "j2")):
+        coordinate = model.find(f"/jointset/{joint}/{name}")
+        coordinate.prescribed, coordinate.prescribed_function = True, Sine(amplitude=0.4, omega=3.0, phase=0.2)
+    model.add(CoordinateActuator(name="motor", coordinate="q0_0", optimal_force=7.0))
+    drive(model, "motor")
+    probe = JointInternalPowerProbe(name="joints", joint_names=("all",), sum_powers_together=is_sum, exponent=2.0)
+    model.add(probe, JointInternalPowerProbe(name="last", joint_names=("j2", "j1")))
+    compare_motion(model, tmp_path)
