@@ -142,6 +142,8 @@ def _run(words: list[str]) -> None:
         os.environ.pop("COLUMNS", None)
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core busy with that.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:

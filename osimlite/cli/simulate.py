@@ -81,7 +81,8 @@ def simulate(
     if animate:
         require("PIL", extra="view", purpose="an animation")
     model = read(file)
-    from osimlite.simulation.given_controls import words_to_controls
+    if controls:
+        from osimlite.simulation.given_controls import words_to_controls
     from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
     from osimlite.simulation.trajectory import Interrupted

@@ -24,7 +24,6 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.given_controls import driven, told
 from osimlite.simulation.options import Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
@@ -158,7 +157,12 @@ class Simulation:
             }
             for given in (initial, chosen.initial_speeds)
         )
-        controls = driven(self.forces.controls, chosen.controls, to)
+        controls, given = self.forces.controls, {}
+        if chosen.controls is not None or any(controls.functions):
+            from osimlite.simulation.given_controls import driven, told
+
+            controls = driven(controls, chosen.controls, to)
+            given = {} if chosen.controls is None else {"controls": told(chosen.controls)}
         self.engine.drive(controls)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
@@ -178,7 +182,7 @@ class Simulation:
             "initial": initial,
             "initial_speeds": initial_speeds,
             **({"equilibrate": True} if chosen.equilibrate else {}),
-            **({} if chosen.controls is None else {"controls": told(chosen.controls)}),
+            **given,
             **{name: getattr(chosen, name) for name in TOLD},
             **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }

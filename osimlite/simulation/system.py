@@ -7,7 +7,7 @@ The stages are those of Simbody: where the links are (position), how they move (
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,10 +23,12 @@ from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
-from osimlite.simulation.kernels.pack_chain import Chain
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import NoSolution
+
+if TYPE_CHECKING:
+    from osimlite.simulation.kernels.pack_chain import Chain
 
 
 class System:

@@ -22,7 +22,6 @@ from pkgutil import iter_modules
 from typing import Any, ClassVar
 
 from osimlite.schema.actuators import Actuator
-from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
@@ -114,6 +113,8 @@ class Kind:
     def __post_init__(self) -> None:
         named = [Number(item) if isinstance(item, str) else item for item in self.parameters]
         if self.controlled and issubclass(self.component, Actuator):
+            from osimlite.schema.muscles import Muscle
+
             is_muscle = issubclass(self.component, Muscle)
             named.insert(0, ReflexControl() if is_muscle else Control(self.component.control_count))
         object.__setattr__(self, "terms", tuple(named))

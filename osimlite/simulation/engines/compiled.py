@@ -7,7 +7,7 @@ they call. The code serves every model: models and parameters are arrays.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -19,10 +19,12 @@ from osimlite.simulation.engines import many
 from osimlite.simulation.engines.base import KernelEngine
 from osimlite.simulation.engines.linking import version
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.engines.renewal import NumbersOnly
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import BatchEngine, BatchOptions
 from osimlite.simulation.runs import Runs
+
+if TYPE_CHECKING:
+    from osimlite.simulation.engines.renewal import NumbersOnly
 
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
@@ -69,4 +71,6 @@ class CompiledEngine(KernelEngine):
 
     def renewal(self, model: Model, folder: Path) -> NumbersOnly:
         """What makes parts of the model anew."""
+        from osimlite.simulation.engines.renewal import NumbersOnly
+
         return NumbersOnly(model, self, folder)

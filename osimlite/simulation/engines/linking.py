@@ -37,9 +37,9 @@ def has_compiler() -> bool:
 def version() -> str:
     """Of what runs the kernels."""
     if has_compiler():
-        from osimlite.simulation.engines.machine_code import VERSION
+        from osimlite.simulation.engines.object_code import numba_version
 
-        return VERSION
+        return f"numba {numba_version()}"
     import platform
 
     return f"Python {platform.python_version()}, without numba"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from osimlite.simulation.engines.sources import digest_of
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
 
 
 _log = logging.getLogger(__name__)
-
-VERSION = f"numba {version('numba')}"
-
 
 _addresses: dict[str, int] = {}
 """Of the laws that are ready."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +27,8 @@ AT_ONCE = 8
 
 def run_many(engine: CompiledEngine, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None) -> Runs:
     """Compute a batch."""
+    from concurrent.futures import ThreadPoolExecutor
+
     starts = engine.state.table(states)
     options.check()
     vectors, count = _rows(engine, numbers), len(starts)

@@ -16,10 +16,11 @@ import re
 import sys
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import llvmlite  # type: ignore[import-untyped]
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 from osimlite.errors import OsimliteError
@@ -127,7 +128,20 @@ def _file(name: str, digest: str) -> str:
 @cache
 def _makers() -> str:
     """What made the code, and for what."""
-    return repr((version("numba"), version("llvmlite"), sys.platform, *_processor()))
+    return repr((numba_version(), llvmlite.__version__, sys.platform, *_processor()))
+
+
+@cache
+def numba_version() -> str:
+    """Of numba, which is not loaded to find out; importlib.metadata alone takes as long to load as all machine code."""
+    spec = find_spec("numba")
+    told = Path(spec.origin).with_name("_version.py").read_text() if spec is not None and spec.origin else ""
+    found = re.search(r'"version": "(.+)"', told)
+    if found is not None:
+        return found[1]
+    from importlib.metadata import version
+
+    return version("numba")
 
 
 def _folders() -> Iterator[Path]:

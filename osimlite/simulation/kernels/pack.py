@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,11 +21,13 @@ from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.merson import STATES
-from osimlite.simulation.kernels.pack_chain import Chain, pack_chain
 from osimlite.simulation.kernels.pack_constraints import constraint_record, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS
 from osimlite.simulation.states import StateLayout
+
+if TYPE_CHECKING:
+    from osimlite.simulation.kernels.pack_chain import Chain
 
 LAWS_OF_FUNCTIONS = {
     MONOMIALS: "amount_by_several",
@@ -253,6 +255,8 @@ class Packer:
         self.operation_records()
         self.constraint_records(*constraints_on(self.places.mechanism, order))
         if self.chain is not None:
+            from osimlite.simulation.kernels.pack_chain import pack_chain
+
             pack_chain(self, self.chain)
         ints[at.WORK_CONTROL] = self.room(len(self.controls.names))
         found = self.item_records()
