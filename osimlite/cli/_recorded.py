@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from osimlite.cli._console import say
-from osimlite.document.reader import read
 from osimlite.errors import OsimliteError
 from osimlite.files import make_folder
 from osimlite.multibody import build_mechanism
+from osimlite.schema.model import Model
 from osimlite.simulation.recorded import RecordedMotion
 from osimlite.simulation.storage import StoTable, write_sto
 from osimlite.text import listed
 
 
-def opened(file: Path, motion: Path, lowpass: float | None) -> RecordedMotion:
+def opened(model: Model, motion: Path, lowpass: float | None) -> RecordedMotion:
     """The motion of the model, through a filter of `lowpass` Hz if that is given."""
-    recorded = RecordedMotion.read(build_mechanism(read(file)), motion)
+    recorded = RecordedMotion.read(build_mechanism(model), motion)
     if not len(recorded.times):
         raise OsimliteError("the motion has no rows", file=str(motion))
     return recorded if lowpass is None else recorded.lowpassed(lowpass)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Annotated
+
+import typer
 
 from osimlite.cli import _options as options
-
-if TYPE_CHECKING:
-    from osimlite.simulation.elements.kind import DeclaredForce
 
 
 def inverse_dynamics(
@@ -16,21 +15,31 @@ def inverse_dynamics(
     output: options.Folder = None,
     external_loads: options.ExternalLoads = None,
     lowpass: options.Lowpass = None,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="What does not push: a force, a group, All, Actuators or Muscles; Muscles if left out.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
 
-    One generalized force (N or N·m) for each coordinate: what it takes beyond gravity to make the bodies move so. The
-    coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. Forces of the model are not taken
-    into account. What a camera records takes a filter first: --lowpass 6.
+    One generalized force (N or N·m) for each coordinate: what it takes beyond gravity, measured loads and the forces of
+    the model (springs, contacts, but no muscles) to make the bodies move so. The coordinates are differentiated by
+    splines of fifth degree, as in OpenSim's tool. What a camera records takes a filter first: --lowpass 6.
 
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml -o results
     """
     from osimlite.cli._recorded import opened, written
+    from osimlite.document.reader import read
+    from osimlite.simulation.elements import force_elements
+    from osimlite.simulation.recorded import exclude_forces
 
-    recorded = opened(file, motion, lowpass)
-    loads: tuple[DeclaredForce, ...] = ()
-    if external_loads is not None:
-        from osimlite.simulation.elements.external_loads import read_external_loads
-
-        loads = read_external_loads(recorded.mechanism, external_loads)
-    written(recorded, {"inverse_dynamics.sto": recorded.inverse_dynamics(loads)}, options.results_folder(file, output))
+    model = read(file)
+    recorded = opened(model, motion, lowpass)
+    exclude_forces(model, exclude or ["Muscles"])
+    forces = force_elements(model, recorded.mechanism, external_loads=external_loads, folder=file.parent)
+    tables = {"inverse_dynamics.sto": recorded.inverse_dynamics(forces)}
+    written(recorded, tables, options.results_folder(file, output))

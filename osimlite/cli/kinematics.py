@@ -27,8 +27,9 @@ def kinematics(
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """
     from osimlite.cli._recorded import opened, written
+    from osimlite.document.reader import read
 
-    recorded = opened(file, motion, lowpass)
+    recorded = opened(read(file), motion, lowpass)
     if assemble:
         recorded = recorded.assembled()
     written(

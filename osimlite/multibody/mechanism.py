@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -130,6 +130,11 @@ class Mechanism:
         """
         q = self.assemble({}, time)
         return q, self.project_speeds(q, {}, time)
+
+    def released(self) -> Mechanism:
+        """The mechanism without constraints, and with no coordinate locked or prescribed: it can be in any state."""
+        infos = tuple(replace(info, locked=False, prescribed=None) for info in self.coordinates)
+        return replace(self, coordinates=infos, constraints=())
 
     def assemble(self, q: Values, time: float = 0.0, *, kept: Collection[int] = ()) -> Array:
         """The values (n,) nearest to `q` that fulfil the constraints, by the rules of OpenSim's assembly.

@@ -67,9 +67,7 @@ class Paths:
         elements = [_Measured(name, PATH.read(builder, owner)) for name, owner in zip(self.names, owners, strict=True)]
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
-        infos = tuple(replace(info, locked=False) for info in self.mechanism.coordinates)
-        free = replace(self.mechanism, coordinates=infos, constraints=())
-        self._system = _System(free, Forces(tuple(elements)))
+        self._system = _System(self.mechanism.released(), Forces(tuple(elements)))
 
     def lengths(self, q: Values) -> dict[str, float]:
         """Length of each path (m)."""

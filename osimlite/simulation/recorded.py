@@ -5,11 +5,10 @@ The quantities, their names and their order are those of OpenSim's BodyKinematic
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,15 +17,45 @@ from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array, angles_xyz
+from osimlite.schema.forces import Force
+from osimlite.schema.model import Model
+from osimlite.schema.tree import is_a
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.lowpass import lowpassed
 from osimlite.simulation.storage import StoTable, read_sto
-from osimlite.text import listed
-
-if TYPE_CHECKING:
-    from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.system import System
+from osimlite.text import did_you_mean, listed
 
 _HALF_ORDER = 3
 """OpenSim differentiates coordinates by splines of fifth degree."""
+
+KINDS = {"all": "Force", "actuators": "Actuator", "muscles": "Muscle"}
+"""What a list of forces can name besides forces and their groups, in any case, with the classes."""
+
+
+def exclude_forces(model: Model, names: Iterable[str]) -> None:
+    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`.
+
+    Args:
+        model: is changed.
+        names: of forces or of groups of them; "All", "Actuators" or "Muscles".
+
+    Raises:
+        ModelError: there is no such force, nor such a group.
+    """
+    forces = {force.name: force for force in model.components(Force)}
+    groups = {group.name: group.members for group in model.force_set.groups}
+    for name in names:
+        kind = KINDS.get(name.lower())
+        members = [force for force in forces.values() if is_a(force, kind)] if kind else []
+        if not kind:
+            if name not in groups and name not in forces:
+                near = did_you_mean(name, [*forces, *groups])
+                raise ModelError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
+            named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
+            members = [forces[member] for member in named if member in forces]
+        for force in members:
+            force.appliesForce = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,26 +188,30 @@ class RecordedMotion:
             row[:] = [number for place in places.values() for number in state.point(*place)]
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)
 
-    def inverse_dynamics(self, external_loads: Sequence[DeclaredForce] = ()) -> StoTable:
-        """Generalized forces (N, N·m) that make the bodies move so against gravity and external loads.
+    def inverse_dynamics(self, forces: Forces | None = None) -> StoTable:
+        """Generalized forces (N, N·m) that make the bodies move so, beyond gravity and what else pushes them.
 
         Locks and other constraints are left aside, as in OpenSim. The forces belong to the generalized speeds: for
         ball and free joints a moment about an axis of the joint's parent frame. There OpenSim's tool takes the
         rates of the angles for the speeds, which is wrong unless the angles are small.
+
+        Args:
+            forces: of the mechanism: springs, contacts, measured loads; their own states are where they start.
+
+        Raises:
+            SimulationError: a force cannot be computed at one of the states.
         """
         mechanism = self.mechanism
+        system = System(mechanism.released(), forces) if forces is not None and forces.elements else None
         first, second = self.rates
         rows = np.empty_like(self.values)
         for time, row, q, qdot, qddot in zip(self.times.tolist(), rows, self.values, first, second, strict=True):
             u = mechanism.speeds_from_rates(q, qdot)
             udot = mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u))
             row[:] = mechanism.inverse_dynamics(q, u, udot)
-            if external_loads:
-                from osimlite.simulation.elements.external_loads import generalized
-
-                state = mechanism.at(q)
-                for load in external_loads:
-                    row -= generalized(load.place, state, time)
+            if system is not None:
+                applied = system.applied(time, system.state.pack(q.tolist(), u.tolist()))
+                row[list(system.order)] -= applied[len(q) : 2 * len(q)]
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]

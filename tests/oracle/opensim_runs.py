@@ -36,9 +36,15 @@ def simulated(path: Path, to: float, accuracy: float, *, equilibrate: bool = Fal
 
 
 def inverse_dynamics(
-    model: str, motion: str, loads: str | None = None, *, to: float = 1.0, lowpass: float = -1.0
+    model: str,
+    motion: str,
+    loads: str | None = None,
+    *,
+    to: float = 1.0,
+    lowpass: float = -1.0,
+    exclude: str = "ALL",
 ) -> StoTable:
-    """The forces that a motion takes, the forces of the model left aside; files are in the current folder."""
+    """The forces that a motion takes, some forces of the model left aside; files are in the current folder."""
     import opensim
 
     opensim.Logger.setLevelString("off")
@@ -53,7 +59,7 @@ def inverse_dynamics(
     tool.setOutputGenForceFileName("forces.sto")
     tool.setResultsDir(".")
     excluded = opensim.ArrayStr()
-    excluded.append("ALL")
+    excluded.append(exclude)
     tool.setExcludedForces(excluded)
     assert tool.run()
     return read_sto("forces.sto")

@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import osimlite
+from osimlite import Body, Coordinate, Model, SpringGeneralizedForce
 from osimlite.document.reader import read_text
 from osimlite.multibody import build_mechanism
-from osimlite.simulation.recorded import RecordedMotion
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.recorded import RecordedMotion, exclude_forces
 from osimlite.simulation.storage import write_sto
 from tests.oracle.opensim_runs import inverse_dynamics
 
@@ -43,6 +46,40 @@ def test_inverse_dynamics_of_real_models(corpus: Any, name: str, tmp_path: Path,
     assert ours.columns == theirs.columns
     assert ours.times == pytest.approx(theirs.times, abs=1e-8)
     assert np.abs(ours.rows - theirs.rows).max() < 1e-8 * np.abs(theirs.rows).max()
+
+
+def _pushed(model: Model) -> None:
+    """Put springs and stops, off and on, beside the muscles; the motion leaves coordinates that were locked free."""
+    for place, coordinate in enumerate(model.components(Coordinate)):
+        model.add(SpringGeneralizedForce(name=f"s{place}", coordinate=coordinate.name, stiffness=3.0, viscosity=0.5))
+        coordinate.locked = place % 3 == 1
+    tips = list(model.components(Body))
+    ends = [osimlite.PathPoint(name=tip.name, socket_parent_frame=tip, location=(0.1, 0.0, 0.0)) for tip in tips[-2:]]
+    cord = model.add(osimlite.PathSpring(name="cord", resting_length=0.01, stiffness=100.0, dissipation=0.1))
+    cord.geometry_path.path_point_set.objects[:] = ends
+    model.find("/forceset/s2").appliesForce = False
+
+
+@pytest.mark.parametrize("name", ["m0005", "m0014"])
+def test_inverse_dynamics_beyond_the_forces_of_the_model(
+    corpus: Any, name: str, tmp_path: Path, monkeypatch: Any, capfd: Any
+) -> None:
+    """As with the usual `forces_to_exclude` of OpenSim's setup files."""
+    monkeypatch.chdir(tmp_path)
+    recorded(corpus, name, np.linspace(0.0, 1.0, 60))
+    model = osimlite.read("model.osim")
+    _pushed(model)
+    osimlite.write(model, "model.osim")
+    theirs = inverse_dynamics("model.osim", "motion.mot", exclude="Muscles")
+    capfd.readouterr()
+    mechanism = build_mechanism(model, opensim_derivatives=True)
+    motion = RecordedMotion.read(mechanism, "motion.mot")
+    alone = motion.inverse_dynamics()
+    exclude_forces(model, ["muscles"])
+    ours = motion.inverse_dynamics(force_elements(model, mechanism))
+    assert ours.columns == theirs.columns
+    assert np.abs(ours.rows - theirs.rows).max() < 1e-8 * np.abs(theirs.rows).max() + 1e-8
+    assert np.abs(ours.rows - alone.rows).max() > 1.0
 
 
 UNEVEN = np.sort(np.r_[np.linspace(0.0, 1.0, 41), 0.013, 0.4801, 0.777])

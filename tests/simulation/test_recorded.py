@@ -9,11 +9,16 @@ from osimlite.errors import DocumentError, ModelError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import rotation_xyz
+from osimlite.schema.actuators import CoordinateActuator
+from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import BallJoint, PinJoint
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
-from osimlite.simulation.recorded import RecordedMotion
+from osimlite.schema.muscles import Thelen2003Muscle
+from osimlite.schema.path_forces import PathSpring
+from osimlite.schema.sets import ObjectGroup
+from osimlite.simulation.recorded import RecordedMotion, exclude_forces
 from osimlite.simulation.storage import write_sto
 
 
@@ -99,3 +104,24 @@ def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     write_sto(path, "motion", [0.0, 0.1, 0.2], ("elbow_0",), [[1.0], [2.0], [3.0]])
     with pytest.raises(ModelError, match="the motion has 3 times; accelerations need at least 6"):
         RecordedMotion.read(arm, path).inverse_dynamics()
+
+
+def test_forces_are_excluded_by_name_by_group_and_by_kind():
+    model = Model(name="m")
+    for name in ("one", "two", "three"):
+        model.add(PathSpring(name=name))
+    model.add(CoordinateActuator(name="motor"))
+    model.add(Thelen2003Muscle(name="soleus"))
+    model.force_set.groups.append(ObjectGroup(name="pair", members=("one", "two")))
+
+    def on() -> list[str]:
+        return [force.name for force in model.components(Force) if force.appliesForce]
+
+    exclude_forces(model, ["three"])
+    assert on() == ["one", "two", "motor", "soleus"]
+    exclude_forces(model, ["muscles", "pair"])
+    assert on() == ["motor"]
+    exclude_forces(model, ["Actuators"])
+    assert on() == []
+    with pytest.raises(ModelError, match="no force and no group of forces 'solus'; did you mean 'soleus'"):
+        exclude_forces(model, ["solus"])

@@ -15,13 +15,11 @@ import numpy as np
 from osimlite.document.part import read_object
 from osimlite.errors import DocumentError, ModelError
 from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
-from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.geometries.load import Load
-from osimlite.simulation.elements.integral import value_of
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.storage import StoTable, read_beside
 from osimlite.text import listed, nearest
@@ -35,23 +33,6 @@ Functions = tuple[Function, Function, Function]
 def external_load(path: str, name: str, load: Load) -> DeclaredForce:
     """The force element of a load."""
     return DeclaredForce(ExternalForce, path, name, load, ())
-
-
-def generalized(load: Load, state: Kinematics, time: float) -> Array:
-    """What a load does to each of the n generalized speeds."""
-
-    def placed(frame: FramePlacement) -> Array:
-        return state.transform(frame.body) @ frame.transform
-
-    def vector(functions: Sequence[Function]) -> Array:
-        return np.array([value_of(function, time) for function in functions] or (0.0, 0.0, 0.0))
-
-    turn = placed(load.force_frame)[:3, :3]
-    there = placed(load.point_frame if load.point else load.frame)
-    point = there[:3, 3] + there[:3, :3] @ vector(load.point)
-    station = state.rotations[load.frame.body].T @ (point - state.origins[load.frame.body])
-    wrench = np.concatenate((turn @ vector(load.torque), turn @ vector(load.force)))
-    return np.asarray(wrench @ state.point_jacobian(load.frame.body, station))
 
 
 def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[DeclaredForce, ...]:
