@@ -2,8 +2,9 @@
 
 A kind says where its forces act (a geometry), what a law is given, and what the law's results mean. The law is a scalar
 function of floats. It is given, one after the other: the inputs of the geometry, the control if there is one, the
-states, the parameters. The kernel of a kind is written from this once, and compiled as every other kernel is. A second
-law, given the same, may find states in equilibrium; its kernel is written likewise.
+states, the parameters. The kernel of a kind is written from this (:mod:`osimlite.simulation.elements.kernel_text`), and
+compiled as every other kernel is. A second law, given the same, may find states in equilibrium; its kernel is written
+likewise.
 
 The integers of an item are the places of what varies in length (curves, formulas, controls) and of its states, and
 after these the geometry's; its numbers the parameters, the geometry's, and the tables; its record the outputs that are
@@ -12,8 +13,7 @@ no rates of states, inputs that are kept, what the geometry keeps, and the regis
 
 from __future__ import annotations
 
-import linecache
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
@@ -25,18 +25,14 @@ from osimlite.schema.actuators import Actuator
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
-from osimlite.simulation.kernels import layout, pointers
+from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF
 from osimlite.simulation.states import StateVariable
 
-ENERGY, SOLVED = "energy", "solved"
-"""The output that is the potential energy (J) of a force, and the one that tells whether the law has a solution; a kind
-without the first stores none that is known, the law of one without the other has always a solution."""
-
-
-NAMES = "NUMBERS", "RECORD", "OWN", "FREEDOMS", "TIME", "WORK_CONTROL", "OK", "UNSOLVED"
-"""What the code of kernels uses of the layout."""
+ENERGY = "energy"
+"""The output that is the potential energy (J) of a force; a kind without it stores none that is known."""
 
 
 @dataclass(frozen=True)
@@ -153,101 +149,10 @@ class Kind:
             names.append(self.geometry.speed)
         return {name: place for place, name in enumerate(dict.fromkeys(names))}
 
-    # ------------------------------------------------------------------------------------------ the kernels
     @cached_property
-    def kernel(self) -> Callable[..., int]:
-        """The function that computes and applies one force, written from the declaration."""
-        return self._written(self.name, self.law, self.source)
-
-    @cached_property
-    def off_kernel(self) -> Callable[..., int]:
-        """The function that computes one force and does not apply it."""
-        return self._written(self.name + OFF, self.law, self.off_source)
-
-    @cached_property
-    def equilibrium_kernel(self) -> Callable[..., int]:
-        """The function that brings the states of one force into equilibrium."""
-        return self._written(self.name + EQUILIBRIUM, self.equilibrium, self.equilibrium_source)
-
-    def _written(self, name: str, law: Callable[..., Any] | None, source: str) -> Callable[..., int]:
-        scope = {name: value for term in self.terms for name, value in term.functions().items()}
-        return written(name, f"{__package__}.kinds.{self.name}", source, law=law, **self.geometry.functions(), **scope)
-
-    @property
-    def source(self) -> str:
-        """The text of the kernel."""
-        return _function([*self._computing(self.name), *self.geometry.after])
-
-    @property
-    def off_source(self) -> str:
-        """The text of the kernel of a force that is off."""
-        return _function(self._computing(self.name + OFF))
-
-    def _computing(self, name: str) -> list[str]:
-        lines = self._before(name)
-        if self.law is not None:
-            results = f"{', '.join(self.outputs)} = " if self.outputs else ""
-            lines.append(f"{results}law({', '.join(self._arguments)})")
-        lines += self._noted(self.recorded)
-        if SOLVED in self.outputs:
-            lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
-        for place, state in self._places.items():
-            lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
-        return lines
-
-    @property
-    def equilibrium_source(self) -> str:
-        """The text of the kernel that brings the states into equilibrium."""
-        lines = self._before(self.name + EQUILIBRIUM)
-        lines.append(f"{', '.join((SOLVED, *self.settled))} = law({', '.join(self._arguments)})")
-        lines += self._noted((*self.geometry.inputs, *self.settled))
-        lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
-        for place, state in self._places.items():
-            if state.name in self.settled:
-                lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
-        return _function(lines)
-
-    def _before(self, name: str) -> list[str]:
-        """What both kernels begin with."""
-        return [
-            f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
-            "i = at(s, item)",
-            "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
-            f"g, gp, room = at(i, {layout.OWN + self._heads}), at(p, {self._size}), at(found, {len(self.recorded)})",
-            *self.geometry.before,
-        ]
-
-    def _noted(self, names: Iterable[str]) -> list[str]:
-        return [f"found[{self.recorded[name]}] = {name}" for name in names if name in self.recorded]
-
-    @property
-    def _places(self) -> dict[int, State]:
-        """Each state, by the integer of an item that says where it is, -1 if it has none."""
-        first = layout.OWN + sum(term.heads for term in self.terms)
-        return {first + number: state for number, state in enumerate(self.states)}
-
-    @property
-    def _arguments(self) -> list[str]:
-        """What a law is called with."""
-        arguments = list(self.geometry.inputs if self.inputs is None else self.inputs)
-        places = layout.OWN
-        number = 0
-        terms: list[str] = []
-        for term in self.terms:
-            terms += term.arguments(places, number)
-            places, number = places + term.heads, number + term.size
-        given = [place for place, state in self._places.items() if state.given]
-        values = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
-        count = 1 if self.controlled else 0
-        return [*arguments, *terms[:count], *values, *terms[count:]]
-
-    @property
-    def _heads(self) -> int:
-        return sum(term.heads for term in self.terms) + len(self.states)
-
-    @property
-    def _size(self) -> int:
-        return sum(term.size for term in self.terms)
+    def text(self) -> KernelText:
+        """Its kernels."""
+        return KernelText(self)
 
     def items(self, force: DeclaredForce, places: Places) -> list[Item]:
         """The parts of the geometry, and after them what the kernel computes of a force."""
@@ -256,7 +161,7 @@ class Kind:
         if parts:
             ints = (layout.OWN + len(parts[-1].ints), *ints)
         size = len(self.recorded) + self.geometry.room(force.place)
-        tail = Tail(layout.OWN + self._heads + len(ints), self._size + len(numbers), size)
+        tail = Tail(layout.OWN + self.text.heads + len(ints), self.text.size + len(numbers), size)
         heads: list[int] = []
         own: list[float] = []
         for term, value in zip(self.terms, force.values, strict=True):
@@ -371,29 +276,6 @@ class ForceOff(DeclaredForce):
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """None."""
         return 0.0
-
-
-def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
-    """A kernel that was written.
-
-    Args:
-        name: of it.
-        module: that it belongs to.
-        source: its text.
-        scope: what this uses, besides the layout.
-    """
-    known = {**{name: getattr(layout, name) for name in NAMES}, "at": pointers.at, "__name__": module, **scope}
-    file = f"<kernel {name}>"
-    exec(compile(source, file, "exec", dont_inherit=True), known)
-    # Tracebacks and `inspect.getsource` show it as they show a file.
-    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    kernel: Callable[..., int] = known[name]
-    return kernel
-
-
-def _function(lines: Sequence[str]) -> str:
-    """Its text, from the head on."""
-    return "\n    ".join([*lines, "return OK"]) + "\n"
 
 
 def kinds() -> list[Any]:

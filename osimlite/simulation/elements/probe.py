@@ -25,7 +25,8 @@ from osimlite.quantity import tell
 from osimlite.schema.probes import Probe
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places
-from osimlite.simulation.elements.kind import DeclaredForce, written
+from osimlite.simulation.elements.kernel_text import written
+from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.functions import table_of_one
 from osimlite.simulation.states import StateVariable

@@ -72,5 +72,5 @@ def law_function(name: str) -> Callable[..., Any]:
         module = name.removesuffix(EQUILIBRIUM).removesuffix(OFF)
         kind = import_module(f"osimlite.simulation.elements.kinds.{module}").KIND
         forms = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel"}
-        function = getattr(kind, forms.get(name.removeprefix(module), "kernel"))
+        function = getattr(kind.text, forms.get(name.removeprefix(module), "kernel"))
     return function

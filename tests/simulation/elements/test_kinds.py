@@ -22,7 +22,7 @@ def test_a_kind_is_found_by_its_class_and_is_in_the_manual(kind, repo):
 
 @pytest.mark.parametrize("kind", DECLARED, ids=lambda kind: kind.name)
 def test_the_kernel_follows_from_the_declaration(kind):
-    source = inspect.getsource(kind.kernel)
+    source = inspect.getsource(kind.text.kernel)
     assert source.startswith(f"def {kind.name}(") and source.endswith("return OK\n")
     assert kind.law is None or " law(" in source
     # What the geometry applies is given by the law.
@@ -39,7 +39,9 @@ def test_a_law_takes_what_the_kernel_gives():
     """One argument for each input, state and parameter."""
     for kind in DECLARED:
         if kind.law is not None:
-            calls = [node for node in ast.walk(ast.parse(kind.source)) if isinstance(node, ast.Call)]
+            calls = [
+                node for node in ast.walk(ast.parse(inspect.getsource(kind.text.kernel))) if isinstance(node, ast.Call)
+            ]
             (given,) = (len(call.args) for call in calls if call.func.id == "law")
             assert given == len(inspect.signature(kind.law).parameters), kind.name
 

@@ -1,0 +1,138 @@
+"""The kernels of a kind of force, written from its declaration."""
+
+from __future__ import annotations
+
+import linecache
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from osimlite.simulation.kernels import layout, pointers
+from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF
+
+if TYPE_CHECKING:
+    from osimlite.simulation.elements.kind import Kind, State
+
+SOLVED = "solved"
+"""The output that tells whether the law has a solution; without it, it always has one."""
+
+NAMES = "NUMBERS", "RECORD", "OWN", "FREEDOMS", "TIME", "WORK_CONTROL", "OK", "UNSOLVED"
+"""What the code of kernels uses of the layout."""
+
+
+@dataclass(frozen=True, eq=False)
+class KernelText:
+    """Writes the kernels of a kind.
+
+    Attributes:
+        kind: the declaration.
+    """
+
+    kind: Kind
+
+    @cached_property
+    def kernel(self) -> Callable[..., int]:
+        """The function that computes and applies one force."""
+        return self._function("", self.kind.law, [*self._computing, *self.kind.geometry.after])
+
+    @cached_property
+    def off_kernel(self) -> Callable[..., int]:
+        """The function that computes one force and does not apply it."""
+        return self._function(OFF, self.kind.law, self._computing)
+
+    @cached_property
+    def equilibrium_kernel(self) -> Callable[..., int]:
+        """The function that brings the states of one force into equilibrium."""
+        kind = self.kind
+        lines = [f"{', '.join((SOLVED, *kind.settled))} = law({', '.join(self._arguments)})"]
+        lines += self._noted((*kind.geometry.inputs, *kind.settled))
+        lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
+        for place, state in self._places.items():
+            if state.name in kind.settled:
+                lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
+        return self._function(EQUILIBRIUM, kind.equilibrium, lines)
+
+    def _function(self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]) -> Callable[..., int]:
+        kind, name = self.kind, self.kind.name + form
+        recorded = len(kind.recorded)
+        source = "\n    ".join(
+            [
+                f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
+                "i = at(s, item)",
+                "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
+                f"g, gp, room = at(i, {layout.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
+                *kind.geometry.before,
+                *lines,
+                "return OK\n",
+            ]
+        )
+        scope = {name: value for term in kind.terms for name, value in term.functions().items()}
+        return written(name, f"{__package__}.kinds.{kind.name}", source, law=law, **kind.geometry.functions(), **scope)
+
+    @property
+    def _computing(self) -> list[str]:
+        """What is done with the law, but for the force."""
+        kind, lines = self.kind, []
+        if kind.law is not None:
+            results = f"{', '.join(kind.outputs)} = " if kind.outputs else ""
+            lines.append(f"{results}law({', '.join(self._arguments)})")
+        lines += self._noted(kind.recorded)
+        if SOLVED in kind.outputs:
+            lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
+        for place, state in self._places.items():
+            lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
+        return lines
+
+    def _noted(self, names: Iterable[str]) -> list[str]:
+        recorded = self.kind.recorded
+        return [f"found[{recorded[name]}] = {name}" for name in names if name in recorded]
+
+    @property
+    def _places(self) -> dict[int, State]:
+        """Each state, by the integer of an item that says where it is, -1 if it has none."""
+        first = layout.OWN + sum(term.heads for term in self.kind.terms)
+        return {first + number: state for number, state in enumerate(self.kind.states)}
+
+    @property
+    def _arguments(self) -> list[str]:
+        """What a law is called with."""
+        kind = self.kind
+        places, number = layout.OWN, 0
+        terms: list[str] = []
+        for term in kind.terms:
+            terms += term.arguments(places, number)
+            places, number = places + term.heads, number + term.size
+        given = [place for place, state in self._places.items() if state.given]
+        states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
+        count = 1 if kind.controlled else 0
+        inputs = kind.geometry.inputs if kind.inputs is None else kind.inputs
+        return [*inputs, *terms[:count], *states, *terms[count:]]
+
+    @property
+    def heads(self) -> int:
+        """How many integers of an item are the kind's own."""
+        return sum(term.heads for term in self.kind.terms) + len(self.kind.states)
+
+    @property
+    def size(self) -> int:
+        """How many numbers of an item are the parameters."""
+        return sum(term.size for term in self.kind.terms)
+
+
+def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
+    """A kernel that was written.
+
+    Args:
+        name: of it.
+        module: that it belongs to.
+        source: its text.
+        scope: what this uses, besides the layout.
+    """
+    known = {**{name: getattr(layout, name) for name in NAMES}, "at": pointers.at, "__name__": module, **scope}
+    file = f"<kernel {name}>"
+    exec(compile(source, file, "exec", dont_inherit=True), known)
+    # Tracebacks and `inspect.getsource` show it as they show a file.
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    kernel: Callable[..., int] = known[name]
+    return kernel
