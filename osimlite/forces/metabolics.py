@@ -6,7 +6,7 @@ tendon compliance affects the metabolic cost of running", PLoS ONE 11, 2016.
 
 from __future__ import annotations
 
-from math import cos, nan, pi, sin
+from math import cos, nan, pi, sin, tanh
 from typing import NamedTuple
 
 
@@ -181,3 +181,89 @@ def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float
     """Which part of all fibers is excited, of slow and of fast ones."""
     angle = 0.5 * pi * excitation
     return ratio_slow_twitch_fibers * sin(angle), (1.0 - ratio_slow_twitch_fibers) * (1.0 - cos(angle))
+
+
+class Smoothed(NamedTuple):
+    """What the smooth law must know besides; 1 is yes and 0 is no.
+
+    Attributes:
+        form: of the transitions: 0 is none, 1 the hyperbolic tangent, 2 the function of Huber.
+        velocity_smoothing: how sharp the transition of shortening to lengthening is.
+        power_smoothing: how sharply negative power is kept out.
+        heat_rate_smoothing: how sharply heat is kept above 1 W/kg.
+    """
+
+    form: float
+    velocity_smoothing: float
+    power_smoothing: float
+    heat_rate_smoothing: float
+
+
+def bhargava2004_smoothed(
+    activation: float,
+    excitation: float,
+    active_force: float,
+    passive_force: float,
+    fiber_velocity: float,
+    force_length: float,
+    maintained: float,
+    m: Bhargava2004,
+    by: Smoothed,
+) -> tuple[float, float, float, float, float]:
+    """The powers by the model of Bhargava with smooth transitions (A. Falisse et al., J. R. Soc. Interface 16, 2019).
+
+    The arguments are those of :func:`bhargava2004`, whose switches of single rates do nothing here.
+
+    Returns:
+        All power, and the part of activation, maintenance, shortening and work, W.
+    """
+    active_force *= m.muscle_effort_scaling_factor
+    total = active_force + passive_force
+    slow, fast = recruited(m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers)
+    starting = m.mass * (m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast)
+    keeping = m.maintenance_constant_slow_twitch * slow + m.maintenance_constant_fast_twitch * fast
+    keeping *= m.mass * maintained
+    # OpenSim keeps the function of Huber away from 0.
+    velocity = fiber_velocity + 1e-16
+    if m.use_force_dependent_shortening_prop_constant:
+        isometric = m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
+        ends = 0.16 * isometric + 0.18 * total, 0.157 * total
+        factor = transition(velocity, *ends, by.velocity_smoothing, -1.0, min(by.form, 1.0))
+    else:
+        factor = transition(velocity, 0.25 * total, 0.0, by.velocity_smoothing, -1.0, by.form)
+    shortening = -factor * velocity
+    work = -active_force * fiber_velocity
+    if not m.include_negative_mechanical_work:
+        work = transition(velocity, work, 0.0, by.velocity_smoothing, -1.0, by.form)
+    if m.forbid_negative_total_power:
+        power = starting + keeping + shortening + work
+        shortening -= transition(-power, 0.0, power, by.power_smoothing, 1.0, by.form)
+    heat = starting + keeping + shortening
+    if m.enforce_minimum_heat_rate_per_muscle:
+        heat = transition(m.mass - heat, heat, m.mass, by.heat_rate_smoothing, 1.0, by.form)
+    return heat + work, starting, keeping, shortening, work
+
+
+def transition(x: float, left: float, right: float, sharpness: float, direction: float, form: float) -> float:
+    """From `left` where x is negative to `right` where it is positive.
+
+    Args:
+        x: what decides.
+        left: at one end.
+        right: at the other.
+        sharpness: of the transition.
+        direction: of the function of Huber, 1 or -1.
+        form: as in :class:`Smoothed`.
+    """
+    if form == 0.0:
+        return left if x <= 0.0 else right
+    if form == 1.0:
+        return left + (right - left) * (0.5 + 0.5 * tanh(sharpness * x))
+    offset = left if direction > 0.0 else right
+    y = sharpness * direction * x + 0.5
+    rise = offset
+    if y > 1.0:
+        rise += y - 0.5
+    elif y >= 0.0:
+        rise += 0.5 * y * y
+    return (right - left) / x * (rise / sharpness + offset * (1.0 - 1.0 / sharpness))

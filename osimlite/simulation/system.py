@@ -7,6 +7,7 @@ The stages are those of Simbody: where the links are (position), how they move (
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.items import ForceElement
+from osimlite.simulation.elements.items import CONTROLS, ForceElement
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
@@ -207,6 +208,16 @@ class System:
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
 
     # ---------------------------------------------------------------------------------------------- reports
+    def recorded(self, path: str, place: int) -> float:
+        """A number in the record of an element, or of the controls, after an evaluation."""
+        start = self.structure[layout.WORK_CONTROL] if path == CONTROLS else self._records_at[path]
+        return float(self._w[start + place])
+
+    @cached_property
+    def _records_at(self) -> dict[str, int]:
+        pairs = zip(self.forces.elements, self._items, strict=True)
+        return {element.path: items[-1][0] for element, items in pairs if items}
+
     def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
         """What each probe gives at a state, before its operation: one number for each of its labels."""
         self.applied(t, y)

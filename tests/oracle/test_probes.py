@@ -18,6 +18,8 @@ from osimlite.schema.functions import PiecewiseLinearFunction, Sine
 from osimlite.schema.metabolics import (
     Bhargava2004MuscleMetabolicsProbe,
     Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
+    Bhargava2004SmoothedMuscleMetabolics,
+    Bhargava2004SmoothedMuscleMetabolics_MuscleParameters,
     Umberger2010MuscleMetabolicsProbe,
     Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
 )
@@ -146,6 +148,17 @@ OF_BHARGAVA = (
 )
 
 
+SMOOTH: tuple[dict[str, object], ...] = (
+    {},
+    {"forbid_negative_total_power": False, "include_negative_mechanical_work": False},
+    {"use_force_dependent_shortening_prop_constant": True, "forbid_negative_total_power": False},
+    {"use_smoothing": True},
+    {"use_smoothing": True, "smoothing_type": "huber", "include_negative_mechanical_work": False},
+    {"use_smoothing": True, "smoothing_type": "huber", "use_force_dependent_shortening_prop_constant": True},
+    {"use_smoothing": True, "velocity_smoothing": 3.0, "power_smoothing": 0.1, "heat_rate_smoothing": 0.2},
+)
+
+
 def add_metabolics(model, names, kinds=(Umberger2010MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe)):
     """Probes with all switches on and off, of some muscles that differ."""
     for kind in kinds:
@@ -180,6 +193,39 @@ def test_metabolic_powers(model, muscle, tmp_path):
     drive(model, "along0", "along1")
     add_metabolics(model, ("along0", "along1"))
     compare(model, tmp_path)
+
+
+@pytest.mark.parametrize("switches", SMOOTH, ids=str)
+def test_smooth_metabolic_powers(model, switches, tmp_path):
+    muscles = along(RigidTendonMuscle)
+    muscles[0].optimal_fiber_length, muscles[1].optimal_fiber_length = 0.2, 2.0
+    model.add(*muscles)
+    drive(model, "along0", "along1")
+    metabolics = Bhargava2004SmoothedMuscleMetabolics(name="used", muscle_effort_scaling_factor=0.7, **switches)
+    for muscle in muscles:
+        parameters = Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(name=muscle.name, socket_muscle=muscle)
+        metabolics.muscle_parameters.append(parameters)
+    model.subcomponents.append(metabolics)
+    theirs = opened(model, tmp_path)
+    state = theirs.initSystem()
+    mechanism = build_mechanism(model)
+    system = System(mechanism, force_elements(model, mechanism))
+    names, rng = mechanism.coordinate_names, np.random.default_rng(7)
+    (outputs,) = (item for item in theirs.getComponentsList() if item.getName() == "used")
+    totals = "Metabolic", "Activation", "Maintenance", "Shortening", "MechanicalWork"
+    for _ in range(STATES):
+        q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
+        put(map(theirs.getCoordinateSet().get, names), state, q, u)
+        state.setTime(TIME)
+        theirs.realizeReport(state)
+        expected = [getattr(outputs, f"getTotal{total}Rate")(state) for total in totals]
+        expected += [outputs.getMuscleMetabolicRate(state, f"/forceset/along{number}") for number in (0, 1)]
+        (found,) = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist()))
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    ends = ["metabolic", "activation", "maintenance", "shortening", "mechanical_work"]
+    labels = [f"/used|total_{end}_rate" for end in ends]
+    labels += [f"/used|muscle_metabolic_rate:/forceset/along{number}" for number in (0, 1)]
+    assert probe_labels(system.probes) == labels
 
 
 def reported(model, tmp_path, to, accuracy):

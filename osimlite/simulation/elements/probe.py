@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.quantity import tell
-from osimlite.schema.probes import Probe
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places
 from osimlite.simulation.elements.kernel_text import written
@@ -207,6 +206,8 @@ class DeclaredProbe:
 def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) -> list[DeclaredProbe]:
     """The probes of a model that are enabled, in its order; those that cannot be computed are told of and left out.
 
+    Components whose outputs are reported are among them.
+
     Args:
         builder: of the elements.
         elements: the forces of the model.
@@ -216,9 +217,9 @@ def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) ->
     """
     by_path = {element.path: element for element in elements}
     found = []
-    for probe in builder.model.probe_set.objects:
+    for probe in builder.tree.components:
         kind = kind_of_probe(type(probe))
-        if kind is None or not probe.enabled:
+        if kind is None or not getattr(probe, "enabled", True):
             continue
         try:
             found.append(_made(kind, builder, probe, by_path))
@@ -227,24 +228,24 @@ def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) ->
     return found
 
 
-def _made(
-    kind: ProbeKind, builder: ElementBuilder, probe: Probe, elements: Mapping[str, ForceElement]
-) -> DeclaredProbe:
+def _made(kind: ProbeKind, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]) -> DeclaredProbe:
     path, reading = builder.path(probe), kind.read(builder, probe)
-    if probe.probe_operation == INTEGRATE and kind.law is None:
+    # A component with outputs has values, and no operations.
+    operation, gain = getattr(probe, "probe_operation", "value"), float(getattr(probe, "gain", 1.0))
+    if operation == INTEGRATE and kind.law is None:
         raise builder.unsupported(probe, ", whose integral osimlite does not compute")
-    initial: tuple[float, ...] = tuple(probe.initial_conditions_for_integration)
+    initial: tuple[float, ...] = tuple(getattr(probe, "initial_conditions_for_integration", ()))
     if len(initial) != len(reading.labels):
         # As in OpenSim, which says that it is an error.
         initial = (0.0,) * len(reading.labels)
     subjects = [_subject(kind, builder, probe, subject, elements) for subject in reading.subjects]
-    builder.check(probe, [probe.gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)])
+    builder.check(probe, [gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)])
     return DeclaredProbe(
         type(probe),
         path,
         probe.name,
-        probe.probe_operation,
-        float(probe.gain),
+        operation,
+        gain,
         initial,
         reading,
         tuple(places for places, _ in subjects),
@@ -253,14 +254,14 @@ def _made(
 
 
 def _subject(
-    kind: ProbeKind, builder: ElementBuilder, probe: Probe, subject: Subject, elements: Mapping[str, ForceElement]
+    kind: ProbeKind, builder: ElementBuilder, probe: Any, subject: Subject, elements: Mapping[str, ForceElement]
 ) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
     """Where what the law is given of a subject stands, and its numbers."""
     actuator, numbers = subject
     path = builder.path(actuator)
     control = CONTROLS, builder.controls.first_of(builder, actuator)
     element = elements.get(path)
-    if not actuator.appliesForce and "factor" in numbers._fields:
+    if not actuator.appliesForce and "factor" in getattr(numbers, "_fields", ()):
         # Its force is 0.
         return (control,) * len(kind.reads), tuple(map(float, numbers._replace(factor=0.0)))
     if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
@@ -277,6 +278,7 @@ def _subject(
     return tuple(places), tuple(map(float, numbers))
 
 
+@cache
 def kind_of_probe(component: type) -> Any:
     """The declaration of a class of probes, None if there is none."""
     name = f"{__package__}.probes.{module_name(component)}"

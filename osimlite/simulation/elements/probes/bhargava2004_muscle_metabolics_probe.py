@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 from osimlite.forces.metabolics import Bhargava2004, bhargava2004
 from osimlite.schema.metabolics import Bhargava2004MuscleMetabolicsProbe
 from osimlite.simulation.elements.gather import ElementBuilder
@@ -28,36 +31,31 @@ def _law(
     )
 
 
-def _read(builder: ElementBuilder, probe: Bhargava2004MuscleMetabolicsProbe) -> Reading:
-    name = "normalized_fiber_length_dependence_on_maintenance_rate"
-    of_muscle, of_probe = Bhargava2004._fields[3:8], [getattr(probe, name) for name in Bhargava2004._fields[8:]]
-    return metabolic(
-        builder,
-        probe,
-        lambda item, muscle, mass: Bhargava2004(
-            muscle.max_isometric_force,
-            muscle.optimal_fiber_length,
-            mass,
-            *(getattr(item, name) for name in of_muscle),
-            *of_probe,
-        ),
-        builder.function(probe, getattr(probe, name), name),
+def of_muscle(probe: Any, item: Any, muscle: Any, mass: float) -> Bhargava2004:
+    """What the law must know of a muscle and of a probe, whose switches are on if it has none."""
+    return Bhargava2004(
+        muscle.max_isometric_force,
+        muscle.optimal_fiber_length,
+        mass,
+        *(getattr(item, name) for name in Bhargava2004._fields[3:8]),
+        *(getattr(probe, name, True) for name in Bhargava2004._fields[8:]),
     )
 
 
-PROBE = ProbeKind(
-    Bhargava2004MuscleMetabolicsProbe,
-    _read,
-    _law,
-    (
-        "activation",
-        "control",
-        "active_fiber_force",
-        "passive_fiber_force",
-        "fiber_length",
-        "fiber_velocity",
-        "active_force_length",
-    ),
-    Bhargava2004,
-    has_curve=True,
+def _read(builder: ElementBuilder, probe: Bhargava2004MuscleMetabolicsProbe) -> Reading:
+    name = "normalized_fiber_length_dependence_on_maintenance_rate"
+    curve = builder.function(probe, getattr(probe, name), name)
+    return metabolic(builder, probe, partial(of_muscle, probe), curve)
+
+
+READS = (
+    "activation",
+    "control",
+    "active_fiber_force",
+    "passive_fiber_force",
+    "fiber_length",
+    "fiber_velocity",
+    "active_force_length",
 )
+
+PROBE = ProbeKind(Bhargava2004MuscleMetabolicsProbe, _read, _law, READS, Bhargava2004, has_curve=True)
