@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, cast
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -23,6 +24,8 @@ def info(
 ) -> None:
     """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
 
+    It also says what of it cannot be simulated.
+
     Example: osimlite info gait2392.osim
     """
     from rich.table import Table
@@ -30,6 +33,7 @@ def info(
     from osimlite.cli._console import add_row, plain_console, say, show
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
+    from osimlite.lint.words import times
     from osimlite.schema.coordinates import Coordinate
     from osimlite.schema.joints import Joint
     from osimlite.schema.tree import is_a
@@ -38,7 +42,9 @@ def info(
     document = read_document(Source.of_file(file))
     model = document.model
     components = list(model.components())
-    muscles = sum(is_a(component, "Muscle") for component in components)
+    muscles = [component for component in components if is_a(component, "Muscle")]
+    wraps = [component for component in components if is_a(component, "PathWrap")]
+    surfaces = sum(is_a(component, "WrapObject") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
 
     console = plain_console()
@@ -53,13 +59,15 @@ def info(
         ("bodies", f"{len(model.body_set.objects)}, {mass:.6g} kg"),
         ("joints", str(len(model.joint_set.objects))),
         ("coordinates", str(sum(isinstance(component, Coordinate) for component in components))),
-        ("muscles", str(muscles)),
-        ("forces besides", str(len(model.force_set.objects) - muscles)),
+        ("muscles", str(len(muscles))),
+        ("forces besides", str(len(model.force_set.objects) - len(muscles))),
+        ("wrap surfaces", f"{surfaces} for {times(len(wraps), 'wrap')} of paths"),
         ("markers", str(len(model.marker_set.objects))),
         ("contact surfaces", str(len(model.contact_geometry_set.objects))),
         ("constraints", str(len(model.constraint_set.objects))),
         ("components in all", str(len(components))),
         ("remarks of the reader", str(len(document.notes))),
+        ("simulation", _simulation(model, file.parent)),
     ):
         add_row(facts, name, value)
     console.print(facts)
@@ -69,6 +77,12 @@ def info(
         say("Coordinates: default, range")
         for line in _coordinates(model):
             # A name is never broken, however narrow the terminal is.
+            say(line)
+
+    if muscles:
+        say()
+        say("Muscles: greatest force, optimal fiber length, tendon slack length, path")
+        for line in _muscles(muscles):
             say(line)
 
     counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in components)
@@ -95,6 +109,43 @@ def _coordinates(model: Model) -> Iterator[str]:
             flags = [word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)]
             numbers = f"{coordinate.default_value:>9.4g} {unit:3}  {low:.4g} to {high:.4g} {unit}".rstrip()
             yield f"    {coordinate.name:{width}} {numbers}" + (f"  ({', '.join(flags)})" if flags else "")
+
+
+def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
+    """A line for each muscle, by class."""
+    from osimlite.lint.words import times
+    from osimlite.schema.paths import GeometryPath
+
+    width = max(len(muscle.name) for muscle in muscles)
+    for kind in dict.fromkeys(map(type, muscles)):
+        yield f"  {kind.__name__}"
+        for muscle in [muscle for muscle in muscles if type(muscle) is kind]:
+            path = muscle.geometry_path
+            laid = type(path).__name__
+            if isinstance(path, GeometryPath):
+                wraps = len(path.path_wrap_set.objects)
+                laid = times(len(path.path_point_set.objects), "point") + (f", {times(wraps, 'wrap')}" if wraps else "")
+            lengths = f"{muscle.optimal_fiber_length:>7.4g} m {muscle.tendon_slack_length:>7.4g} m"
+            yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
+
+
+def _simulation(model: Model, folder: Path) -> str:
+    """What of a model cannot be simulated."""
+    from osimlite._require import require
+    from osimlite.errors import OsimliteError
+    from osimlite.text import listed
+
+    try:
+        require("numpy", extra="sim", purpose="simulations")
+        from osimlite.multibody import build_mechanism
+        from osimlite.simulation.elements import by_class, force_elements
+
+        forces = force_elements(model, build_mechanism(model), skip_unsupported=True, folder=folder)
+    except OsimliteError as error:
+        return f"not possible: {error}"
+    if forces.skipped:
+        return f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
+    return "possible, with all that moves and pushes"
 
 
 def _unit(joint: Joint, place: int) -> str:

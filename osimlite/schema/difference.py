@@ -35,27 +35,27 @@ class _Comparison:
         self.new = new.tree()
 
     def run(self) -> Iterator[Difference]:
-        gone = [path for path in self.old.by_path if path not in self.new.by_path]
-        for path in _topmost(gone):
+        for path in _only_in(self.old, self.new):
             yield Difference(path, "", _kind(self.old.by_path[path]), None)
         for path, component in self.new.by_path.items():
             before = self.old.by_path.get(path)
             if before is not None:
                 yield from self._object(path, "", before, component)
-        came = [path for path in self.new.by_path if path not in self.old.by_path]
-        for path in _topmost(came):
+        for path in _only_in(self.new, self.old):
             yield Difference(path, "", None, _kind(self.new.by_path[path]))
 
     def _object(self, path: str, way: str, old: Object, new: Object) -> Iterator[Difference]:
         """Compare two objects that stand in the same place; `way` is the property that leads to them."""
         if _kind(old) != _kind(new):
             yield Difference(path, way or "class", _kind(old), _kind(new))
-            return
-        if isinstance(old, Unknown) and isinstance(new, Unknown):
-            if old.content != new.content:
+            if way:
+                return
+        if isinstance(old, Unknown) or isinstance(new, Unknown):
+            if isinstance(old, Unknown) and isinstance(new, Unknown) and old.content != new.content:
                 yield Difference(path, way or "content", old.content, new.content)
             return
-        for spec in field_specs(type(new)).values():
+        # Of components of two classes, what both have.
+        for spec in [spec for tag, spec in field_specs(type(new)).items() if tag in field_specs(type(old))]:
             place = f"{way}.{spec.tag}" if way else spec.tag
             one, other = getattr(old, spec.name), getattr(new, spec.name)
             if isinstance(spec.kind, Held):
@@ -110,10 +110,12 @@ def _equal(one: Any, other: Any) -> bool:
     return bool(one == other) or repr(one) == repr(other)
 
 
-def _topmost(paths: list[str]) -> Iterator[str]:
-    """Those paths that are not below another of them."""
-    given = set(paths)
-    return (path for path in paths if not any(path.startswith(above + "/") for above in _above(path) if above in given))
+def _only_in(tree: Tree, other: Tree) -> Iterator[str]:
+    """Paths of a tree that the other has not, and that are not below another of them, nor parts of a class."""
+    given = {path for path in tree.by_path if path not in other.by_path}
+    for path, component in tree.by_path.items():
+        if path in given and not tree.is_internal(component) and not any(above in given for above in _above(path)):
+            yield path
 
 
 def _above(path: str) -> Iterator[str]:

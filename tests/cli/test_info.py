@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import osimlite
 from osimlite.document.reader import read
 from osimlite.errors import NotWellFormedError
 from osimlite.lint import validate
@@ -22,6 +23,31 @@ def test_info_breaks_no_name_and_says_units():
     assert "    Pelvis_tx           0 m    0 to 10 m" in lines
     assert "    platform_rz   -0.1745 rad  -1.745 to 1.745 rad  (locked)" in lines
     assert any("8 Coordinate," in line for line in lines) and max(map(len, lines)) <= 80
+
+
+def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
+    model = osimlite.Model(name="m")
+    body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(osimlite.SliderJoint(name="rail").between(model.ground, body))
+    body.wrap_object_set.objects.append(osimlite.WrapSphere(name="ball", radius=0.1))
+    for kind, wraps in ((osimlite.Thelen2003Muscle, 1), (osimlite.RigidTendonMuscle, 0)):
+        muscle = model.add(kind(name=f"m{wraps}", max_isometric_force=546.0))
+        path = muscle.geometry_path
+        path.path_point_set.objects += [
+            osimlite.PathPoint(name="o", socket_parent_frame=model.ground, location=(0.5, 0.0, 0.0)),
+            osimlite.PathPoint(name="i", socket_parent_frame=body, location=(0.0, 0.2, 0.0)),
+        ]
+        path.path_wrap_set.objects += [osimlite.PathWrap(name="w", wrap_object="ball")] * wraps
+    osimlite.write(model, tmp_path / "m.osim")
+    lines = run("info", tmp_path / "m.osim").out.splitlines()
+    assert "    m1     546 N     0.1 m     0.2 m  2 points, 1 wrap" in lines
+    assert "    m0     546 N     0.1 m     0.2 m  2 points" in lines
+    facts = dict(line.split("  ", 1) for line in lines if "  " in line.strip())
+    assert facts["wrap surfaces"].strip() == "1 for 1 wrap of paths"
+    assert facts["simulation"].strip() == "possible, with all that moves and pushes"
+    model.find("/forceset/m1").ignore_tendon_compliance = True
+    osimlite.write(model, tmp_path / "m.osim")
+    assert "not possible: the ignore_tendon_compliance of '/forceset/m1'" in run("info", tmp_path / "m.osim").out
 
 
 def test_format_says_when_there_is_nothing_to_do(tmp_path):

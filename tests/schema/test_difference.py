@@ -45,6 +45,17 @@ def test_every_kind_of_change(walker: Model) -> None:
     ]
 
 
+def test_of_another_class_counts_what_both_have() -> None:
+    """And the parts that a class makes for itself count for nothing."""
+    old, new = Model(name="m"), Model(name="m")
+    old.add(osimlite.Thelen2003Muscle(name="soleus", max_isometric_force=100.0))
+    new.add(osimlite.RigidTendonMuscle(name="soleus", max_isometric_force=200.0, min_control=0.01))
+    assert differences(old, new) == [
+        Difference("/forceset/soleus", "class", "Thelen2003Muscle", "RigidTendonMuscle"),
+        Difference("/forceset/soleus", "max_isometric_force", 100.0, 200.0),
+    ]
+
+
 def test_differences_are_symmetric(walker: Model) -> None:
     other = dynamic_walker(thigh_length=0.42)
     there, back = differences(walker, other), differences(other, walker)
