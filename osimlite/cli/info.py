@@ -61,7 +61,7 @@ def info(
         ("coordinates", str(sum(isinstance(component, Coordinate) for component in components))),
         ("muscles", str(len(muscles))),
         ("forces besides", str(len(model.force_set.objects) - len(muscles))),
-        ("wrap surfaces", f"{surfaces} for {times(len(wraps), 'wrap')} of paths"),
+        ("wrap surfaces", f"{surfaces}, for {times(len(wraps), 'wrap')}"),
         ("markers", str(len(model.marker_set.objects))),
         ("contact surfaces", str(len(model.contact_geometry_set.objects))),
         ("constraints", str(len(model.constraint_set.objects))),
@@ -117,9 +117,11 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
     from osimlite.schema.paths import GeometryPath
 
     width = max(len(muscle.name) for muscle in muscles)
-    for kind in dict.fromkeys(map(type, muscles)):
-        yield f"  {kind.__name__}"
-        for muscle in [muscle for muscle in muscles if type(muscle) is kind]:
+    for kind in dict.fromkeys(type(muscle).__name__ for muscle in muscles):
+        yield f"  {kind}"
+        for muscle in muscles:
+            if type(muscle).__name__ != kind:
+                continue
             path = muscle.geometry_path
             laid = type(path).__name__
             if isinstance(path, GeometryPath):
