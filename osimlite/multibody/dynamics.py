@@ -17,7 +17,7 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import shortest, solutions, stacked
+from osimlite.multibody.linear import ROUNDING, shortest, solutions, stacked
 from osimlite.multibody.spatial import Array
 
 if TYPE_CHECKING:
@@ -153,7 +153,9 @@ def constrained_accelerations(
         factor = np.linalg.cholesky(matrix)
         if np.min(factor.diagonal() ** 2 / matrix.diagonal()) > SAFE_MASS:
             udot = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-            weighted = np.linalg.solve(factor, rows.T).T
+            # What moves nothing by more than rounding binds nothing.
+            binding = np.where(np.abs(rows).max(axis=1, keepdims=True) > ROUNDING, rows, 0.0)
+            weighted = np.linalg.solve(factor, binding.T).T
             # The second time mends the rounding of the first.
             for _ in range(2):
                 push = shortest(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))

@@ -275,7 +275,7 @@ def test_an_unknown_constraint_is_refused_by_name():
         bodies = ()
         name = "/constraintset/strange"
 
-    with pytest.raises(UnsupportedError, match=r"cannot keep up '/constraintset/strange' \(Strange\)"):
+    with pytest.raises(UnsupportedError, match=r"'/constraintset/strange' \(Strange\) cannot be kept up"):
         CompiledEngine(replace(mechanism, constraints=(Strange(),)), Forces(()))
 
 

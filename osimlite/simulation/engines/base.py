@@ -80,8 +80,11 @@ class KernelEngine(System):
         return self._y.tolist() if status == layout.OK else None
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
-        # They depend on nothing else.
-        return self.derivative(0.0, q + u + [0.0] * len(self.state.variables))[: len(self.order)]
+        y = q + u + [0.0] * len(self.state.variables)
+        status = self.realize(0.0, y, layout.VELOCITY_STAGE)
+        if status != layout.OK:
+            raise self.refusal(status, 0.0, y)
+        return self.found()[: len(self.order)]
 
     def hold(self) -> None:
         """There is no window."""

@@ -82,8 +82,8 @@ class BulletEngine(KernelEngine):
         fixed = [place for place in range(len(mechanism.coordinates)) if place not in free]
         shapes = {} if visuals is None else visuals.by_body
         robot = legal_names(merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes)))
-        self._is_plain = _is_plain(mechanism, robot)
-        if self._is_plain:
+        is_plain = _is_plain(mechanism, robot)
+        if is_plain:
             # A constraint might decide how the end of a chain moves.
             require_masses(robot)
         elif route == ARTICULATED_BODY:
@@ -110,7 +110,7 @@ class BulletEngine(KernelEngine):
             self.close()
             raise
         # Bullet takes inertias that no body has, but not for mass matrices.
-        self._steps_itself = self._is_plain and (is_exact or not added)
+        self._steps_itself = is_plain and (is_exact or not added)
         count = len(body.joints)
         self._moves = self.structure[self.structure[layout.CHAIN] + layout.WORK_JOINTS] if count else 0
         self._forces = self._moves + 3 * count
@@ -131,9 +131,9 @@ class BulletEngine(KernelEngine):
 
     def _supply_by_step(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> None:
         """Accelerations a: a mass matrix of one, and b - a as what has to be overcome."""
-        first, count = self._forces, len(self.order)
+        first, size = self._forces, len(self.order)
         values, rates, biases = w[self._moves : first].reshape(3, -1)
-        applied = f[count : 2 * count]
+        count, applied = len(values), f[size : 2 * size]
         forces = self.joint_forces(y.tolist(), applied)
         found = self._body.accelerations_by_step(values.tolist(), rates.tolist(), forces)
         applied[:] = 0.0

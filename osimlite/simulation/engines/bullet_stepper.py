@@ -58,7 +58,7 @@ class BulletStepper(Stepper):
         self._body.step(h, self._torques)
         y = self._state_there(h)
         # Bullet clips what would be faster, so that a motion that has burst may look finite.
-        if not max(map(abs, y[: 2 * len(self._places)]), default=0.0) < 0.5 * self._body.FASTEST:
+        if not max(map(abs, y[: 2 * len(self._engine.order)]), default=0.0) < 0.5 * self._body.FASTEST:
             raise burst(self.time, self._h)
         self._previous = self.time, self.state, []
         self.time, self.state = t, y
@@ -83,7 +83,7 @@ class BulletStepper(Stepper):
 
     def _evaluate_forces(self, y: Sequence[float]) -> Sequence[float]:
         self.evaluations += 1
-        count = len(self._places)
+        count = len(self._engine.order)
         applied = self._engine.applied(self.time, y)
         self._auxiliary_rates = applied[2 * count :]
         return self._engine.joint_forces(y, np.array(applied[count : 2 * count]))

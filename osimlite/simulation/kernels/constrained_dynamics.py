@@ -84,9 +84,11 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
         scales[k] = 1.0 / sqrt(pivot)
     rows, drifts, weighted = at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_FACTOR])
     for i in range(count):
-        row, turned = at(rows, size * i), at(weighted, size * i)
+        row, turned, longest = at(rows, size * i), at(weighted, size * i), 0.0
         for k in range(size):
-            turned[k] = row[k]
+            longest = max(longest, abs(row[k]))
+        for k in range(size):
+            turned[k] = row[k] if longest > ROUNDING else 0.0
         toward_ground(s, w, turned)
         for k in range(size):
             turned[k] *= scales[k]

@@ -98,10 +98,7 @@ def _pieces(function: f.Function, where: str) -> tuple[list[float], list[list[fl
         return [function.x[0], *function.x], [first[:2], *pieces[:-1], last[:2]]
     if isinstance(function, PiecewisePolynomial):
         return function.knots.tolist(), function.pieces.tolist()
-    raise UnsupportedError(
-        f"{where} is a {type(function).__name__}, which the compiled engine cannot do; take --engine bullet, or "
-        "another function"
-    )
+    raise UnsupportedError(f"{where} is a {type(function).__name__}, which cannot be computed; take another function")
 
 
 def value_at(table: Floats, z: float) -> tuple[float, float, float]:

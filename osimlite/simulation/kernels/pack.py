@@ -163,10 +163,7 @@ def _operations(
             found.append(_Operation(kind, frame, places, radii=motion.radii))
             frame = np.eye(4)
         else:
-            raise UnsupportedError(
-                f"the compiled engine cannot compute the {type(motion).__name__} of '{mobilizer.joint}'; "
-                "take --engine bullet"
-            )
+            raise UnsupportedError(f"the {type(motion).__name__} of '{mobilizer.joint}' cannot be computed")
     for operation in found:
         operation.joint = mobilizer.joint
     for operation, drift in drifts:

@@ -87,8 +87,7 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
         case b.WeldConstraint():
             return _between(_weld(constraint, places))
     raise UnsupportedError(
-        f"the compiled engine cannot keep up '{constraint.name}' ({type(constraint).__name__}); take --engine bullet, "
-        "or set its isEnforced to false"
+        f"'{constraint.name}' ({type(constraint).__name__}) cannot be kept up; set its isEnforced to false"
     )
 
 
