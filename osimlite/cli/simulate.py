@@ -65,8 +65,9 @@ def simulate(
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
-    Where the motion cannot be computed any further, or Ctrl-C ends it, what was
-    recorded is kept, without pictures.
+    What the model's probes report goes into probes.sto. Where the motion cannot be
+    computed any further, or Ctrl-C ends it, what was recorded is kept, without
+    pictures.
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """

@@ -250,6 +250,9 @@ def reported(model, tmp_path, to, accuracy):
 def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
     """Steps, labels and all that probes report at the ends of the steps."""
     labels, times, rows = reported(model, tmp_path, to, accuracy)
+    if any(probe.probe_operation == "differentiate" for probe in model.probe_set.objects):
+        # Simbody takes the first rate from memory that nobody has set.
+        rows[0] = [0.0] * len(labels)
     with Simulation(model, "compiled") as ready:
         steps = []
         stepper = ready.engine.stepper(
