@@ -235,7 +235,7 @@ def millard2012_acceleration_equilibrium(
 
     Step for step as in initMuscleState of OpenSim's class: parts of Newton's steps, while the rate of the path is
     shared between fibers and tendon by their stiffness. Where the slope vanishes, OpenSim goes on somewhere at random;
-    here the search ends.
+    here the search ends. It ends, as there, where a tendon without stiffness becomes taut.
 
     Args as of `millard2012_acceleration`.
     """
@@ -268,6 +268,8 @@ def millard2012_acceleration_equilibrium(
         tendon = length - fiber * cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
         both, tendon_rate = at.stiffness + at.tendon_stiffness, rate
         if tendon > m.slack and abs(both) > SIGNIFICANT:
+            if at.tendon_stiffness == 0.0:
+                break
             tendon_rate = at.stiffness / both * rate
     return False, fiber, fiber_velocity
 

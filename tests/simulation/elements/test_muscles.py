@@ -33,7 +33,7 @@ RECORDED = {
 """What of a record is what of the table."""
 
 
-DIGITS = {"Millard2012EquilibriumMuscle": 2e-11}
+DIGITS = {"Millard2012EquilibriumMuscle": 2e-11, "Millard2012AccelerationMuscle": 2e-11}
 """How exactly the numbers of a muscle are known, where it is not 2e-12."""
 
 
@@ -61,6 +61,10 @@ def test_derivatives_forces_and_energy(case, code):
     (element,) = ready.forces.elements
     for number, row in enumerate(rows):
         y = [float(row[name]) for name in ("path_length", "path_speed", *states(ready))]
+        if row["error"]:
+            with pytest.raises(SimulationError, match="no solution of the equations of '/forceset/mu', whose path of"):
+                ready.applied(float(number), y)
+            continue
         _, force, *rates = ready.applied(float(number), y)
         ((_, records),) = ready._records()
         known = element.known(records[-1])
@@ -69,7 +73,7 @@ def test_derivatives_forces_and_energy(case, code):
         for name, value in ours.items():
             expected = float(row[name])
             # What is a difference of forces has the digits of these.
-            scale = 1e-15 * known["max_isometric_force"] if "Force" in name or name == "Actuation" else 0.0
+            scale = 1e-3 * digits * known["max_isometric_force"] if "Force" in name or name == "Actuation" else 0.0
             # Exponentials of large numbers have fewer.
             close = digits if abs(expected) < 1e6 else 1e-10
             assert value == pytest.approx(expected, rel=close, abs=1e-14 + scale, nan_ok=True), (number, name)
@@ -78,8 +82,8 @@ def test_derivatives_forces_and_energy(case, code):
         parts = [row[f"{part}PotentialEnergy"] for part in ("Fiber", "Tendon")]
         stored = 0.0 if "n/a" in parts else sum(map(float, parts))
         # OpenSim's integrals of Millard's curves are splines.
-        close = 1e-5 if "millard" in case else 1e-8
-        assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=close, abs=0.01 * close)
+        close = 1e-4 if "millard" in case else 1e-8
+        assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=close, abs=0.001 * close)
 
 
 @pytest.mark.parametrize("code", [None, Checked("Python")], ids=["compiled", "Python"])
@@ -95,7 +99,7 @@ def test_equilibrium(case, code):
                 ready.equilibrated(float(number), y)
             continue
         found = ready.equilibrated(float(number), y)
-        expected = [float(row.get(f"eq_{name}", value)) for name, value in zip(states(ready), start, strict=True)]
+        expected = [float(row.get(f"eq_{name}") or value) for name, value in zip(states(ready), start, strict=True)]
         assert found[:2] == y[:2] and found[2:] == pytest.approx(expected, rel=1e-12, abs=1e-14), number
 
 
