@@ -140,7 +140,7 @@ class Renewal(Protocol):
         """The model with what its forces and bodies are now; None if more has changed than numbers.
 
         Args:
-            owners: forces, bodies and the model itself, if a property of theirs has changed.
+            owners: forces, controllers, bodies and the model itself, if a property of theirs has changed.
         """
 
 

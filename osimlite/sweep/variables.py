@@ -5,6 +5,7 @@
 ``RHip_rz/speed``                       generalized speed at the start
 ``/bodyset/Pelvis/mass``                any number of the model, by its path
 ``/forceset/*Foot*/.../stiffness``      several numbers that are the same in each run
+``BRA/control``                         control of an actuator at all times, added to what the model does
 ``thigh_length``                        parameter of the function that makes the model
 ``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
 ======================================  ==========================================================
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, quantity
+from osimlite.schema.actuators import Actuator
 from osimlite.schema.model import Model
 from osimlite.simulation.start import suspect_value
 from osimlite.sweep.properties import Place, places
@@ -63,11 +65,18 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Control:
+    """What is added to the control of an actuator, by its path."""
+
+    actuator: str
+
+
+@dataclass(frozen=True)
 class Slope:
     """Gravity of the same size, tilted about z, in rad."""
 
 
-Target = Start | Property | Parameter | Slope
+Target = Start | Property | Control | Parameter | Slope
 
 
 @dataclass(frozen=True)
@@ -197,6 +206,9 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
     if name in parameters:
         default = parameters[name]
         return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
+    actuators = {key: item.path for item in model.components(Actuator) for key in (item.name, item.path)}
+    if last == "control" and front in actuators:
+        return Control(actuators[front]), ""
     if name.startswith("/"):
         found = places(model, name, list(infos))
         unit = found[0].unit
@@ -207,6 +219,7 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         return Slope(), "rad"
     known = [*(info.name for info in mechanism.coordinates), *parameters, "slope"]
     known += [f"{info.name}/speed" for info in mechanism.coordinates]
+    known += [f"{item.name}/control" for item in model.components(Actuator)]
     near = did_you_mean(name, known) or ("; a path begins with /" if "/" in name else "")
     raise SettingError(f"there is no coordinate, parameter or path '{name}' to vary{near}")
 

@@ -19,20 +19,27 @@ import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.schema.base import Component
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
+from osimlite.schema.functions import Constant
 from osimlite.schema.model import Model
 from osimlite.simulation.many import Renewal
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
+from osimlite.sweep.properties import Setter
+from osimlite.sweep.variables import Control, Floats, Parameter, Property, Slope, Start
 
 if TYPE_CHECKING:
     from osimlite.gait.foot_contacts import FootContacts
 
 PRESSED = 8e-4
 """So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
+
+RENEWED = Force, Controller, Body, Model
+"""What an engine need not be made anew for."""
 
 MOST_KEPT = 64
 """So many models are kept: a grid asks for the same ones again and again."""
@@ -193,10 +200,10 @@ class Variants:
             if isinstance(item.target, Start):
                 info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinate)]
                 found.append(info.default_speed if item.target.is_speed else info.default_value)
-            elif isinstance(item.target, Property):
+            elif place in setters:
                 found.append(setters[place][0].get())
             else:
-                found.append(0.0 if isinstance(item.target, Slope) else item.target.default)
+                found.append(item.target.default if isinstance(item.target, Parameter) else 0.0)
         return found
 
     def set_start(self, values: Sequence[float]) -> None:
@@ -252,8 +259,14 @@ class Variants:
             elif isinstance(target, Slope):
                 self._slopes.append(place)
                 owners.append(model)
+            elif isinstance(target, Control):
+                control = Constant(value=0.0)
+                brain = PrescribedController(name=f"varied_{place}", socket_actuators=(target.actuator,))
+                brain.ControlFunctions.objects.append(control)
+                owners.append(model.add(brain))
+                self._setters.append((place, [Setter(control, "value", None)]))
         can_renew = self._plan.engine == "compiled" and not self._parameters
-        self._owners = owners if can_renew and all(isinstance(item, Force | Body | Model) for item in owners) else None
+        self._owners = owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
 
     def _whole(self) -> Variant:
         plan = self._plan

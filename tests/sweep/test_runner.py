@@ -13,6 +13,9 @@ from hypothesis import strategies as st
 from osimlite import Body, Coordinate, Model, PinJoint, SliderJoint
 from osimlite.errors import DoubtfulWarning, OsimliteError, SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.actuators import CoordinateActuator
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.functions import Constant
 from osimlite.simulation import Simulation
 from osimlite.sweep.plan import Plan, Stop, plan
 from osimlite.sweep.runner import Runner
@@ -135,6 +138,35 @@ def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
             energies = simulation.run(0.6).summary["energy_J"]
         energy = Runner(made).run(np.array([row])).measures["energy"][0]
         assert energy == pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9)
+
+
+def test_controls_are_those_that_a_run_is_given():
+    """Besides what the model does; only the numbers are made afresh, of other controllers too."""
+    model = dynamic_walker()
+    model.add(*(CoordinateActuator(name=f"{side}_hip", coordinate=f"{side}Hip_rz") for side in "RL"))
+    brain = PrescribedController(name="brain", socket_actuators=("/forceset/R_hip",))
+    brain.ControlFunctions.objects.append(Constant(value=0.3))
+    model.add(brain)
+    of_brain = "/controllerset/brain/ControlFunctions/value"
+    vary = {
+        "R_hip/control": (-3.0, 3.0),
+        "RHip_rz": (0.2, 0.6),
+        "/forceset/L_hip/control": (-1.0, 1.0),
+        of_brain: (0.0, 1.0),
+    }
+    made = plan(model, vary, measures=tuple(STATES), to=0.3)
+    rows = np.array([[2.0, 0.5, -1.0, 0.3], [-1.5, 0.3, 0.25, 0.7]])
+    block = Runner(made).run(rows)
+    assert Variants(made).variant(rows[0].tolist()).simulation is None
+    for number, (right, hip, left, own) in enumerate(rows.tolist()):
+        brain.ControlFunctions.objects[0].value = own
+        with Simulation(model, "compiled") as simulation:
+            trajectory = simulation.run(0.3, initial={"RHip_rz": hip}, controls={"R_hip": right, "L_hip": left})
+        ends = dict(zip(trajectory.coordinates, trajectory.values[-1].tolist(), strict=True))
+        rates = dict(zip(trajectory.coordinates, trajectory.speeds[-1].tolist(), strict=True))
+        for name in STATES:
+            coordinate, _, what = name.partition("/")
+            assert block.measures[name][number] == (ends if what == "value" else rates)[coordinate]
 
 
 def test_parameters_of_a_function():

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from osimlite.errors import SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
+from osimlite.schema.actuators import CoordinateActuator
 from osimlite.sweep.properties import places
-from osimlite.sweep.variables import Parameter, Property, Slope, Start, Variable, parse, variables
+from osimlite.sweep.variables import Control, Parameter, Property, Slope, Start, Variable, parse, variables
 
 MODEL = dynamic_walker()
 MECHANISM = build_mechanism(MODEL)
@@ -37,6 +38,18 @@ def test_names():
     locked = one("platform_rz", "-12deg:-2deg")
     assert isinstance(locked.target, Property) and locked.target.places[0].steps == ("default_value",)
     assert locked.low == math.radians(-12)
+
+
+def test_controls():
+    model = dynamic_walker()
+    model.add(CoordinateActuator(name="motor", coordinate="RHip_rz"))
+    for name in ("motor/control", "/forceset/motor/control"):
+        (found,) = variables({name: "-1:1"}, model, build_mechanism(model))
+        assert found.target == Control("/forceset/motor")
+    with pytest.raises(SettingError, match="did you mean 'motor/control'"):
+        variables({"moter/control": "0:1"}, model, build_mechanism(model))
+    with pytest.raises(SettingError, match="are the same number; vary one of them"):
+        variables({"motor/control": "0:1", "/forceset/motor/control": "0:1"}, model, build_mechanism(model))
 
 
 def test_several_numbers_by_one_path():

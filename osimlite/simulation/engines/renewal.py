@@ -13,10 +13,12 @@ from osimlite.multibody.build import mass_properties
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
+from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
+from osimlite.simulation.elements.controls import Controls, ModelControls
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
@@ -72,7 +74,7 @@ class NumbersOnly:
         """The model with what its forces and bodies are now; None if more has changed than numbers.
 
         Args:
-            owners: forces, bodies and the model itself, if a property of theirs has changed.
+            owners: forces, controllers, bodies and the model itself, if a property of theirs has changed.
         """
         made: dict[str, Any] = {}
         sharing = {type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)}
@@ -82,23 +84,24 @@ class NumbersOnly:
                 made[element.path] = element
         if not made.keys() <= self._items.keys():
             return None
-        only_forces = all(isinstance(owner, Force) for owner in owners)
+        only_forces = all(isinstance(owner, Force | Controller) for owner in owners)
         if any(isinstance(element, DeclaredProbe) for element in self._forces.elements):
             if not only_forces:
                 # The mass of the model has a say in what muscles use.
                 return None
             made |= {probe.path: probe for probe in probe_elements(self._builder, self._forces.elements)}
-        forces = replace(
-            self._forces, elements=tuple(made.get(element.path, element) for element in self._forces.elements)
-        )
+        elements = tuple(made.get(element.path, element) for element in self._forces.elements)
+        forces = replace(self._forces, elements=elements)
+        if any(isinstance(owner, Controller) for owner in owners):
+            forces = replace(forces, controls=ModelControls(self._builder).controls)
         mechanism = self._mechanism if only_forces else self._with_masses()
         if mechanism is None:
             return None
-        numbers = self._with_forces(made) if only_forces else self._packed(mechanism, forces)
+        numbers = self._with_forces(made, forces.controls) if only_forces else self._packed(mechanism, forces)
         return None if numbers is None else Renumbered(mechanism, forces, numbers, type(self._engine))
 
-    def _with_forces(self, made: Mapping[str, Any]) -> Floats | None:
-        """The given numbers with those of some elements in their places."""
+    def _with_forces(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
+        """The given numbers with those of some elements, and of the controls, in their places."""
         numbers = self._engine.numbers.copy()
         for path, element in made.items():
             items = element.items(self._places)
@@ -106,6 +109,13 @@ class NumbersOnly:
                 return None
             place = self._first[path]
             numbers[place : place + _length(items)] = [x for item in items for x in item.numbers]
+        if controls is not self._forces.controls:
+            structure = self._engine.structure
+            place = structure[layout.CONTROLS]
+            ints, own, _ = controls.record()
+            if structure[place + layout.OWN :].tolist() != ints:
+                return None
+            numbers[structure[place + layout.NUMBERS] :] = own
         return numbers
 
     def _with_masses(self) -> Mechanism | None:
