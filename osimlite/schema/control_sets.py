@@ -3,11 +3,8 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, none
-from osimlite.schema.fields import LegacyMany, Value, real
+from osimlite.schema.fields import LegacyFlag, LegacyMany, LegacyNumber, real
 from osimlite.schema.sets import ObjectGroup
-
-LegacyFlag = Annotated[bool, Value("bool", legacy=True)]
-LegacyNumber = Annotated[float, real(legacy=True)]
 
 
 class Control(Object, abstract=True):
@@ -37,7 +34,7 @@ class ControlLinearNode(Object):
     """A point of a control curve."""
 
     t: Annotated[float, real(legacy=True)] = 0.0
-    """Time."""
+    """When the control has the value, in seconds."""
     value: LegacyNumber = 0.0
     """Of the control at that time."""
 

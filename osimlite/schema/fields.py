@@ -275,9 +275,9 @@ def maybe(unit: str | None = None, domain: str = "") -> Value:
     return Value("double", "optional", unit=unit, domain=domain)
 
 
-def word(*choices: str) -> Value:
+def word(*choices: str, legacy: bool = False) -> Value:
     """Marker of a text of which only some words have a meaning."""
-    return Value("string", choices=choices)
+    return Value("string", choices=choices, legacy=legacy)
 
 
 Vec2 = tuple[float, float]
@@ -290,6 +290,10 @@ Text = Annotated[str, Value("string")]
 Number = Annotated[float, Value("double")]
 Integer = Annotated[int, Value("int")]
 Vector = Annotated[Reals, Value("double", "vector")]
+LegacyFlag = Annotated[bool, Value("bool", legacy=True)]
+LegacyText = Annotated[str, Value("string", legacy=True)]
+LegacyNumber = Annotated[float, real(legacy=True)]
+LegacyInteger = Annotated[int, Value("int", legacy=True)]
 LegacyReals = Annotated[Reals, reals(legacy=True)]
 MaybeFlag = Annotated[bool | None, Value("bool", "optional")]
 
@@ -297,5 +301,6 @@ Single = Annotated[T, Held("single")]
 Unnamed = Annotated[T, Held("unnamed")]
 Optional = Annotated[T | None, Held("optional")]
 Many = Annotated[list[T], Held("list")]
+LegacyUnnamed = Annotated[T, Held("unnamed", legacy=True)]
 LegacyMany = Annotated[list[T], Held("list", legacy=True)]
 LegacyOptional = Annotated[T | None, Held("optional", legacy=True)]

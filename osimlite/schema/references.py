@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from osimlite.schema.base import Component
-from osimlite.schema.fields import Reference
+from osimlite.schema.fields import LEGACY, Reference
 
 Named = str | Component
 Names = tuple[Named, ...]
@@ -59,3 +59,40 @@ LegacyFileName = Annotated[str, Reference("file", "file", required=False, legacy
 MaybeFileName = Annotated[str | None, Reference("file", "file", "optional", required=False)]
 ColumnName = Annotated[str, Reference("column", "column", required=False)]
 MaybeColumnName = Annotated[str | None, Reference("column", "column", "optional", required=False)]
+
+
+def reads(content: str, *, legacy: bool = False) -> Reference:
+    """Marker of a file that a tool reads; `content` is the class of the object in it, or what kind of table it is."""
+    return Reference("file", f"{content} file", required=False, legacy=legacy)
+
+
+def writes(content: str, *, legacy: bool = False) -> Reference:
+    """Marker of a file that a tool writes."""
+    return Reference("output-file", f"{content} file", required=False, legacy=legacy)
+
+
+# What tools name in the model that they work on, and the files that they are given and write.
+BodyName = Annotated[Named, Reference("body-name", "Body", required=False, legacy=True)]
+BodyOrCenterOfMass = Annotated[Named, Reference("body-name-or-com", "Body", required=False, legacy=True)]
+BodiesOrCenterOfMass = Annotated[Names, Reference("body-name-or-com", "Body", "list", required=False, legacy=True)]
+LegacyCoordinateName = Annotated[CoordinateName, LEGACY]
+LegacyCoordinateNames = Annotated[
+    Names, Reference("coordinate-name", "Coordinate", "list", required=False, legacy=True)
+]
+LegacyJointNames = Annotated[JointNames, LEGACY]
+LegacyActuatorNames = Annotated[ActuatorNames, LEGACY]
+MarkerNames = Annotated[Names, Reference("marker-name", "Marker", "list", legacy=True)]
+InputModel = Annotated[str, reads("Model")]
+LegacyInputModel = Annotated[str, reads("Model", legacy=True)]
+LegacyOutputModel = Annotated[str, writes("Model", legacy=True)]
+InputTable = Annotated[str, reads("table")]
+LegacyInputTable = Annotated[str, reads("table", legacy=True)]
+LegacyInputMarkers = Annotated[str, reads("marker data", legacy=True)]
+LegacyInputLoads = Annotated[str, reads("ExternalLoads", legacy=True)]
+LegacyInputForceSets = Annotated[
+    tuple[str, ...], Reference("file", "ForceSet file", "list", required=False, legacy=True)
+]
+OutputTable = Annotated[str, writes("table")]
+LegacyOutputTable = Annotated[str, writes("table", legacy=True)]
+OutputFolder = Annotated[str, Reference("output-folder", "folder", required=False)]
+LegacyOutputFolder = Annotated[OutputFolder, LEGACY]

@@ -104,6 +104,24 @@ _AREAS = {
         "BushingForce ExpressionBasedBushingForce ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce "
         "FunctionBasedBushingForce PointToPointSpring SpringGeneralizedForce"
     ),
+    "tools.analyses": (
+        "Actuation Analysis AnalysisSet BodyKinematics ForceReporter IMUDataReporter InducedAccelerations "
+        "JointReaction Kinematics MuscleAnalysis OutputReporter PointKinematics ProbeReporter StatesReporter "
+        "StaticOptimization"
+    ),
+    "tools.dynamics": "AbstractTool AnalyzeTool DynamicsTool ForwardTool InverseDynamicsTool",
+    "tools.inverse_kinematics": (
+        "IKCoordinateTask IKMarkerTask IKTask IKTaskSet IMUInverseKinematicsTool InverseKinematicsTool "
+        "InverseKinematicsToolBase OrientationWeight OrientationWeightSet Tool"
+    ),
+    "tools.scale": (
+        "BodyScale BodyScaleSet GenericModelMaker MarkerPair MarkerPairSet MarkerPlacer Measurement MeasurementSet "
+        "ModelScaler Scale ScaleSet ScaleTool"
+    ),
+    "tools.tracking": (
+        "CMCTool CMC_Joint CMC_Point CMC_Task CMC_TaskSet MuscleStateTrackingTask RRATool SMC_Joint StateTrackingTask "
+        "TrackingTask"
+    ),
     "wrapping": "WrapCylinder WrapEllipsoid WrapObject WrapObjectSet WrapSphere WrapTorus",
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,18 @@ SCHEMAS = Path(__file__).resolve().parents[2] / "schemas"
 CATALOGUE = json.loads((SCHEMAS / "opensim-4.6.json").read_text())["classes"]
 REFERENCES = json.loads((SCHEMAS / "references.json").read_text())["references"]
 
+LATER = {"moco", "processor"}
+ALSO = {
+    "CoordinateSet", "ExperimentalSensor", "IMUPlacer", "MarkerWeight", "MarkersReference", "PolynomialPathFitter",
+    "PolynomialPathFitterBounds", "Set_MarkerWeight_", "SimbodyEngine", "XsensDataReaderSettings",
+}  # fmt: skip
+"""Not yet declared."""
 CONCRETE = sorted(
     name
     for name, entry in CATALOGUE.items()
-    if not entry["abstract"] and (entry.get("document") == "model" or entry.get("area") == "control sets")
+    if entry.get("registered") and not entry["abstract"] and entry["document"] not in LATER and name not in ALSO
 )
-"""Of models, and of the documents of controls that models name."""
+"""The classes that a document may hold."""
 
 NOT_IN_FILES = {"PathWrapPoint"}
 """Concrete in OpenSim's C++ but never written to a file: declared as internal parts, without a tag."""
@@ -38,7 +45,19 @@ OUTSIDE_46 = {"@file", "actuator_list"}
 OUTSIDE_TARGETS = {"file": "file", "column": "column"}
 """What lies outside the model has one target per rule; the catalogue describes it in prose."""
 
-TARGETS = {"SimTK::Vector_<double>": "Vector", "object in the enclosing Set": "Object"}
+TARGETS = {
+    "SimTK::Vector_<double>": "Vector",
+    "object in the enclosing Set": "Object",
+    "Actuator or group": "Actuator",
+    "Force or ForceSet group": "Force",
+    "Marker (2)": "Marker",
+    "PhysicalFrame base frame name": "PhysicalFrame",
+    "segment of the model": "Body",
+}
+"""What the catalogue describes in prose."""
+
+FILES = re.compile(r"\w+_files?|filepath|\w+_(directory|folder)")
+"""Names of properties of tools that are paths of files and folders."""
 
 
 def declared(tag: str) -> Any:
@@ -51,7 +70,7 @@ def declared(tag: str) -> Any:
 def references() -> dict[tuple[str, str], dict]:
     found = {}
     for entry in REFERENCES:
-        if entry["document"] == "model":
+        if entry["document"] not in LATER and entry["cls"] not in ALSO:
             found[entry["cls"], entry["property"]] = entry
     return found
 
@@ -68,6 +87,11 @@ def expected_reference(prop: dict) -> tuple[str, str, bool, bool] | None:
     target = entry["target"].removeprefix("Output of type ").removesuffix(" (list)")
     target = OUTSIDE_TARGETS.get(rule, TARGETS.get(target, target))
     return rule, target, entry["required"], prop["kind"] == "list"
+
+
+def tag_of(prop: dict) -> str:
+    """The tag in a file: of the one object of a property of the first system it is that of its class."""
+    return prop["accepts_base"] if "printed_as" in prop else prop["name"]
 
 
 def expected_default(prop: dict) -> str | None:
@@ -106,16 +130,16 @@ def test_class_equals_the_catalogue(name: str) -> None:
     entry = CATALOGUE[name]
     cls = declared(entry["xml_tag"])
     specs = field_specs(cls)
-    assert list(specs) == [prop["name"] for prop in entry["properties"]]
+    assert list(specs) == [tag_of(prop) for prop in entry["properties"]]
     plain = cls()
     for prop in entry["properties"]:
-        spec = specs[prop["name"]]
+        spec = specs[tag_of(prop)]
         kind = spec.kind
         value = getattr(plain, spec.name)
         assert spec.legacy == bool(prop.get("legacy")), prop["name"]
         if prop.get("object"):
             assert isinstance(kind, Held), prop["name"]
-            form = "unnamed" if prop["unnamed"] else prop["kind"]
+            form = "unnamed" if prop["unnamed"] or "printed_as" in prop else prop["kind"]
             assert kind.form == form, prop["name"]
             assert spec.accepts is not None and spec.accepts.tag == prop["accepts_base"], prop["name"]
             default = prop["default"] or []
@@ -139,7 +163,12 @@ def test_class_equals_the_catalogue(name: str) -> None:
             assert text == expected_default(prop), prop["name"]
             assert (value is None) == (prop["default"] is None), prop["name"]
             continue
+        if isinstance(kind, Reference) and kind.rule in ("file", "output-file", "output-folder"):
+            assert FILES.fullmatch(prop["name"]), prop["name"]
+            assert (" ".join(value) if kind.shape == "list" else value) == expected_default(prop), prop["name"]
+            continue
         assert isinstance(kind, Value), f"{prop['name']} names nothing"
+        assert not FILES.fullmatch(prop["name"]), f"{prop['name']} names a file"
         assert kind.unit == prop.get("unit"), prop["name"]
         if prop["type"] in ("Vec3", "Vec6", "Transform", "Vector"):
             assert (kind.scalar, kind.shape) == ("double", prop["type"].replace("Vector", "vector")), prop["name"]
@@ -157,7 +186,7 @@ def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None
     cls = declared(entry["xml_tag"])
     for prop in entry["properties"]:
         if prop["declared_in"] in CATALOGUE and prop["name"] not in ("objects", "groups"):
-            assert field_specs(cls)[prop["name"]].declared_in.tag == prop["declared_in"], prop["name"]
+            assert field_specs(cls)[tag_of(prop)].declared_in.tag == prop["declared_in"], prop["name"]
 
 
 @pytest.mark.parametrize("name", CONCRETE)
@@ -193,18 +222,19 @@ def test_no_reference_is_forgotten() -> None:
     named = {key for key in REFERENCE_OF if key[1] == "@name"}
     others = {key for key in REFERENCE_OF if key[1] in OUTSIDE_46}
     assert REFERENCE_OF.keys() - reached == named | others
-    assert len(REFERENCE_OF) == 93
+    assert len(REFERENCE_OF) == 117
     for owner, _ in named:
         rule = declared(owner).name_reference
         entry = REFERENCE_OF[owner, "@name"]
-        assert (rule.rule, rule.target, rule.required) == (entry["resolution"], entry["target"], entry["required"])
+        target = TARGETS.get(entry["target"], entry["target"])
+        assert (rule.rule, rule.target, rule.required) == (entry["resolution"], target, entry["required"])
 
 
 def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
     """And, besides, those that say that OpenSim has them only later."""
     known = [tag for tag in tags() if not declared(tag).since]
     assert known == sorted(CATALOGUE[name]["xml_tag"] for name in CONCRETE)
-    assert len(known) == 178
+    assert len(known) == 221
     assert not {tag for tag in tags() if declared(tag).since} & {entry.get("xml_tag") for entry in CATALOGUE.values()}
 
 

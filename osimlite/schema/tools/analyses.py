@@ -1,0 +1,183 @@
+"""Analyses: what tools compute and write along a motion."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made, none
+from osimlite.schema.constraints import ConstraintSet
+from osimlite.schema.fields import (
+    Flag,
+    LegacyFlag,
+    LegacyInteger,
+    LegacyMany,
+    LegacyNumber,
+    LegacyText,
+    LegacyUnnamed,
+    Reals,
+    Reference,
+    Value,
+    real,
+    reals,
+)
+from osimlite.schema.references import (
+    BodiesOrCenterOfMass,
+    LegacyCoordinateNames,
+    LegacyInputTable,
+    LegacyJointNames,
+    Named,
+    Names,
+)
+from osimlite.schema.sets import ObjectGroup
+
+
+class Analysis(Object, abstract=True):
+    """Something that is computed along a motion."""
+
+    on: LegacyFlag = True
+    """Whether the analysis is done."""
+    start_time: Annotated[float, real("s", legacy=True)] = float("-inf")
+    """Where it begins."""
+    end_time: Annotated[float, real("s", legacy=True)] = float("inf")
+    """Where it ends."""
+    step_interval: LegacyInteger = 1
+    """Every how many steps of the integrator, or rows of the motion, something is written."""
+    in_degrees: LegacyFlag = True
+    """Whether angles are written in degrees."""
+
+
+class AnalysisSet(Object):
+    """The analyses of a run."""
+
+    objects: LegacyMany[Analysis] = none()
+    """The analyses."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the analyses; the tools ignore them."""
+
+
+class Actuation(Analysis):
+    """Force, speed and power of the actuators."""
+
+
+class BodyKinematics(Analysis):
+    """Places, velocities and accelerations of bodies."""
+
+    bodies: BodiesOrCenterOfMass = ("all",)
+    """Names of bodies, `all`, or center_of_mass."""
+    express_results_in_body_local_frame: LegacyFlag = False
+    """Whether velocities and accelerations are along the axes of the body; otherwise of ground."""
+
+
+class ForceReporter(Analysis):
+    """What all forces report of themselves."""
+
+    include_constraint_forces: LegacyFlag = False
+    """Whether the forces of constraints are written too."""
+
+
+class IMUDataReporter(Analysis):
+    """What inertial sensors would measure."""
+
+    report_orientations: Flag = True
+    """Whether orientations are written."""
+    report_gyroscope_signals: Flag = True
+    """Whether angular velocities are written."""
+    report_accelerometer_signals: Flag = True
+    """Whether accelerations, gravity included, are written."""
+    compute_accelerations_without_forces: Flag = False
+    """Whether accelerations are from the motion alone; otherwise from the forces of the model."""
+    frame_paths: Annotated[Names, Reference("model-path", "PhysicalFrame", "list", required=False)] = ()
+    """Frames with sensors; without any, all sensors of the model."""
+
+
+class InducedAccelerations(Analysis):
+    """What each force contributes to accelerations."""
+
+    coordinate_names: LegacyCoordinateNames = ()
+    """Coordinates whose accelerations are divided up, or `all`."""
+    body_names: BodiesOrCenterOfMass = ("center_of_mass",)
+    """Bodies whose accelerations are divided up, `all`, or center_of_mass."""
+    constraint_set: LegacyUnnamed[ConstraintSet] = made(ConstraintSet)
+    """Constraints that stand for the contact with the ground."""
+    force_threshold: Annotated[float, real("N", legacy=True)] = 6.0
+    """Measured force above which the constraints hold."""
+    compute_potentials_only: LegacyFlag = False
+    """Whether each force is taken as one newton."""
+    report_constraint_reactions: LegacyFlag = False
+    """Whether what each force contributes to the forces of the constraints is written."""
+
+
+class JointReaction(Analysis):
+    """Forces and torques that joints carry."""
+
+    forces_file: LegacyInputTable = ""
+    """Forces of the actuators; without it they follow from the states."""
+    joint_names: LegacyJointNames = ("ALL",)
+    """Joints that are written, or ALL."""
+    apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
+    """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
+    express_in_frame: Annotated[
+        Names, Reference("frame-path-or-body-name", "Frame", "list", required=False, legacy=True)
+    ] = ("ground",)
+    """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
+
+
+class Kinematics(Analysis):
+    """Values, speeds and accelerations of coordinates."""
+
+    coordinates: Annotated[Names, Reference("coordinate-name", "Coordinate", "list", required=False)] = ("all",)
+    """Coordinates that are written, or `all`."""
+
+
+class MuscleAnalysis(Analysis):
+    """Lengths, speeds, forces and moment arms of muscles."""
+
+    muscle_list: Annotated[Names, Reference("muscle-name", "Muscle", "list", required=False, legacy=True)] = ("all",)
+    """Muscles that are written, or `all`."""
+    moment_arm_coordinate_list: LegacyCoordinateNames = ("all",)
+    """Coordinates about which moment arms are computed, or `all`."""
+    compute_moments: LegacyFlag = True
+    """Whether moments are computed besides moment arms."""
+
+
+class OutputReporter(Analysis):
+    """Outputs of components."""
+
+    output_paths: Annotated[tuple[str, ...], Reference("input", "Output", "list", required=False)] = ()
+    """The outputs, each as `path|output`."""
+
+
+class PointKinematics(Analysis):
+    """Place, velocity and acceleration of a point."""
+
+    body_name: Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame", legacy=True)] = "ground"
+    """The body that the point is fixed in."""
+    relative_to_body_name: Annotated[
+        Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False, legacy=True)
+    ] = "none"
+    """The body along whose axes the results are given; none for ground."""
+    point_name: LegacyText = "NONAME"
+    """Name of the point, which the results bear."""
+    point: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (0.0, 0.0, 0.0)
+    """Where the point is in its body."""
+
+
+class ProbeReporter(Analysis):
+    """What the probes of the model measure."""
+
+
+class StatesReporter(Analysis):
+    """The states."""
+
+
+class StaticOptimization(Analysis):
+    """Divides the generalized forces of a motion among the actuators, at every moment for itself."""
+
+    use_model_force_set: LegacyFlag = True
+    """Whether the actuators are those of the model."""
+    activation_exponent: LegacyNumber = 2.0
+    """Power of the activations whose sum is made as small as possible."""
+    use_muscle_physiology: LegacyFlag = True
+    """Whether forces of muscles depend on their lengths and speeds."""
+    optimizer_convergence_criterion: LegacyNumber = 1e-4
+    """How far the optimizer goes."""
+    optimizer_max_iterations: LegacyInteger = 100
+    """How many iterations the optimizer may take."""

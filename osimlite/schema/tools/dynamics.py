@@ -1,0 +1,104 @@
+"""Tools that compute forces or motions: inverse dynamics, analyses along a motion, forward integration."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made
+from osimlite.schema.controllers import ControllerSet
+from osimlite.schema.fields import LegacyFlag, LegacyInteger, LegacyNumber, LegacyUnnamed, Reals, Reference, real, reals
+from osimlite.schema.references import (
+    LegacyInputForceSets,
+    LegacyInputLoads,
+    LegacyInputModel,
+    LegacyInputTable,
+    LegacyJointNames,
+    LegacyOutputFolder,
+    LegacyOutputTable,
+    Names,
+)
+from osimlite.schema.tools.analyses import AnalysisSet
+from osimlite.schema.tools.inverse_kinematics import Tool
+
+
+class DynamicsTool(Tool, abstract=True):
+    """A tool that works with measured loads."""
+
+    model_file: LegacyInputModel = "Unassigned"
+    """The model, found from the folder that OpenSim runs in."""
+    time_range: Annotated[Reals, reals("s", least=2, most=2, legacy=True)] = (float("-inf"), float("inf"))
+    """First and last time."""
+    forces_to_exclude: Annotated[Names, Reference("set-member", "Force", "list", required=False, legacy=True)] = ()
+    """Forces that do not act: ALL, ACTUATORS, MUSCLES, groups of the model's forces, names of forces."""
+    external_loads_file: LegacyInputLoads = "Unassigned"
+    """Measured loads (.xml)."""
+
+
+class InverseDynamicsTool(DynamicsTool):
+    """Computes the generalized forces that a measured motion takes."""
+
+    coordinates_file: LegacyInputTable = "Unassigned"
+    """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
+    lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
+    """Cut-off frequency of the filter of the coordinates; negative for no filter."""
+    output_gen_force_file: LegacyOutputTable = "inverse_dynamics.sto"
+    """File for the generalized forces, in `results_directory`."""
+    joints_to_report_body_forces: LegacyJointNames = ()
+    """Joints whose generalized forces are also written as forces and torques on bodies, or ALL."""
+    output_body_forces_file: LegacyOutputTable = "body_forces_at_joints.sto"
+    """File for forces and torques on bodies, in `results_directory`."""
+
+
+class AbstractTool(Object, abstract=True):
+    """What the tools that run a model through time are told."""
+
+    model_file: LegacyInputModel = ""
+    """The model, found from the folder of the setup file, as are all files."""
+    replace_force_set: LegacyFlag = False
+    """Whether the forces of `force_set_files` replace those of the model; otherwise they are added."""
+    force_set_files: Annotated[
+        tuple[str, ...], Reference("file", "ForceSet file", "list", required=False, legacy=True)
+    ] = ()
+    """Documents of forces, separated by blanks."""
+    results_directory: LegacyOutputFolder = "./"
+    """Folder for the results, made if only its last part is missing."""
+    output_precision: LegacyInteger = 8
+    """Number of digits in the results."""
+    initial_time: Annotated[float, real("s", legacy=True)] = 0.0
+    """Where the run begins."""
+    final_time: Annotated[float, real("s", legacy=True)] = 1.0
+    """Where the run ends."""
+    solve_for_equilibrium_for_auxiliary_states: LegacyFlag = False
+    """Whether muscles are brought into equilibrium before the run."""
+    maximum_number_of_integrator_steps: LegacyInteger = 20000
+    """How many steps the integrator may take."""
+    maximum_integrator_step_size: LegacyNumber = 1.0
+    """Longest step of the integrator, in seconds."""
+    minimum_integrator_step_size: LegacyNumber = 1e-8
+    """Shortest step of the integrator, in seconds."""
+    integrator_error_tolerance: LegacyNumber = 1e-5
+    """Error of a step above which the integrator takes a shorter one."""
+    analysis_set: LegacyUnnamed[AnalysisSet] = made(AnalysisSet, name="Analyses")
+    """What is computed and written along the run."""
+    controller_set: LegacyUnnamed[ControllerSet] = made(ControllerSet, name="Controllers")
+    """Controllers that are added to those of the model."""
+    external_loads_file: LegacyInputLoads = ""
+    """Measured loads (.xml)."""
+
+
+class AnalyzeTool(AbstractTool):
+    """Runs analyses along a motion that is already known."""
+
+    states_file: LegacyInputTable = ""
+    """The motion, as states."""
+    coordinates_file: LegacyInputTable = ""
+    """The motion, as coordinates, if there is no `states_file`."""
+    speeds_file: LegacyInputTable = ""
+    """Generalized speeds; without it they are the derivatives of the coordinates."""
+    lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
+    """Cut-off frequency of the filter of the coordinates; negative for no filter."""
+
+
+class ForwardTool(AbstractTool):
+    """Integrates the equations of motion."""
+
+    states_file: LegacyInputTable = ""
+    """Where the motion starts: the row at `initial_time`; without it the model's default state."""

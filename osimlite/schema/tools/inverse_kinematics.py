@@ -1,0 +1,121 @@
+"""Inverse kinematics: the pose that fits measured markers or orientations best, frame by frame."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made, none
+from osimlite.schema.fields import (
+    Flag,
+    LegacyMany,
+    LegacyNumber,
+    Number,
+    Reals,
+    Reference,
+    Single,
+    Unnamed,
+    Vec3,
+    real,
+    reals,
+    vec3,
+    word,
+)
+from osimlite.schema.references import InputModel, InputTable, OutputFolder, OutputTable, reads
+from osimlite.schema.sets import ObjectGroup
+
+
+class Tool(Object, abstract=True):
+    """A tool that writes its results into a folder."""
+
+    results_directory: OutputFolder = "./"
+    """Folder for the results, made if only its last part is missing."""
+
+
+class IKTask(Object, abstract=True):
+    """Something measured that the pose is fitted to."""
+
+    apply: Flag = True
+    """Whether the task counts."""
+    weight: Number = 0.0
+    """How much the squared deviation counts beside those of other tasks; without one, nothing."""
+
+
+class IKMarkerTask(IKTask):
+    """A marker that is to be where it was measured; the name is that of the marker, in the model and in the data."""
+
+    name_reference = Reference("marker-name", "Marker")
+
+
+class IKCoordinateTask(IKTask):
+    """A coordinate that is to have a value; the name is that of the coordinate."""
+
+    name_reference = Reference("coordinate-name", "Coordinate")
+
+    value_type: Annotated[str, word("default_value", "manual_value", "from_file", legacy=True)] = "default_value"
+    """Where the value is from: the model, this task, or the coordinate file of the tool."""
+    value: LegacyNumber = 0.0
+    """The value if `value_type` is manual_value, in radians or metres."""
+
+
+class IKTaskSet(Object):
+    """What inverse kinematics fits."""
+
+    objects: LegacyMany[IKTask] = none()
+    """The tasks, each with the name of a marker or a coordinate."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the tasks; the tools ignore them."""
+
+
+class InverseKinematicsToolBase(Tool, abstract=True):
+    """What both tools of inverse kinematics are told."""
+
+    model_file: InputModel = ""
+    """The model, found from the folder that OpenSim runs in."""
+    constraint_weight: Annotated[float, real(domain=">= 0")] = float("inf")
+    """How much errors of the model's constraints count; infinite, the constraints are kept."""
+    accuracy: Annotated[float, real(domain="> 0")] = 1e-5
+    """How exactly the best pose is found."""
+    time_range: Annotated[Reals, reals("s", least=2, most=2)] = (float("-inf"), 2.0)
+    """First and last time; outside the data they are cut to the data."""
+    output_motion_file: OutputTable = ""
+    """File for the coordinates; `results_directory` does not count for it."""
+    report_errors: Flag = True
+    """Whether deviations are written for every frame."""
+
+
+class InverseKinematicsTool(InverseKinematicsToolBase):
+    """Fits the pose of a model to measured markers and coordinates."""
+
+    ik_task_set: Unnamed[IKTaskSet] = made(IKTaskSet)
+    """The markers and coordinates with their weights; if none applies, all markers count the same."""
+    marker_file: Annotated[str, reads("marker data")] = ""
+    """Measured markers (.trc, .sto)."""
+    coordinate_file: InputTable = ""
+    """Values of coordinates for tasks whose `value_type` is from_file; always read in degrees."""
+    report_marker_locations: Flag = False
+    """Whether the markers of the model are written for every frame."""
+
+
+class OrientationWeight(Object):
+    """How much the deviation of one sensor counts; the name is that of the sensor."""
+
+    weight: Number = 1.0
+    """Beside those of the others."""
+
+
+class OrientationWeightSet(Object):
+    """Weights of orientation sensors."""
+
+    objects: LegacyMany[OrientationWeight] = none()
+    """The weights; a sensor without one counts one."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the weights; the tools ignore them."""
+
+
+class IMUInverseKinematicsTool(InverseKinematicsToolBase):
+    """Fits the pose of a model to measured orientations."""
+
+    sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
+    orientations_file: InputTable = ""
+    """Measured orientations, a column of quaternions for each sensor (.sto)."""
+    orientation_weights: Single[OrientationWeightSet] = made(OrientationWeightSet, name="orientation_weights")
+    """How much each sensor counts."""

@@ -1,0 +1,179 @@
+"""The scale tool: a generic model made as large and as heavy as a subject."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made, none
+from osimlite.schema.fields import (
+    LegacyFlag,
+    LegacyMany,
+    LegacyText,
+    LegacyUnnamed,
+    Reals,
+    Reference,
+    Value,
+    real,
+    reals,
+)
+from osimlite.schema.references import (
+    LegacyInputMarkers,
+    LegacyInputModel,
+    LegacyInputTable,
+    LegacyOutputModel,
+    LegacyOutputTable,
+    MarkerNames,
+    Named,
+    reads,
+    writes,
+)
+from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.tools.inverse_kinematics import IKTaskSet
+
+LegacyTimeRange = Annotated[Reals, reals("s", least=2, most=2, legacy=True)]
+
+
+class GenericModelMaker(Object):
+    """Reads the model that is scaled."""
+
+    model_file: LegacyInputModel = "Unassigned"
+    """The model, found from the folder of the setup file."""
+    marker_set_file: Annotated[str, reads("MarkerSet", legacy=True)] = "Unassigned"
+    """Markers that are added to those of the model, or replace those of the same name."""
+
+
+class MarkerPair(Object):
+    """Two markers whose distance is measured."""
+
+    markers: MarkerNames = ()
+    """Names of the two markers, of the model and of the data."""
+
+
+class MarkerPairSet(Object):
+    """The pairs of markers of a measurement."""
+
+    objects: LegacyMany[MarkerPair] = none()
+    """The pairs; the measurement is the mean of their ratios."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the pairs; the tools ignore them."""
+
+
+class BodyScale(Object):
+    """A body that a measurement scales; the name is that of the body."""
+
+    name_reference = Reference("body-name", "Body")
+
+    axes: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
+    """Axes of the body along which it is scaled: X, Y, Z; other words do nothing."""
+
+
+class BodyScaleSet(Object):
+    """The bodies that a measurement scales."""
+
+    objects: LegacyMany[BodyScale] = none()
+    """The bodies with their axes."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the bodies; the tools ignore them."""
+
+
+class Measurement(Object):
+    """A length of the subject, by which bodies are scaled."""
+
+    apply: LegacyFlag = True
+    """Whether the measurement counts."""
+    marker_pair_set: LegacyUnnamed[MarkerPairSet] = made(MarkerPairSet)
+    """Pairs of markers whose distances are compared, measured to model."""
+    body_scale_set: LegacyUnnamed[BodyScaleSet] = made(BodyScaleSet)
+    """What is scaled by the ratio."""
+
+
+class MeasurementSet(Object):
+    """The measurements of a subject."""
+
+    objects: LegacyMany[Measurement] = none()
+    """The measurements; where two scale the same axis, the last counts."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the measurements; the tools ignore them."""
+
+
+class Scale(Object):
+    """Scale factors of a body."""
+
+    scales: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (1.0, 1.0, 1.0)
+    """Factors along the x, y and z axes of the body."""
+    segment: Annotated[Named, Reference("body-name", "PhysicalFrame", legacy=True)] = "unnamed_segment"
+    """Name of the body."""
+    apply: LegacyFlag = True
+    """Whether the factors count."""
+
+
+class ScaleSet(Object):
+    """Scale factors given by hand."""
+
+    objects: LegacyMany[Scale] = none()
+    """The factors, body by body."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the factors; the tools ignore them."""
+
+
+class ModelScaler(Object):
+    """Scales the bodies, by measurements or by hand."""
+
+    apply: LegacyFlag = True
+    """Whether the model is scaled."""
+    scaling_order: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
+    """What is scaled by, in turn: measurements, manualScale; both overwrite what was before."""
+    measurement_set: LegacyUnnamed[MeasurementSet] = made(MeasurementSet)
+    """Lengths that are taken from the data."""
+    scale_set: LegacyUnnamed[ScaleSet] = made(ScaleSet)
+    """Factors given by hand."""
+    marker_file: LegacyInputMarkers = "Unassigned"
+    """Measured markers of a standing subject (.trc)."""
+    time_range: LegacyTimeRange = (-1.0, -1.0)
+    """First and last time over which distances are averaged."""
+    preserve_mass_distribution: LegacyFlag = False
+    """Whether the bodies keep their shares of the mass; otherwise their masses grow with their sizes."""
+    output_model_file: LegacyOutputModel = "Unassigned"
+    """File for the scaled model."""
+    output_scale_file: Annotated[str, writes("ScaleSet", legacy=True)] = "Unassigned"
+    """File for the factors."""
+
+
+class MarkerPlacer(Object):
+    """Poses the scaled model as the subject stood and moves its markers to where they were measured."""
+
+    apply: LegacyFlag = True
+    """Whether markers are moved."""
+    ik_task_set: LegacyUnnamed[IKTaskSet] = made(IKTaskSet)
+    """What the pose is fitted to."""
+    marker_file: LegacyInputMarkers = "Unassigned"
+    """Measured markers of a standing subject (.trc)."""
+    coordinate_file: LegacyInputTable = ""
+    """Values of coordinates for tasks that take them from a file."""
+    time_range: LegacyTimeRange = (-1.0, -1.0)
+    """First and last time over which the markers are averaged."""
+    output_motion_file: LegacyOutputTable = "Unassigned"
+    """File for the pose."""
+    output_model_file: LegacyOutputModel = "Unassigned"
+    """File for the model with its markers moved."""
+    output_marker_file: Annotated[str, writes("MarkerSet", legacy=True)] = "Unassigned"
+    """File for the moved markers."""
+    max_marker_movement: Annotated[float, real("m", legacy=True)] = -1.0
+    """How far a marker may be moved, negative for any distance; the placer does not look at it."""
+
+
+class ScaleTool(Object):
+    """Scales a generic model to a subject and places its markers."""
+
+    mass: Annotated[float, real("kg", legacy=True)] = -1.0
+    """Mass of the subject; not positive, the masses are those of the scaled bodies."""
+    height: Annotated[float, real("mm", legacy=True)] = -1.0
+    """Height of the subject, for readers only."""
+    age: Annotated[float, real("years", legacy=True)] = -1.0
+    """Age of the subject, for readers only."""
+    notes: LegacyText = "Unassigned"
+    """On the subject, for readers only."""
+    generic_model_maker: LegacyUnnamed[GenericModelMaker] = made(GenericModelMaker)
+    """First step: the model is read."""
+    model_scaler: LegacyUnnamed[ModelScaler] = made(ModelScaler)
+    """Second step: the bodies are scaled."""
+    marker_placer: LegacyUnnamed[MarkerPlacer] = made(MarkerPlacer)
+    """Third step: the markers are placed."""

@@ -1,0 +1,174 @@
+"""Tools that track a measured motion: residual reduction (RRA) and computed muscle control (CMC)."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, none
+from osimlite.schema.fields import (
+    LegacyFlag,
+    LegacyInteger,
+    LegacyMany,
+    LegacyNumber,
+    LegacyReals,
+    Reals,
+    Value,
+    real,
+    reals,
+    word,
+)
+from osimlite.schema.references import (
+    BodyName,
+    BodyOrCenterOfMass,
+    LegacyActuatorNames,
+    LegacyCoordinateName,
+    LegacyInputTable,
+    LegacyOutputModel,
+    reads,
+)
+from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.tools.dynamics import AbstractTool
+
+_Direction = Annotated[Reals, reals(least=3, most=3, legacy=True)]
+_TaskSetFile = Annotated[str, reads("CMC_TaskSet", legacy=True)]
+_ControlSetFile = Annotated[str, reads("ControlSet", legacy=True)]
+_Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
+
+
+class TrackingTask(Object, abstract=True):
+    """Something that a controller is to follow."""
+
+    on: LegacyFlag = True
+    """Whether the task counts."""
+    weight: LegacyReals = (1.0, 1.0, 1.0)
+    """How much its accelerations count beside those of other tasks, one number for each component."""
+
+
+class StateTrackingTask(TrackingTask, abstract=True):
+    """A state that is to be followed."""
+
+
+class MuscleStateTrackingTask(StateTrackingTask):
+    """A state of a muscle that is to be followed; the name is that of the muscle and its state."""
+
+
+class CMC_Task(TrackingTask, abstract=True):
+    """A point, an orientation or a coordinate that is to be followed."""
+
+    wrt_body: BodyOrCenterOfMass = ""
+    """The body whose motion is followed; coordinates do not need it."""
+    express_body: BodyOrCenterOfMass = ""
+    """The body along whose axes the motion is given; coordinates do not need it."""
+    active: Annotated[tuple[bool, ...], Value("bool", "list", legacy=True)] = (False, False, False)
+    """Which of the three components count; a coordinate has the first only."""
+    kp: LegacyReals = (1.0, 1.0, 1.0)
+    """Acceleration per deviation of position."""
+    kv: LegacyReals = (0.5, 0.5, 0.5)
+    """Acceleration per deviation of speed; critical damping is at twice the root of `kp`."""
+    ka: LegacyReals = (1.0, 1.0, 1.0)
+    """Share of the measured acceleration that is asked for."""
+    r0: _Direction = (0.0, 0.0, 0.0)
+    """Direction of the first component; coordinates do not need it."""
+    r1: _Direction = (0.0, 0.0, 0.0)
+    """Direction of the second component; coordinates do not need it."""
+    r2: _Direction = (0.0, 0.0, 0.0)
+    """Direction of the third component; coordinates do not need it."""
+
+
+class CMC_Joint(CMC_Task):
+    """A coordinate that is to be followed."""
+
+    coordinate: LegacyCoordinateName = ""
+    """Name of the coordinate."""
+    limit: LegacyNumber = 0.0
+    """Deviation towards which the weight grows."""
+
+
+class CMC_Point(CMC_Task):
+    """A point of a body that is to be followed."""
+
+    point: _Direction = (0.0, 0.0, 0.0)
+    """Where the point is in its body."""
+
+
+class SMC_Joint(CMC_Joint):
+    """A coordinate that is to be followed by sliding mode control."""
+
+    surface_error_boundary: LegacyNumber = 100.0
+    """Thickness of the layer around the sliding surface."""
+
+
+class CMC_TaskSet(Object):
+    """What RRA and CMC follow."""
+
+    objects: LegacyMany[TrackingTask] = none()
+    """The tasks."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the tasks; the tools ignore them."""
+
+
+class CMCTool(AbstractTool):
+    """Finds excitations of muscles that make a model follow a measured motion."""
+
+    solve_for_equilibrium_for_auxiliary_states: LegacyFlag = True
+    actuators_to_exclude: LegacyActuatorNames = ()
+    """Actuators and groups of them that are not controlled."""
+    desired_points_file: LegacyInputTable = ""
+    """Measured points that tasks follow."""
+    desired_kinematics_file: LegacyInputTable = ""
+    """The measured motion."""
+    task_set_file: _TaskSetFile = ""
+    """What is followed, and how closely."""
+    constraints_file: _ControlSetFile = ""
+    """Bounds of the controls over time."""
+    rra_controls_file: _ControlSetFile = ""
+    """Controls that RRA computed, around which those of the residuals are kept."""
+    lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
+    """Cut-off frequency of the filter of the motion; negative for no filter."""
+    cmc_time_window: Annotated[float, real("s", legacy=True)] = 0.01
+    """Time that muscles are given to come to the force that is asked for."""
+    use_fast_optimization_target: LegacyFlag = True
+    """Whether accelerations must be met exactly; it is faster, and fails where they cannot be."""
+    optimizer_algorithm: _Optimizer = "ipopt"
+    """The optimizer."""
+    numerical_derivative_step_size: LegacyNumber = 1e-4
+    """Step of the optimizer's numerical derivatives."""
+    optimization_convergence_tolerance: LegacyNumber = 1e-4
+    """How far the optimizer goes."""
+    optimizer_max_iterations: LegacyInteger = 1000
+    """How many iterations the optimizer may take."""
+    optimizer_print_level: LegacyInteger = 0
+    """How much the optimizer prints, from 0 to 3."""
+    use_verbose_printing: LegacyFlag = False
+    """Whether the tool prints what it does."""
+
+
+class RRATool(AbstractTool):
+    """Changes a motion and the mass distribution of a model until hardly any residual forces are left."""
+
+    desired_points_file: LegacyInputTable = ""
+    """Measured points that tasks follow."""
+    desired_kinematics_file: LegacyInputTable = ""
+    """The measured motion."""
+    task_set_file: _TaskSetFile = ""
+    """What is followed, and how closely."""
+    constraints_file: _ControlSetFile = ""
+    """Bounds of the controls over time."""
+    lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
+    """Cut-off frequency of the filter of the motion; negative for no filter."""
+    optimizer_algorithm: _Optimizer = "ipopt"
+    """The optimizer."""
+    numerical_derivative_step_size: LegacyNumber = 1e-4
+    """Step of the optimizer's numerical derivatives."""
+    optimization_convergence_tolerance: LegacyNumber = 1e-5
+    """How far the optimizer goes."""
+    adjust_com_to_reduce_residuals: LegacyFlag = False
+    """Whether a center of mass is moved, and the model written with it."""
+    initial_time_for_com_adjustment: LegacyNumber = -1.0
+    """Start of the time over which residuals are averaged; -1 for the start of the run."""
+    final_time_for_com_adjustment: LegacyNumber = -1.0
+    """End of the time over which residuals are averaged; -1 for the end of the run."""
+    adjusted_com_body: BodyName = ""
+    """The body whose center of mass is moved, usually the heaviest."""
+    output_model_file: LegacyOutputModel = ""
+    """File for the changed model; adjusted_model.osim if there is no name."""
+    use_verbose_printing: LegacyFlag = False
+    """Whether the tool prints what it does."""
