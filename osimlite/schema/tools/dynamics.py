@@ -6,7 +6,6 @@ from osimlite.schema.base import Object, made
 from osimlite.schema.controllers import ControllerSet
 from osimlite.schema.fields import LegacyFlag, LegacyInteger, LegacyNumber, LegacyUnnamed, Reals, Reference, real, reals
 from osimlite.schema.references import (
-    LegacyInputForceSets,
     LegacyInputLoads,
     LegacyInputModel,
     LegacyInputTable,
