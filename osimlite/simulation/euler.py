@@ -76,11 +76,7 @@ class SemiImplicitEuler(Stepper):
                 h = limit - self.time
             t = limit
             self._origin, self._since = limit, 0
-        q = self.state[: self._nq]
-        rest = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
-        u = rest[: self._nq]
-        rates = u if self._rates is None else self._rates(q, u)
-        y = [x + h * v for x, v in zip(q, rates, strict=True)] + rest
+        y = self._moved(h)
         if self._projected is not None:
             found = self._projected(t, y, FIXED_STEP_TOLERANCE)
             if found is None:
@@ -101,6 +97,14 @@ class SemiImplicitEuler(Stepper):
                 t,
                 error.index,
             ) from error
+
+    def _moved(self, h: float) -> list[float]:
+        """The state after a step of length h (s), wherever constraints hold."""
+        q = self.state[: self._nq]
+        rest = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
+        u = rest[: self._nq]
+        rates = u if self._rates is None else self._rates(q, u)
+        return [x + h * v for x, v in zip(q, rates, strict=True)] + rest
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The straight line between the ends of the last step."""

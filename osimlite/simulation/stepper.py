@@ -101,26 +101,11 @@ class Stepper(ABC):
     def interpolant(self) -> Callable[[float], list[float]]:
         """The function that gives the state at any time within the last step, s; it stays good for that step."""
 
-    def interpolate(self, t: float) -> list[float]:
-        """State at a time within the last step, s."""
-        return self.interpolant()(t)
-
     def steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
         """Yield (time, state) after each step; the last one ends at `until` (s), as with OpenSim's Manager."""
         while self.time < until:
             self.step(until)
             yield self.time, self.state
-
-    def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
-        """Yield (time, state) at times that do not decrease, s.
-
-        They do not shorten the steps: within a step, the state is interpolated. The last step ends at the last
-        time, so that the steps are those of `steps` up to it.
-        """
-        for t in times:
-            while self.time < t:
-                self.step(times[-1])
-            yield t, self.at(t)
 
     def table(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
         """The states at times that do not decrease (s), one row for each, or for those reached when it was `ended`.
@@ -150,7 +135,7 @@ class Stepper(ABC):
         start = self._previous[0]
         if not start <= t < self.time:
             raise ValueError(f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s")
-        return self.interpolate(t)
+        return self.interpolant()(t)
 
     def _advance(self, t: float, y: list[float]) -> None:
         """Make (t, y) the present state."""

@@ -293,7 +293,7 @@ def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
     """To the last bit."""
     y = fast.initial_state({}, {})
     ours, theirs = (fast.engine.stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None) for _ in range(2))
-    (_, end), steps = list(ours.reports([2.0]))[-1], list(theirs.steps(2.0))
+    (end,), steps = ours.table([2.0]).tolist(), list(theirs.steps(2.0))
     assert end == steps[-1][1]
     assert (ours.taken, ours.attempted, ours.evaluations) == (theirs.taken, theirs.attempted, theirs.evaluations)
 

@@ -82,14 +82,6 @@ class RungeKuttaMerson(Stepper):
 
         return held
 
-    def reports(self, times: Sequence[float]) -> Iterator[tuple[float, list[float]]]:
-        """Yield (time, state) at times that do not decrease, s; the steps are those of `steps`."""
-        batch, done = self._batch(times, times[-1]), 0
-        for _ in self._calls(batch):
-            reached = bisect_right(times, self.time)
-            yield from zip(times[done:reached], batch.reports[0, done:reached].tolist(), strict=True)
-            done = reached
-
     def table(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
         """The same as of the base as an array."""
         batch = self._batch(times, times[-1])
