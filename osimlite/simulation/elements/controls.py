@@ -113,6 +113,9 @@ class ModelControls:
         self._gains = dict.fromkeys(self._first, 0.0)
         self._refused: dict[str, UnsupportedError] = {}
         for controller, (actuator, signal, number) in _drives(builder):
+            if not isinstance(actuator, Actuator):
+                # Of a class that nobody knows, which is refused for that.
+                continue
             path = builder.path(actuator)
             if number is None and actuator.control_count > 1:
                 # OpenSim 4.6 takes the others from the memory behind the first.

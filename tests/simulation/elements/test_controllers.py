@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import osimlite
 from osimlite import Model
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.multibody import build_mechanism
@@ -15,6 +16,7 @@ from osimlite.schema.controller_types import (
     SynergyVector,
 )
 from osimlite.schema.examples import ToyPropMyoController, ToyReflexController
+from osimlite.schema.functions import Constant
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
@@ -147,3 +149,18 @@ def test_controllers_of_the_examples(model, tmp_path):
     model.add(ToyPropMyoController(name="myo", socket_actuator="/forceset/motor"))
     message = "driven by the ToyPropMyoController '/controllerset/myo', which follows an activation"
     assert message in told(model, tmp_path).message
+
+
+def test_an_actuator_of_a_class_that_nobody_knows(tmp_path):
+    model = arm()
+    model.add(CoordinateActuator(name="motor", coordinate="q0"))
+    brain = PrescribedController(name="brain", socket_actuators=("/forceset/motor", "/forceset/piston"))
+    brain.ControlFunctions.objects += [Constant(value=1.0), Constant(value=2.0)]
+    model.add(brain)
+    text = osimlite.to_text(model).replace("<CoordinateActuator", '<Piston name="piston"/><CoordinateActuator', 1)
+    (tmp_path / "model.osim").write_text(text)
+    read = osimlite.read(tmp_path / "model.osim")
+    assert "'/forceset/piston' (Piston)" in told(read, tmp_path).message
+    forces = force_elements(read, build_mechanism(read), skip_unsupported=True)
+    assert forces.controls.names == ("/forceset/motor",)
+    assert [len(functions) for functions in forces.controls.functions] == [1]

@@ -19,7 +19,8 @@ def drives(builder: ElementBuilder, controller: SynergyController) -> Iterator[D
         ModelError: there is not one signal for each vector, or not one weight for each control.
     """
     path, vectors = builder.path(controller), controller.synergy_vectors
-    targets = [(item, number) for item in named(builder, controller) for number in range(item.control_count)]
+    counts = [(item, getattr(type(item), "control_count", 1)) for item in named(builder, controller)]
+    targets = [(item, number) for item, count in counts for number in range(count)]
     for vector in vectors:
         if len(vector.synergy_weights) != len(targets):
             raise ModelError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.errors import ModelError
+from osimlite.schema.actuators import Actuator
 from osimlite.schema.examples import ToyReflexController
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.controls import Drive, Reflex, named
@@ -18,7 +19,7 @@ def drives(builder: ElementBuilder, controller: ToyReflexController) -> Iterator
         ModelError: it names an actuator that is no muscle.
     """
     for muscle in named(builder, controller):
-        if not isinstance(muscle, Muscle):
+        if isinstance(muscle, Actuator) and not isinstance(muscle, Muscle):
             raise ModelError(
                 f"'{builder.path(controller)}' drives '{builder.path(muscle)}', which is no muscle; name muscles only"
             )
