@@ -279,3 +279,18 @@ def test_sizes_that_do_not_fit():
         runge_kutta_merson(lambda t, y: [0.0], 0.0, [1.0, 0.0], 1)
     with pytest.raises(ValueError, match="2 coordinates and as many speeds do not fit"):
         SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 2, 1e-3)
+
+
+def test_a_motion_ends_at_a_state_that_has_a_derivative():
+    ends = []
+
+    def f(t, y):
+        if y[0] == t > 0.3:
+            ends.append(t)
+            return [math.nan]
+        return [1.0]
+
+    integrator = runge_kutta_merson(f, 0.0, [0.0], 0)
+    with pytest.raises(IntegrationError):
+        list(integrator.steps(1.0))
+    assert ends and f(integrator.time, integrator.state) == [1.0]

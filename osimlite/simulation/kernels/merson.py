@@ -193,9 +193,11 @@ def run(m: Motion, y: Floats) -> int:
             return FAILED if t1 < t0 else TOO_MANY
         counts[EVALUATIONS] += 1
         if evaluated(m, t1, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
-            clock[0] = t1
-            copy(size, y1, y)
-            return FAILED
+            # Simbody ends here; smaller steps lead nearer to where the motion ends.
+            if t1 - t0 <= shortest_step(t0):
+                return FAILED
+            clock[1] = max(0.1 * (t1 - t0), shortest_step(t0))
+            continue
         counts[TAKEN] += 1
         clock[0] = t1
         note_peaks(m, t1)
