@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import osimlite
 from osimlite.errors import ModelError
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
@@ -20,8 +21,9 @@ from osimlite.schema.muscles import RigidTendonMuscle
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
+from osimlite.simulation.system import System
 
-pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
@@ -154,6 +156,27 @@ def test_reflexes(model, tmp_path):
     for name, gain in (("first", 2.0), ("second", 3.0)):
         model.add(ToyReflexController(name=name, gain=gain, socket_actuators=("/forceset/along0", "/forceset/along1")))
     assert compare(model, tmp_path, counted=None) == 2 * STATES
+
+
+@pytest.mark.parametrize("words", ["on_q0_0", "on_q1_0 on_q0_0"])
+def test_a_column_beside_a_function_of_the_same_name_in_an_old_document(model, words, tmp_path):
+    motors(model, "q0_0", "q1_0")
+    write_sto(tmp_path / "controls.sto", "controls", [0.0, 1.0], ["on_q0_0", "on_q1_0"], [[1.0, 4.0], [2.0, 7.0]])
+    brain = PrescribedController(name="brain", controls_file="controls.sto", socket_actuators=("/forceset/on_q0_0",))
+    brain.ControlFunctions.objects += [Constant(value=5.0 + number) for number in range(len(words.split()))]
+    model.add(brain)
+    text = osimlite.to_text(model).replace('Version="40600"', 'Version="40500"')
+    paths = "<socket_actuators>/forceset/on_q0_0</socket_actuators>"
+    assert paths in text
+    (tmp_path / "old.osim").write_text(text.replace(paths, f"<actuator_list>{words}</actuator_list>"))
+    theirs = opensim.Model(str(tmp_path / "old.osim"))
+    state = theirs.initSystem()
+    state.setTime(0.3)
+    theirs.realizeVelocity(state)
+    read = osimlite.read(tmp_path / "old.osim")
+    system = System(mechanism := build_mechanism(read), force_elements(read, mechanism, folder=tmp_path))
+    system.applied(0.3, system.state.default())
+    assert system.controls() == pytest.approx(theirs.getControls(state).to_numpy().tolist(), rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,9 @@ from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.storage import beside
 from osimlite.text import did_you_mean
 
+LISTS_OF_PATHS = 40600
+"""Documents before this version name actuators by their names."""
+
 
 def drives(builder: ElementBuilder, controller: PrescribedController) -> Iterator[Drive]:
     """What it does to each actuator.
@@ -46,6 +49,8 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
     actuators |= {builder.path(item): item for item in builder.tree.components if isinstance(item, Actuator)}
     table = read_controls(beside(builder.folder, str(controller.controls_file)))
     known = {word if isinstance(word, str) else builder.path(word) for word in controller.socket_actuators}
+    if builder.model.document_version < LISTS_OF_PATHS:
+        known |= {item.name for item in taken}
     taken = list(taken)
     for place, label in enumerate(table.columns):
         if label in known:
