@@ -11,7 +11,7 @@ import numpy as np
 
 from osimlite.document.part import read_object
 from osimlite.errors import ModelError
-from osimlite.multibody.functions import Constant, Function, PiecewiseConstant, PiecewiseLinear
+from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.schema.control_sets import Control, ControlConstant, ControlLinear, ControlSet
 from osimlite.simulation.elements.control_tables import read_controls
@@ -35,7 +35,7 @@ class ControlCurves:
 
         Raises:
             DocumentError: it holds something else.
-            ModelError: a control has no nodes, or their times do not increase.
+            ModelError: a control has no nodes, or their times go back.
         """
         curves: dict[str, Function] = {}
         if ".sto" in path.name:
@@ -67,12 +67,10 @@ def _curve(control: Control, file: str) -> Function:
     assert isinstance(control, ControlLinear)
     if not control.x_nodes:
         raise ModelError(f"the control '{control.name}' has no x_nodes; give it some", file=file)
-    nodes = {node.t: node.value for node in control.x_nodes}
-    times, values = list(nodes), list(nodes.values())
-    if not np.isfinite([*times, *values]).all() or (np.diff(times) <= 0.0).any():
+    times, values = [node.t for node in control.x_nodes], [node.value for node in control.x_nodes]
+    if not np.isfinite([*times, *values]).all() or (np.diff(times) < 0.0).any():
         raise ModelError(
-            f"the x_nodes of the control '{control.name}' do not go on in time, or have no numbers; sort them",
-            file=file,
+            f"the x_nodes of the control '{control.name}' go back in time, or have no numbers; sort them", file=file
         )
     if control.use_steps:
         # A value holds up to its own time, that included.
@@ -80,13 +78,14 @@ def _curve(control: Control, file: str) -> Function:
     return _lines(times, values, goes_on=control.extrapolate)
 
 
-def _lines(times: list[float], values: list[float], *, goes_on: bool) -> Function:
-    """Straight lines between points; outside they go on, or the end values hold."""
+def _lines(times: Sequence[float], values: Sequence[float], *, goes_on: bool) -> Function:
+    """Straight lines between points; outside they go on, or the end values hold. Points at one time make a jump."""
     if len(times) == 1:
         return Constant(values[0])
+    widths = np.diff(times)
+    slopes = np.where(widths > 0.0, np.diff(values) / np.where(widths > 0.0, widths, 1.0), 0.0)
+    lines = np.column_stack((values[:-1], slopes))
     if goes_on:
-        return PiecewiseLinear(tuple(times), tuple(values))
-    slopes = np.diff(values) / np.diff(times)
-    return PiecewisePolynomial(
-        np.array((times[0], *times)), np.column_stack(((values[0], *values), (0.0, *slopes, 0.0)))
-    )
+        return PiecewisePolynomial(np.array(times[:-1]), lines)
+    ends = np.array(((values[0], 0.0), (values[-1], 0.0)))
+    return PiecewisePolynomial(np.array((times[0], *times)), np.vstack((ends[:1], lines, ends[1:])))

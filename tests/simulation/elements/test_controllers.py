@@ -75,7 +75,7 @@ def nodes(*times) -> str:
         ('<ControlLinear name="motor"/>', "the control 'motor' has no x_nodes; give it some"),
         (
             f'<ControlLinear name="motor"><x_nodes>{nodes(0, 2, 1)}</x_nodes></ControlLinear>',
-            "the x_nodes of the control 'motor' do not go on in time, or have no numbers; sort them",
+            "the x_nodes of the control 'motor' go back in time, or have no numbers; sort them",
         ),
     ],
 )
