@@ -23,7 +23,7 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.contact import ContactEllipsoid
+from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
 from osimlite.schema.contact_forces import MeyerFregly2016Force, SmoothSphereHalfSpaceForce
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.functions import (
@@ -50,6 +50,11 @@ from osimlite.schema.paths import (
     PathWrap,
 )
 from osimlite.schema.prescribed import PrescribedForce
+from osimlite.schema.scholz_paths import (
+    Scholz2015GeometryPath,
+    Scholz2015GeometryPathObstacle,
+    Scholz2015GeometryPathPoint,
+)
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedBushingForce,
@@ -113,6 +118,26 @@ def around(path, *surfaces) -> GeometryPath:
     wraps = path.path_wrap_set.objects
     wraps += (PathWrap(name=f"around_{surface}", wrap_object=surface) for surface in surfaces)
     return path
+
+
+OBSTACLES = (
+    ContactSphere(name="o0", socket_frame="/bodyset/b0", radius=0.05, location=(0.1, -0.1, 0.1)),
+    ContactCylinder(name="o1", socket_frame="/bodyset/b1", radius=0.02, location=(0.3, 0.0, 0.1)),
+    ContactTorus(name="o2", socket_frame="/bodyset/b1", torus_radius=0.05, tube_radius=0.02, location=(0, 0.1, -0.2)),
+    ContactEllipsoid(name="o3", socket_frame="/bodyset/b2", radii=(0.04, 0.03, 0.05)),
+)
+
+
+def over(path, surfaces) -> Scholz2015GeometryPath:
+    """The path over surfaces between its last two points."""
+    found = Scholz2015GeometryPath(name="path")
+    for point in path.path_point_set.objects:
+        found.path_elements.append(Scholz2015GeometryPathPoint(name=f"e_{point.name}", path_point=point))
+    for surface in surfaces:
+        obstacle = Scholz2015GeometryPathObstacle(name=f"over_{surface.name}", contact_hint=(0.0, 0.2, 0.0))
+        obstacle.socket_contact_geometry = f"/contactgeometryset/{surface.name}"
+        found.path_elements.insert(-1, obstacle)
+    return found
 
 
 def between(kind, one="/bodyset/b0", two="/bodyset/b3", **more):
@@ -268,6 +293,10 @@ FORCES = {
             ),
         ),
     ),
+    "path over obstacles": lambda: (
+        *OBSTACLES,
+        PathSpring(name="a", **SPRING, geometry_path=over(straight(), OBSTACLES)),
+    ),
     "path by a formula": lambda: ExpressionBasedPathForce(
         name="a", resting_length=0.4, clamp_stretch=True, expression="30*s^2 + ldot*s", geometry_path=straight()
     ),
@@ -419,7 +448,7 @@ def test_all_at_once():
     model = chain()
     for place, (name, make) in enumerate(FORCES.items()):
         made = make()
-        if "actuator" in name or name == "station":
+        if "actuator" in name or name in ("station", "path over obstacles"):
             continue  # others name them by a path
         for item in made if isinstance(made, tuple | list) else (made,):
             item.name = f"{item.name}{place}"

@@ -44,6 +44,8 @@ LAW_MODULES = {
     "function_of_one": "function_paths",
     "polynomial": "function_paths",
     "formula": "function_paths",
+    "cable_path": "cable_paths",
+    "pull_cable": "cable_paths",
     "wrap_cylinder": "wrap_cylinder",
     "wrap_sphere": "wrap_sphere",
     "wrap_ellipsoid": "wrap_ellipsoid",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.util import find_spec
+from math import isnan
 from typing import Any, Protocol
 
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_name
@@ -30,9 +31,9 @@ class AlongPath(Geometry):
 
     inputs = ("length", "rate")
     speed = "rate"
-    before = ("length, rate = path_length(s, x, w, y, f, item - g[0])",)
+    before = ("length, rate = path_length(s, x, w, y, f, item - g[0])", "if isnan(length):", "    return UNSOLVED")
     after = ("pull_path(s, x, w, y, f, item - g[0], tension)",)
-    calls = (path_length, pull_path)
+    calls = (path_length, pull_path, isnan)
 
     def read(self, builder: ElementBuilder, force: Any) -> Path:
         """The path of a force.
