@@ -1,8 +1,8 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
-Everything public is here: ``read``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``paths``, ``to_urdf``,
-``simulate``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported
-when first used, so that importing osimlite costs nothing.
+Everything public is here: ``read``, ``read_document``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``paths``,
+``to_urdf``, ``simulate``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names
+are imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from osimlite.document.printer import to_text as to_text
     from osimlite.document.printer import write as write
     from osimlite.document.reader import read as read
+    from osimlite.document.reader import read_any as read_document
     from osimlite.document.reader import read_text as read_text
     from osimlite.errors import OsimliteError as OsimliteError
     from osimlite.lint import validate as validate
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         "mechanism",
         "paths",
         "read",
+        "read_document",
         "read_text",
         "simulate",
         "to_text",
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 _FUNCTIONS = {
     "read": "osimlite.document.reader",
+    "read_document": "osimlite.document.reader:read_any",
     "read_text": "osimlite.document.reader",
     "write": "osimlite.document.printer",
     "to_text": "osimlite.document.printer",

@@ -10,11 +10,12 @@ from osimlite.document.printer import DECLARATION, to_text
 from osimlite.document.reader import document_of, parse, version_of
 from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError
+from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
 
 
 def formatted(source: Source) -> str:
-    """The text of a model in the layout in which it would be printed.
+    """The text of a document in the layout in which it would be printed.
 
     A document of the current version is read and printed. One of another keeps its version and its words: only white
     space changes, and the comments that OpenSim prints by itself are dropped.
@@ -30,7 +31,7 @@ def formatted(source: Source) -> str:
         root, _ = read_repaired(source, fault, parse)
     version = version_of(source, root)
     if version == CURRENT_VERSION:
-        return to_text(document_of(source, root, version).model)
+        return to_text(document_of(source, root, version, Object).top)
     for element in root.iter(etree.Element):
         if not len(element):
             element.text = " ".join(split(element.text or "")) or None

@@ -1,4 +1,4 @@
-"""Model to text, in OpenSim's layout: one tab a level, properties in catalogue order, only what has been set."""
+"""Objects to text, in OpenSim's layout: one tab a level, properties in catalogue order, only what has been set."""
 
 from __future__ import annotations
 
@@ -21,39 +21,37 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
 """What every document begins with."""
 
 
-def to_text(model: Model, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
-    """The document of a model.
+def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
+    """The document of a model, or of another object that has one of its own, such as the setup of a tool.
 
     Args:
-        model: what to print; components given as references must be part of it.
+        top: what to print; components given as references must be part of it, if it is a model.
         numbers: ``"shortest"`` prints the shortest decimal that reads back equal, ``"opensim"`` 17 significant digits.
         comments: whether to print the comments the model was read with.
 
     Raises:
         ModelError: a reference leads to a component outside the model.
     """
-    expect_model(model)
-    return _document(_Printer(model, numbers, comments))
+    return _document(_Printer(top, numbers, comments))
 
 
-def write(model: Model, path: str | Path, *, numbers: Numbers = "shortest") -> None:
-    """Write a model file; it appears whole or not at all.
+def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> None:
+    """Write the file of a model or of another object; it appears whole or not at all.
 
     What was read from a file of its own and is unchanged stays a reference to that file. Arguments and errors as
     `to_text`.
     """
-    expect_model(model)
-    write_atomically(path, _document(_Printer(model, numbers, True, Path(path).resolve().parent)))
+    write_atomically(path, _document(_Printer(top, numbers, True, Path(path).resolve().parent)))
 
 
 def _document(printer: _Printer) -> str:
-    model = printer.model
-    layout = model.layout or Layout()
+    top = printer.top
+    layout = top.layout or Layout()
     lines = printer.lines
     lines.append(DECLARATION)
     printer.comment(layout.prolog, 0)
     lines.append(f'<OpenSimDocument Version="{CURRENT_VERSION}">')
-    printer.object(model, model.name, 1)
+    printer.object(top, top.name, 1)
     lines.append("</OpenSimDocument>")
     printer.comment(layout.epilog, 0)
     return "\n".join(lines) + "\n"
@@ -62,14 +60,16 @@ def _document(printer: _Printer) -> str:
 class _Printer:
     """Collects the lines of one document; `folder` is where it will stand, if that is known."""
 
-    def __init__(self, model: Model, numbers: str, comments: bool, folder: Path | None = None) -> None:
-        self.model = model
-        self.tree = model.tree()
+    def __init__(self, top: Object, numbers: str, comments: bool, folder: Path | None = None) -> None:
+        if not isinstance(top, Object) or type(top).abstract:
+            expect_model(top)
+        self.top = top
+        self.tree = top.tree() if isinstance(top, Model) else None
         self.numbers = numbers
         self.comments = comments
         self.folder = folder
         self.lines: list[str] = []
-        block = model.layout.defaults if model.layout is not None else []
+        block = top.layout.defaults if top.layout is not None else []
         self.defaults = {type(item): item for item in reversed(block)}
 
     def object(self, item: Object, name: str, depth: int) -> None:
@@ -87,7 +87,7 @@ class _Printer:
             if layout is not None:
                 head += "".join(f" {key}={quoted(text)}" for key, text in layout.attributes.items())
             self.lines.append(head + ">")
-            if item is self.model and layout is not None and layout.defaults:
+            if item is self.top and layout is not None and layout.defaults:
                 self._block(layout.defaults, depth + 1)
             present = item.model_fields_set
             default = self.defaults.get(type(item))
@@ -168,6 +168,8 @@ class _Printer:
 
     def _named(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
+            if self.tree is None:
+                return value.name if reference.rule.endswith("-name") else value.path
             return self.tree.text_for(self.tree.owner_of(item), reference, value)
         if isinstance(value, tuple):
             return tuple(self._named(item, reference, word) for word in value)

@@ -1,4 +1,4 @@
-"""Text to model: lxml parses, :mod:`osimlite.document.objects` makes components of the elements."""
+"""Text to objects: lxml parses, :mod:`osimlite.document.objects` makes objects of the elements."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ from osimlite.files import expect_size
 from osimlite.schema.base import Object
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
+from osimlite.schema.registry import class_for, tags
+from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
     from osimlite.document.upgrade import Change, Refusal, Upgraded
@@ -56,12 +58,12 @@ _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
 @dataclass(slots=True)
 class Document:
-    """A model together with the text it came from and what the reader noticed in it.
+    """The object at the top of a document, with the text it came from and what the reader noticed in it.
 
     `fault` is what the XML parser says against a text that could be read all the same.
     """
 
-    model: Model
+    top: Object
     source: Source
     version: int
     notes: list[Note] = field(default_factory=list)
@@ -69,12 +71,18 @@ class Document:
     fault: NotWellFormedError | None = None
 
     @property
+    def model(self) -> Model:
+        """The model of a document that was read as one of a model."""
+        assert isinstance(self.top, Model)
+        return self.top
+
+    @property
     def refusals(self) -> list[Refusal]:
         """Over what OpenSim fails when it brings a document of an older version up to date."""
         found = [] if self.upgraded is None else self.upgraded.refusals
         if not found:
             return []
-        tops = (self.model, *(self.model.layout.defaults if self.model.layout is not None else ()))
+        tops = (self.top, *(self.top.layout.defaults if self.top.layout is not None else ()))
         read = {item._index for top in tops for item in top.walk()}
         return [refusal for refusal in found if refusal.owner in read]
 
@@ -93,18 +101,27 @@ def read(path: str | Path) -> Model:
     return read_document(Source.of_file(path)).model
 
 
+def read_any(path: str | Path) -> Object:
+    """Read a document of any kind: a model, the setup of a tool, a set of tasks, of markers, of loads.
+
+    Raises:
+        DocumentError: the file is missing or is not an OpenSim document; with line and column.
+    """
+    return read_document(Source.of_file(path), of=Object).top
+
+
 def read_text(text: str | bytes) -> Model:
     """Read a model from the text of a document; DocumentError if it is none."""
     return read_document(Source(text) if isinstance(text, bytes) else Source.of_characters(text)).model
 
 
-def read_document(source: Source, *, to_check: bool = False) -> Document:
-    """Read a model and keep its text and the notes.
+def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = False) -> Document:
+    """Read a document whose top object is of a class or derived from it, and keep its text and the notes.
 
     A text that is `to_check` is also asked whether there is anything between its elements.
 
     Raises:
-        DocumentError: the text is not an OpenSim model document; with line and column.
+        DocumentError: the text is not an OpenSim document, or holds something else; with line and column.
     """
     try:
         root = parse(source)
@@ -115,41 +132,45 @@ def read_document(source: Source, *, to_check: bool = False) -> Document:
         from osimlite.document.repair import read_repaired
 
         root, notes = read_repaired(source, fault, parse)
-        document = document_of(source, root, version_of(source, root))
+        document = document_of(source, root, version_of(source, root), of)
         document.notes[:0] = notes
         document.fault = fault
         return document
-    return document_of(source, root, version_of(source, root))
+    return document_of(source, root, version_of(source, root), of)
 
 
-def document_of(source: Source, root: etree._Element, version: int) -> Document:
+def document_of(source: Source, root: etree._Element, version: int, of: type[Object] = Model) -> Document:
     """The document that an element tree stands for.
 
     Raises:
-        DocumentError: there is no model in it, or something that no rule carries over from an older version.
+        DocumentError: there is no such object in it, or something that no rule carries over from an older version.
     """
     with collector_paused():
-        upgraded = _upgraded(source, root, version) if version < CURRENT_VERSION else None
-        document = _document(source, root, version, upgraded)
-        if upgraded is None and any(note.kind in _NOT_KNOWN for note in document.notes):
+        if version < CURRENT_VERSION:
+            return _document(source, root, version, of, _upgraded(source, root, version))
+        document = None if _class_of(_first(root)) is None else _document(source, root, version, of, None)
+        if document is None or any(note.kind in _NOT_KNOWN for note in document.notes):
             from osimlite.document.upgrade import with_present_names
 
             upgraded = with_present_names(root)
-            if upgraded is not None:
-                document = _document(source, root, version, upgraded)
+            if document is None or upgraded is not None:
+                document = _document(source, root, version, of, upgraded)
     return document
 
 
-def _document(source: Source, root: etree._Element, version: int, upgraded: Upgraded | None) -> Document:
+def _document(
+    source: Source, root: etree._Element, version: int, of: type[Object], upgraded: Upgraded | None
+) -> Document:
     reader = ObjectReader(_included_by(source))
-    model = _model_in(source, root if upgraded is None else upgraded.root, reader)
+    top = _top_in(source, root if upgraded is None else upgraded.root, reader, of)
     if version != CURRENT_VERSION:
-        layout_of(model).version = version
+        layout_of(top).version = version
     notes = reader.notes
     if upgraded is not None:
-        notes = _renumber(source, model, notes, upgraded)
-        _refuse_leftovers(source, version, notes)
-    return Document(model, source, version, notes, upgraded)
+        notes = _renumber(source, top, notes, upgraded)
+        if isinstance(top, Model):
+            _refuse_leftovers(source, version, notes)
+    return Document(top, source, version, notes, upgraded)
 
 
 def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
@@ -165,14 +186,14 @@ def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
         raise fault from None
 
 
-def _renumber(source: Source, model: Model, notes: list[Note], upgraded: Upgraded) -> list[Note]:
+def _renumber(source: Source, top: Object, notes: list[Note], upgraded: Upgraded) -> list[Note]:
     """Give everything read from an upgraded tree the place it has in the old text."""
     source.moved = upgraded.moved
     numbers = upgraded.numbers
     if numbers is None:
         return notes
-    for top in (model, *layout_of(model).defaults):
-        for item in top.walk():
+    for each in (top, *layout_of(top).defaults):
+        for item in each.walk():
             if item._index is not None:
                 object.__setattr__(item, "_index", numbers[item._index])
     return [note._replace(number=numbers[note.number]) for note in notes]
@@ -260,8 +281,11 @@ def version_of(source: Source, root: etree._Element) -> int:
     number = int(digits[1]) if digits is not None and int(digits[1]) < 2**31 else None
     if root.tag == "OpenSimDocument" and number is not None and number >= OLDEST:
         return number
-    if root.tag == "Model" and text is None:
-        return OLDEST
+    if text is None and root.tag != "OpenSimDocument":
+        from osimlite.document.upgrade.v40600_class_names import RENAMED
+
+        if _class_of(root) is not None or root.tag in RENAMED:
+            return OLDEST
     # Places cost a pass over the text, so they are computed for errors only.
     line, column, _ = source.of_tag(0)
     if root.tag != "OpenSimDocument":
@@ -283,40 +307,46 @@ def version_of(source: Source, root: etree._Element) -> int:
     raise fault
 
 
-def _model_in(source: Source, root: etree._Element, reader: ObjectReader) -> Model:
-    """Read the model that is the one object of a document, with the comments around it."""
-    reader.count = 1
-    model: Model | None = None
-    pending: list[Remark] = []
-    for child in root:
-        if not is_element(child):
-            remember(child, pending)
-        elif model is not None:
-            reader.notes.append(Note("second-object", reader.count, as_written(child.tag)))
-            reader.count += size(child)
-        elif child.tag == "Model":
-            model = reader.top(child, Model)
-            if pending:
-                layout_of(model).comments.extend(remark.text for remark in pending)
-                pending = []
+def _first(root: etree._Element) -> etree._Element | None:
+    """The element of the one object of a document."""
+    return next((child for child in root if is_element(child)), None)
+
+
+def _class_of(element: etree._Element | None) -> type[Object] | None:
+    return None if element is None else class_for(as_written(element.tag))
+
+
+def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type[Object]) -> Object:
+    """Read the one object of a document, with the comments around it."""
+    first = _first(root)
+    cls = _class_of(first)
+    if first is None or cls is None or not issubclass(cls, of):
+        if first is None:
+            what = "no object" if of is Object else f"no <{of.tag}>"
+        elif of is Object:
+            tag = as_written(first.tag)
+            what = f"a <{tag}>, which is no class of OpenSim 4.6{did_you_mean(tag, tags())}"
         else:
-            line, column, _ = source.of_tag(reader.count)
-            raise DocumentError(
-                f"the document holds a <{as_written(child.tag)}>, not a <Model>",
-                file=source.file, line=line, column=column,
-            )  # fmt: skip
-    if model is None:
-        line, column, _ = source.of_tag(0)
-        raise DocumentError("the document holds no <Model>", file=source.file, line=line, column=column)
-    if pending:
-        layout_of(model).after.extend(pending)
-    for place, nodes in (("prolog", [*root.itersiblings(preceding=True)][::-1]), ("epilog", root.itersiblings())):
-        outside: list[Remark] = []
+            what = f"a <{as_written(first.tag)}>, not a <{of.tag}>"
+        line, column, _ = source.of_tag(0 if first is None else 1)
+        raise DocumentError(f"the document holds {what}", file=source.file, line=line, column=column)
+    reader.count = 1
+    top = reader.top(first, cls)
+    for second in first.itersiblings(etree.Element):
+        reader.notes.append(Note("second-object", reader.count, as_written(second.tag)))
+        reader.count += size(second)
+    for place, nodes in (
+        ("comments", [*first.itersiblings(preceding=True)][::-1]),
+        ("after", first.itersiblings()),
+        ("prolog", [*root.itersiblings(preceding=True)][::-1]),
+        ("epilog", root.itersiblings()),
+    ):
+        remarks: list[Remark] = []
         for node in nodes:
-            remember(node, outside)
-        if outside:
-            getattr(layout_of(model), place).extend(remark.text for remark in outside)
-    return model
+            remember(node, remarks)
+        if remarks:
+            getattr(layout_of(top), place).extend(remarks if place == "after" else [remark.text for remark in remarks])
+    return top
 
 
 def _included_by(source: Source, around: tuple[str, ...] = (), read: list[int] | None = None) -> Included | None:

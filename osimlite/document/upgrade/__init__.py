@@ -99,7 +99,7 @@ def upgrade(root: Element, version: int) -> Upgraded:
         Refused: the document says something that no step can carry over.
     """
     draft = Draft(root, version)
-    if root.tag == "Model":
+    if root.tag != "OpenSimDocument":
         draft.wrap("OpenSimDocument")
     if draft.moves:
         from osimlite.document.upgrade.strict import check

@@ -8,6 +8,7 @@ RENAMED = {
     "ActuatorSet": "ForceSet",
     "Delp1990Muscle": "Delp1990Muscle_Deprecated",
     "GeneralizedForce": "CoordinateActuator",
+    "IKTool": "InverseKinematicsTool",
     "MovingMusclePoint": "MovingPathPoint",
     "MuscleMetabolicPowerProbeUmberger2010": "Umberger2010MuscleMetabolicsProbe",
     "MuscleMetabolicPowerProbeUmberger2010_MetabolicMuscleParameter": (
@@ -24,6 +25,9 @@ RENAMED = {
     "NaturalCubicSpline": "SimmSpline",
     "Schutte1993Muscle": "Schutte1993Muscle_Deprecated",
     "natCubicSpline": "SimmSpline",
+    "rdCMC_Joint": "CMC_Joint",
+    "rdCMC_Point": "CMC_Point",
+    "rdCMC_TaskSet": "CMC_TaskSet",
 }
 """Old names of classes, which OpenSim 4.6 still takes in documents of every version."""
 
