@@ -11,9 +11,16 @@ INITIAL_STEP = 0.01
 """First step tried, s: a tenth of Simbody's default time scale."""
 
 
-def shortest_step(t: float) -> float:
-    """The shortest step that moves the time t; as in Simbody, from 0 it may be of any length."""
-    return max(2.0**-52 * abs(t), 1e-300)
+PATIENCE = 10_000
+"""Steps that may be tried before a motion that gets nowhere is given up."""
+
+
+def shortest_step(t: float, tried: float) -> float:
+    """The shortest step to take at a time t (s) after so many that were tried.
+
+    As in Simbody, the first steps from 0 may be of any length. OpenSim goes on with such steps for ever; here they end.
+    """
+    return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
 
 
 def weight(value: float) -> float:

@@ -124,3 +124,13 @@ def test_a_station_that_is_nowhere_is_no_matter():
     model = pendulum(osimlite.PinJoint)
     model.add(osimlite.Station(name="toe", location=(float("inf"), 0.0, 0.0), socket_parent_frame=model.ground))
     assert osimlite.simulate(model, 0.01, "compiled").times[-1] == 0.01
+
+
+def test_steps_that_lead_nowhere_come_to_an_end():
+    """Each is as short as the number range allows, and there would be no end of them."""
+    model = pendulum(osimlite.PinJoint)
+    coordinate = next(iter(model.components(osimlite.Coordinate)))
+    words = "1e40*sin(1e30*q)"
+    model.add(osimlite.ExpressionBasedCoordinateForce(name="drive", coordinate=coordinate, expression=words))
+    with pytest.raises(SimulationError, match="cannot go on at t = "):
+        osimlite.simulate(model, 1e-6, "compiled", initial={coordinate.name: 1.0})

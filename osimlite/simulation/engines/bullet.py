@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.errors import OsimliteError, UnsupportedError
+from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
@@ -77,12 +77,14 @@ class BulletEngine(KernelEngine):
     ) -> None:
         if route not in ROUTES:
             raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
-        self.route = MASS_MATRIX if route == "auto" else route
         free = free_coordinates(mechanism)
         fixed = [place for place in range(len(mechanism.coordinates)) if place not in free]
         shapes = {} if visuals is None else visuals.by_body
         robot = legal_names(merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes)))
         is_plain = _is_plain(mechanism, robot)
+        # What is added to inertias that no body has, and taken off again, costs digits.
+        is_exact = is_plain and any(excess(link) > 0.0 for link in robot.links)
+        self.route = (ARTICULATED_BODY if is_exact else MASS_MATRIX) if route == "auto" else route
         if is_plain:
             # A constraint might decide how the end of a chain moves.
             require_masses(robot)
@@ -123,7 +125,13 @@ class BulletEngine(KernelEngine):
         """Mass matrix and bias; see :class:`osimlite.simulation.kernels.pack_chain.Chain`."""
         robot, client, first = self._body.id, self._body.client, self._forces
         values, rates, accelerations = w[self._moves : first].reshape(3, -1).tolist()
-        forces = bullet.calculateInverseDynamics(robot, values, rates, accelerations, 0, client)
+        try:
+            forces = bullet.calculateInverseDynamics(robot, values, rates, accelerations, 0, client)
+        except SystemError:
+            raise SimulationError(
+                f"Bullet refuses the inertias of '{self.mechanism.name}', which are none after its own rounding; look "
+                "for masses and mass centers beyond belief, or take --engine compiled"
+            ) from None
         self._pack_forces(w, 8 * first, *forces)
         # numpy takes twice as long to read tuples.
         matrix = chain.from_iterable(bullet.calculateMassMatrix(robot, values, 0, client))

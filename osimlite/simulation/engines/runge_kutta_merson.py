@@ -158,7 +158,7 @@ class RungeKuttaMerson(Stepper):
         Args:
             errors: of the last step that was tried (y,).
         """
-        t0, y0, h = self.time, self.state, shortest_step(self.time)
+        t0, y0, h = self.time, self.state, shortest_step(self.time, self.attempted)
         f0, size = self._evaluate(t0, y0), len(self._engine.order)
         # It may cease to exist behind this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])

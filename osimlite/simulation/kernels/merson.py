@@ -234,7 +234,7 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
     counts, clock, settings, sizes, size = m.counts, m.clock, m.settings, m.sizes, m.s[STATE_SIZE]
     errors = at(m.w, m.s[WORK_STATE] + ERRORS * size)
-    limit, accuracy, smallest = settings[LIMIT], settings[ACCURACY], shortest_step(t0)
+    limit, accuracy, smallest = settings[LIMIT], settings[ACCURACY], shortest_step(t0, counts[ATTEMPTED])
     while True:
         if counts[ATTEMPTED] >= sizes[MOST_TRIES]:
             return t0
