@@ -194,9 +194,9 @@ def run(m: Motion, y: Floats) -> int:
         counts[EVALUATIONS] += 1
         if evaluated(m, t1, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
             # Simbody ends here; smaller steps lead nearer to where the motion ends.
-            if t1 - t0 <= shortest_step(t0):
+            if t1 - t0 <= shortest_step(t0, counts[ATTEMPTED]):
                 return FAILED
-            clock[1] = max(0.1 * (t1 - t0), shortest_step(t0))
+            clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[ATTEMPTED]))
             continue
         counts[TAKEN] += 1
         clock[0] = t1
