@@ -63,14 +63,13 @@ def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path 
     if given is None:
         return controls
     known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
-    shared = {key for key in known if sum(name.endswith(f"/{key}") for name in controls.names) > 1}
     functions: dict[str, Function] = {}
     start, end = -inf, inf
     for key, value in _by_name(given).items():
         if key not in known:
             raise SettingError(f"the model has no actuator '{key}' to control{did_you_mean(key, known)}")
-        if key in shared:
-            paths = [name for name in controls.names if name.endswith(f"/{key}")]
+        paths = [name for name in controls.names if name.endswith(f"/{key}")]
+        if len(paths) > 1:
             raise SettingError(f"{len(paths)} actuators are called '{key}': {listed(paths)}; give the path of one")
         if known[key] in functions:
             raise SettingError(f"'{known[key]}' is controlled twice, by its name and by its path; leave one out")
