@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.util import find_spec
-from math import isnan
 from typing import Any, Protocol
 
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_name
@@ -31,9 +30,9 @@ class AlongPath(Geometry):
 
     inputs = ("length", "rate")
     speed = "rate"
-    before = ("length, rate = path_length(s, x, w, y, f, item - g[0])", "if isnan(length):", "    return UNSOLVED")
+    before = ("length, rate = path_length(s, x, w, y, f, item - g[0])", "if length != length:", "    return UNSOLVED")
     after = ("pull_path(s, x, w, y, f, item - g[0], tension)",)
-    calls = (path_length, pull_path, isnan)
+    calls = (path_length, pull_path)
 
     def read(self, builder: ElementBuilder, force: Any) -> Path:
         """The path of a force.
