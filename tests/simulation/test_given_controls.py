@@ -102,7 +102,7 @@ def test_a_control_set_can_be_given(model, tmp_path):
     assert (forces["second"] == 7.0).all()
 
 
-@pytest.mark.parametrize("code", [COMPILED, PYTHON], ids=str)
+@pytest.mark.parametrize("code", [COMPILED, PYTHON], ids=lambda code: code.name)
 def test_the_kernel_alone(model, code):
     mechanism = osimlite.mechanism(model)
     forces = osimlite.simulation.elements.force_elements(model, mechanism)
