@@ -26,8 +26,8 @@ def named_mesh_folders() -> tuple[Path, ...]:
 _SPECIAL = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
-def model_files(paths: Iterable[Path]) -> list[Path]:
-    """The files named, and every ``.osim`` file below the folders named, sorted within each folder.
+def model_files(paths: Iterable[Path], suffixes: tuple[str, ...] = (".osim",)) -> list[Path]:
+    """The files named, and every file with one of some suffixes below the folders named, sorted within each folder.
 
     Raises:
         MissingFileError: a path is not there.
@@ -36,9 +36,10 @@ def model_files(paths: Iterable[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            below = sorted(file for file in path.rglob("*.osim") if not file.is_dir())
+            named = (file for file in path.rglob("*.*") if file.suffix.lower() in suffixes)
+            below = sorted(file for file in named if not file.is_dir())
             if not below:
-                raise OsimliteError("there is no .osim file in this folder", file=str(path))
+                raise OsimliteError(f"there is no {' or '.join(suffixes)} file in this folder", file=str(path))
             found.extend(below)
         elif path.exists():
             found.append(path)

@@ -15,6 +15,7 @@ from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
+from osimlite.lint.suffixes import TABLES
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -82,7 +83,8 @@ def run(
 def _files(paths: list[str]) -> Iterator[str]:
     """Every file to check, folders opened up."""
     for text in paths:
-        yield from map(str, model_files([Path(text)])) if text != "-" and os.path.isdir(text) else [text]
+        is_folder = text != "-" and os.path.isdir(text)
+        yield from map(str, model_files([Path(text)], (".osim", *TABLES))) if is_folder else [text]
 
 
 def _source(path: str) -> Source:

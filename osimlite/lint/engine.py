@@ -6,19 +6,25 @@ A rule is a function of the subject and of `found`, which it calls once per find
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from inspect import cleandoc
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
-from osimlite.document.survey import survey
+from osimlite.document.survey import survey, survey_file
+from osimlite.errors import SpecialFileError
+from osimlite.files import read_file
+from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
 from osimlite.lint.subject import Subject
+from osimlite.lint.suffixes import is_table
 from osimlite.lint.suppressions import suppressions
+from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
 from osimlite.text import brief
@@ -34,6 +40,7 @@ FAMILIES = {
     "5": "physics",
     "6": "paths",
     "7": "files",
+    "8": "data",
 }
 """The families of rules by the first digit of their codes."""
 
@@ -61,6 +68,8 @@ _MODULES = (
     "wraps",
     "muscles",
     "files",
+    "tables",
+    "marker_tables",
 )
 
 
@@ -85,7 +94,7 @@ class Found(Protocol):
         """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`."""
 
 
-Check = Callable[[Subject, Found], None]
+Check = Callable[[Any, Found], None]
 Mends = Literal["", "safe", "unsafe", "both"]
 
 
@@ -94,7 +103,8 @@ class Rule:
     """One registered rule.
 
     `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
-    version, where OpenSim does something else with them. `mends` says of what kind its mends are.
+    version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
+    at: ``model`` or ``table``.
     """
 
     code: str
@@ -104,6 +114,7 @@ class Rule:
     before: tuple[int, Severity] | None = None
     thresholds: tuple[Threshold, ...] = ()
     mends: Mends = ""
+    about: str = "model"
 
     @property
     def family(self) -> str:
@@ -142,13 +153,14 @@ def rule(
     before: tuple[int, Severity] | None = None,
     thresholds: tuple[Threshold, ...] = (),
     mends: Mends = "",
+    about: str = "model",
 ) -> Callable[[Check], Check]:
     """Register a function as the rule `code`; the other arguments are those of :class:`Rule`."""
 
     def register(check: Check) -> Check:
         if code in _RULES or any(known.name == name for known in _RULES.values()):
             raise ValueError(f"rule {code} {name} is registered twice")
-        _RULES[code] = Rule(code, name, severity, check, before, thresholds, mends)
+        _RULES[code] = Rule(code, name, severity, check, before, thresholds, mends, about)
         return check
 
     return register
@@ -163,9 +175,19 @@ def all_rules() -> tuple[Rule, ...]:
 
 
 def check_source(source: Source, config: Config | None = None) -> Report:
-    """Check a text."""
+    """Check a text: a table if its file is called so, else a document."""
+    if source.file is not None and is_table(source.file):
+        return run(Table(source.data, source.file, config))
     with collector_paused():
         return run(Subject(survey(source), config))
+
+
+def subject_of(file: str, config: Config | None = None) -> Checked:
+    """A file to check; MissingFileError if there is none. What it is, its name tells."""
+    if is_table(file):
+        with suppress(SpecialFileError):
+            return Table(read_file(file), file, config)
+    return Subject(survey_file(file), config)
 
 
 def check_model(model: Model, config: Config | None = None) -> Report:
@@ -174,11 +196,11 @@ def check_model(model: Model, config: Config | None = None) -> Report:
         return run(Subject(model, config))
 
 
-def run(subject: Subject) -> Report:
+def run(subject: Checked) -> Report:
     """Run every rule that is wanted, and return all findings sorted by place."""
     findings: list[Finding] = []
     for known in all_rules():
-        if subject.config.wants(known) and _applies(known, subject):
+        if subject.config.wants(known) and subject.is_for(known):
             known.check(subject, _collector(known, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
@@ -188,12 +210,12 @@ def run(subject: Subject) -> Report:
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
     report = Report(unique)
-    if unique and subject.source is not None and subject.source.file is not None:
-        report.texts[subject.source.file] = subject.source.text
+    if unique and subject.file is not None:
+        report.texts[subject.file] = subject.text
     return report
 
 
-def _not_ignored(subject: Subject, findings: list[Finding]) -> list[Finding]:
+def _not_ignored(subject: Checked, findings: list[Finding]) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
     assert subject.source is not None
     comments = suppressions(subject.source)
@@ -212,16 +234,7 @@ def _not_ignored(subject: Subject, findings: list[Finding]) -> list[Finding]:
     return kept
 
 
-def _applies(known: Rule, subject: Subject) -> bool:
-    if known.code[4] == "0":
-        return subject.source is not None
-    if subject.model is None:
-        return False
-    # Of a text with a syntax error only what is said in one place can be judged.
-    return subject.sure_until is None or known.code[4] in "12"
-
-
-def _collector(known: Rule, subject: Subject, findings: list[Finding]) -> Found:
+def _collector(known: Rule, subject: Checked, findings: list[Finding]) -> Found:
     def found(
         message: str,
         item: Object | None = None,

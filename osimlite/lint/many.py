@@ -7,17 +7,14 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from osimlite.errors import MissingFileError, SpecialFileError
+from osimlite.errors import MissingFileError
 from osimlite.files import read_file, read_standard_input
 from osimlite.lint.cache import Cache, folder_for, key_of
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.settings import Settings, settings_for
-
-if TYPE_CHECKING:
-    from osimlite.lint.subject import Subject
 
 WORTH_SHARING = 4_000_000
 """Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""
@@ -141,49 +138,16 @@ def _processes(jobs: list[Job]) -> int:
 def check_one(job: Job) -> list[Finding]:
     """Check one file, and keep what was found."""
     from osimlite.document.reader import collector_paused
-    from osimlite.document.survey import survey_file
-    from osimlite.lint.engine import run
-    from osimlite.lint.subject import Subject
+    from osimlite.lint.engine import run, subject_of
 
     with collector_paused():
-        found = survey_file(job.file)
-        subject = Subject(found, job.config)
+        subject = subject_of(job.file, job.config)
         findings = run(subject).findings
-        if job.kept_in is not None and not any(isinstance(fault, SpecialFileError) for fault in found.faults):
-            outside = looked_at(subject)
-            if outside is not None:
-                # A file that changes while it is checked must not be taken for one that was checked after.
-                Cache(job.kept_in).put(job.file, key_of(found.source.data, job.file, job.config), findings, outside)
+        outside = subject.outside() if job.kept_in is not None else None
+        if job.kept_in is not None and outside is not None:
+            # A file that changes while it is checked must not be taken for one that was checked after.
+            Cache(job.kept_in).put(job.file, key_of(subject.data, job.file, job.config), findings, outside)
     return findings
-
-
-def looked_at(subject: Subject) -> list[str] | None:
-    """Every path outside the text that findings may depend on; None if nobody can say."""
-    from osimlite.schema.fields import Reference
-    from osimlite.schema.specs import reference_specs
-
-    if any(note.kind == "include" for note in subject.notes):
-        return None
-    folder = subject.folder
-    if folder is None or subject.model is None:
-        return []
-    # OpenSim looks for data files in the working folder as well.
-    places = [os.path.abspath(folder / place) for place in (".", "Geometry", *subject.config.mesh_paths)]
-    places.append(os.getcwd())
-    found: dict[str, None] = {}
-    for cls, items in subject.by_class.items():
-        for spec in reference_specs(cls):
-            if not isinstance(spec.kind, Reference) or spec.kind.rule != "file":
-                continue
-            for item in items:
-                name = getattr(item, spec.name)
-                if name:
-                    paths = [os.path.join(place, name) for place in places]
-                    found |= dict.fromkeys(paths)
-                    if not any(map(os.path.isfile, paths)):
-                        # Another file in the same folder may be what was meant.
-                        found |= dict.fromkeys(map(os.path.dirname, paths))
-    return list(found)
 
 
 def _standard_input(config: Config, texts: dict[str, str]) -> list[Finding]:

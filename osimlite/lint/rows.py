@@ -12,6 +12,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice, pairwise, product
+from math import inf, nan, nextafter
 from operator import lt
 from typing import NamedTuple
 
@@ -38,6 +39,7 @@ _WHOLE_POWERS = frozenset(
     form for form in _POWERS if any(part.lstrip(b"+-")[:1] in (b"e", b"E") for part in form.split(b"\n"))
 )
 _KINDS = bytes.maketrans(_DIGITS + b".+-eE\n,", b"0" * 11 + b"--ee\t\t")
+_PLAIN = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
 _CELL = re.compile(rb"[^\t]*")
 _BLANKS_AT_TAB = re.compile(rb" *\t *")
@@ -106,16 +108,17 @@ class Scan:
         """Look at the rows from an offset on, which is in this line of the file."""
         if self.markers:
             self.rows.unseen = set(range((self.cells - 2) // 3))
+            while start < len(data) and data[start : start + 1] in b"\t\r\n ":
+                # Before the first frame OpenSim passes over lines that have no number of one.
+                start, line = data.find(b"\n", start) + 1 or len(data), line + 1
         for block in _blocks(data, start):
             good = self._clean(block)
-            if good is not None:
-                line += self._take(good, line)
+            if good is not None and (taken := self._take(good, line)):
+                line += taken
                 continue
             for text in block.split(b"\n")[:-1]:
                 good = self._clean(text + b"\n")
-                if good is not None:
-                    self._take(good, line)
-                else:
+                if good is None or not self._take(good, line):
                     self._odd(text, line)
                 line += 1
         if not self.rows.count:
@@ -140,8 +143,10 @@ class Scan:
         if not self._is_pattern(bones.translate(None, _REST)):
             return None
         forms = set(bones.split(b"\t"))
+        if self._ends_in_tab and block.count(b"\t\n") != block.count(b"\n"):
+            return None
         # Without its digits a number may look like what is none; the few passes that tell are made where it matters.
-        if not forms <= _KNOWN or b"\t.\t" in block:
+        if not forms <= _KNOWN or b"\t.\t" in block or b"\t.\n" in block:
             return None
         doubts = [
             *((b"0-", b"-\t") if not forms.isdisjoint(_SIGNED) else ()),
@@ -152,8 +157,10 @@ class Scan:
             kinds = block.translate(_KINDS)
             if any(doubt in kinds for doubt in doubts):
                 return None
-        self._holes = not forms.isdisjoint(_EMPTY) and (b"\t\t" in block or b"\t\n" in block)
-        return None if self._holes and not (self.markers or self._ends_in_tab) else block
+        self._holes = not forms.isdisjoint(_EMPTY) and (
+            b"\t\t" in block or b"\n\t" in block or (not self._ends_in_tab and b"\t\n" in block)
+        )
+        return None if self._holes and not self.markers else block
 
     def _is_pattern(self, between: bytes) -> bool:
         """Whether what stands between the numbers of a block is that of whole rows; a tab may end all of them."""
@@ -164,32 +171,38 @@ class Scan:
         return not rest and between == pattern * count
 
     def _take(self, block: bytes, line: int) -> int:
-        """Note times and samples of good rows; how many there are."""
+        """Note times and samples of good rows; how many there are, 0 if a time is no number after all."""
         lines = block.split(b"\n")
         lines.pop()
         rows = self.rows
+        heads = [text.split(b"\t", 2) for text in lines] if self.markers else []
+        try:
+            times = [float(head[1] or b"nan") for head in heads] or [float(text.split(b"\t", 1)[0]) for text in lines]
+        except ValueError:
+            return 0
         self._begin(line)
         if self.markers:
-            heads = [text.split(b"\t", 2) for text in lines]
-            times = [float(head[1] or b"nan") for head in heads]
-            for number, head in enumerate(heads):
-                self._expect_frame(head[0], line + number)
-                if not head[1]:
-                    self._note("time", 1, line + number, len(head[0]) + 2, 1, "")
+            for number, (frame, time, *_) in enumerate(heads):
+                self._expect_frame(frame, line + number)
+                if not time:
+                    self._note("time", 1, line + number, len(frame) + 2, 1, "")
+                    times[number] = nextafter(times[number - 1] if number else self._last(), inf)
             if rows.unseen or self._holes or b"\t\t\t" in block.translate(None, b"0.-+"):
                 for number, text in enumerate(lines):
                     self._markers(text, line + number)
-        else:
-            times = [float(text.split(b"\t", 1)[0]) for text in lines]
-        if (rows.times and not times[0] > rows.times[-1]) or not all(map(lt, times, islice(times, 1, None))):
-            for number, (before, time) in enumerate(pairwise([*rows.times[-1:], *times])):
-                if not time > before:
-                    self._order(line + number + (not rows.times), time, before)
+        if not times[0] > self._last() or not all(map(lt, times, islice(times, 1, None))):
+            for number, (before, now) in enumerate(pairwise([self._last(), *times])):
+                if not now > before:
+                    self._order(line + number, now, before)
         rows.times.extend(times)
         rows.count += len(lines)
         for text in lines[:: max(1, len(lines) // 4)] if len(lines) > 4 or len(rows.samples) < 64 else ():
-            rows.samples.append([float(word or b"nan") for word in text.translate(_COMMA_AS_TAB).split(b"\t")])
+            rows.samples.append([_number(word) for word in text.translate(_COMMA_AS_TAB).split(b"\t")])
         return len(lines)
+
+    def _last(self) -> float:
+        """The time of the last row."""
+        return self.rows.times[-1] if self.rows.times else -inf
 
     def _begin(self, line: int) -> None:
         """Note in which line the next row is, where it does not follow the one before."""
@@ -235,21 +248,20 @@ class Scan:
                 value = _number(cell)
                 if value != value:
                     self._note("time", time, line, column, len(cell), _shown(cell))
-                elif rows.times and not value > rows.times[-1]:
-                    self._order(line, value, rows.times[-1])
-            elif not (self.markers and not cell):
+                elif not value > self._last():
+                    self._order(line, value, self._last())
+            elif not (self.markers and cell.lower() in (b"", b"nan")):
                 parts = cell.split(b",") if self.parts > 1 else [cell]
                 if len(parts) != self.parts or any(_number(part) != _number(part) for part in parts):
                     self._note("cell", number, line, column, max(1, len(cell)), _shown(cell))
         if len(cells) > time and len(cells) == self.cells:
             self._begin(line)
             value = _number(cells[time][1])
-            rows.times.append(value if value == value or not rows.times else rows.times[-1])
+            rows.times.append(value if value == value else nextafter(self._last(), inf))
             rows.count += 1
             if self.markers:
-                seen = b"\t".join(b"" if _number(cell) != _number(cell) else cell for _, cell in cells)
-                self._markers(seen, line)
-            if len(rows.samples) < 16:
+                self._markers(b"\t".join(b"" if cell.lower() == b"nan" else cell for _, cell in cells), line)
+            if len(rows.samples) < 64:
                 rows.samples.append(numbers)
 
     def _expect_frame(self, cell: bytes, line: int) -> None:
@@ -269,9 +281,12 @@ class Scan:
 
 
 def _blocks(data: bytes, start: int) -> Iterator[bytes]:
-    """Whole lines from an offset on, each with its end."""
-    while start < len(data):
-        end = data.rfind(b"\n", start, start + BLOCK) + 1 or data.find(b"\n", start) + 1 or len(data)
+    """Whole lines from an offset on, each with its end; blank lines at the end of all left out."""
+    size = len(data)
+    while size > start and data[size - 1] in b"\r\n" and data[size - 2] in b"\r\n":
+        size -= 1
+    while start < size:
+        end = data.rfind(b"\n", start, min(start + BLOCK, size)) + 1 or data.find(b"\n", start, size) + 1 or size
         block = data[start:end]
         yield block if block.endswith(b"\n") else block + b"\n"
         start = end
@@ -283,11 +298,8 @@ def _starts(match: re.Match[bytes]) -> bool:
 
 
 def _number(cell: bytes) -> float:
-    """A number; NaN for a text that is none, as C reads numbers."""
-    try:
-        return float("nan") if b"_" in cell else float(cell)
-    except ValueError:
-        return float("nan")
+    """A number; NaN for a text that is none as C++ reads numbers, which knows neither NaN nor infinity."""
+    return float(cell) if _PLAIN.fullmatch(cell) else nan
 
 
 def _shown(cell: bytes) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import chain
@@ -9,34 +10,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from osimlite.document.notes import Note
-from osimlite.document.source import Position, Source
+from osimlite.document.source import Position
 from osimlite.document.survey import Survey
-from osimlite.errors import DocumentError
+from osimlite.errors import DocumentError, SpecialFileError
+from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, lineage
+from osimlite.schema.specs import FieldSpec, lineage, reference_specs
 from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:
     from osimlite.document.upgrade.draft import Change, Refusal
+    from osimlite.lint.engine import Rule
 
 T = TypeVar("T", bound=Object)
 
 
-class Subject:
+class Subject(Checked):
     """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read."""
 
     def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
-        self.config = config or Config()
-        self.source: Source | None = None
+        super().__init__(config)
         self.model: Model | None
         self.faults: list[DocumentError] = []
         self.notes: list[Note] = []
-        self.sure_until: int | None = None
-        self.version: int | None = None
-        self.upgraded = False
         self.changes: list[Change] = []
         self.refusals: list[Refusal] = []
         self.kept: dict[str, object] = {}
@@ -60,10 +60,13 @@ class Subject:
         assert self.source is not None and self.sure_until is not None
         return note.number < len(self.source.spans) and self.source.of_tag(note.number).line < self.sure_until
 
-    @property
-    def file(self) -> str | None:
-        """The file the text came from."""
-        return self.source.file if self.source is not None else None
+    def is_for(self, rule: Rule) -> bool:
+        """Whether a rule has anything to look at; of a text with a syntax error only what is said in one place."""
+        if rule.about != self.about:
+            return False
+        if rule.code[4] == "0":
+            return self.source is not None
+        return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
     @cached_property
     def folder(self) -> Path | None:
@@ -219,6 +222,33 @@ class Subject:
         if word is not None:
             return self.source.of_text(number, word, nth)
         return self.source.of_tag(number)
+
+    def outside(self) -> list[str] | None:
+        """Every path outside the text that findings may depend on; None if nobody can say."""
+        if any(note.kind == "include" for note in self.notes) or any(
+            isinstance(fault, SpecialFileError) for fault in self.faults
+        ):
+            return None
+        folder = self.folder
+        if folder is None or self.model is None:
+            return []
+        # OpenSim looks for data files in the working folder as well.
+        places = [os.path.abspath(folder / place) for place in (".", "Geometry", *self.config.mesh_paths)]
+        places.append(os.getcwd())
+        found: dict[str, None] = {}
+        for cls, items in self.by_class.items():
+            for spec in reference_specs(cls):
+                if not isinstance(spec.kind, Reference) or spec.kind.rule != "file":
+                    continue
+                for item in items:
+                    name = getattr(item, spec.name)
+                    if name:
+                        paths = [os.path.join(place, name) for place in places]
+                        found |= dict.fromkeys(paths)
+                        if not any(map(os.path.isfile, paths)):
+                            # Another file in the same folder may be what was meant.
+                            found |= dict.fromkeys(map(os.path.dirname, paths))
+        return list(found)
 
     def names_itself(self, item: Object) -> bool:
         """Whether the text gives an object its name; always true of a model made in Python."""

@@ -30,8 +30,8 @@ def example(rule: Rule, heading: str) -> bytes:
     section = rule.page.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
     block = re.search(r"```(\S+)\n(.*?)```", section, re.DOTALL)
     assert block is not None, f"{rule.code} shows nothing under '{heading}'"
-    if block[1] == "document":
-        return block[2].encode()
+    if block[1] in ("document", "sto", "trc"):
+        return block[2].replace("→", "\t").encode()
     return str(skeleton.document(block[2])).encode("latin-1" if block[1] == "latin-1" else "utf-8")
 
 
@@ -47,10 +47,17 @@ def test_a_page_has_its_headings_and_prose(rule):
     assert rule.code[4] in FAMILIES and re.fullmatch(r"OSIM\d{3}", rule.code)
 
 
+def example_file(rule: Rule, heading: str, folder: Path) -> Path:
+    """The same as a file."""
+    suffix = re.search(r"```(sto|trc)\n", rule.page)
+    path = folder / f"example.{suffix[1] if suffix else 'osim'}"
+    path.write_bytes(example(rule, heading))
+    return path
+
+
 @pytest.mark.parametrize("rule", RULES)
 def test_the_example_of_a_page_has_the_finding(rule, tmp_path):
-    path = tmp_path / "example.osim"
-    path.write_bytes(example(rule, "Example"))
+    path = example_file(rule, "Example", tmp_path)
     report = validate(path)
     assert set(report.codes) == {rule.code}, str(report)
     assert all(finding.line is not None for finding in report)
@@ -58,16 +65,14 @@ def test_the_example_of_a_page_has_the_finding(rule, tmp_path):
 
 @pytest.mark.parametrize("rule", RULES)
 def test_the_mended_example_has_no_finding(rule, tmp_path):
-    path = tmp_path / "mended.osim"
-    path.write_bytes(example(rule, "Use instead"))
-    assert str(validate(path)) == "nothing found"
+    assert str(validate(example_file(rule, "Use instead", tmp_path))) == "nothing found"
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_a_rule_has_fixtures_that_fail_and_that_pass(rule):
     folder = FIXTURES / rule.code
-    failing, passing = sorted(folder.glob("fail-*.osim")), sorted(folder.glob("pass-*.osim"))
-    assert failing and passing, f"fixtures/lint/{rule.code} needs fail-NN-*.osim and pass-*.osim"
+    failing, passing = sorted(folder.glob("fail-*")), sorted(folder.glob("pass-*"))
+    assert failing and passing, f"fixtures/lint/{rule.code} needs fail-NN-* and pass-*"
     for path in failing:
         expected = int(path.name.split("-")[1])
         report = validate(path)
@@ -80,7 +85,7 @@ def test_a_rule_has_fixtures_that_fail_and_that_pass(rule):
 def test_a_rule_mends_as_its_page_says(rule):
     kinds = {
         "safe" if finding.fix.safe else "unsafe"
-        for path in (FIXTURES / rule.code).glob("fail-*.osim")
+        for path in (FIXTURES / rule.code).glob("fail-*")
         for finding in validate(path)
         if finding.fix is not None
     }

@@ -1,0 +1,65 @@
+"""What every subject of a check has, whatever it is: a model, a table, a document that runs a tool."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from osimlite.lint.config import Config
+
+if TYPE_CHECKING:
+    from osimlite.document.source import Position, Source
+    from osimlite.lint.engine import Rule
+    from osimlite.schema.base import Object
+
+
+class Checked:
+    """Something under check. `about` says which rules speak of it (:attr:`Rule.about`)."""
+
+    about: ClassVar[str] = "model"
+    source: Source | None = None
+    version: int | None = None
+    upgraded = False
+    sure_until: int | None = None
+
+    def __init__(self, config: Config | None = None) -> None:
+        self.config = config or Config()
+
+    @property
+    def file(self) -> str | None:
+        """The file that is checked."""
+        return self.source.file if self.source is not None else None
+
+    @property
+    def text(self) -> str:
+        """Its text, for those who show lines of it."""
+        return self.source.text if self.source is not None else ""
+
+    @property
+    def data(self) -> bytes:
+        """Its bytes."""
+        return self.source.data if self.source is not None else b""
+
+    def is_for(self, rule: Rule) -> bool:
+        """Whether a rule has anything to look at."""
+        return rule.about == self.about
+
+    def path(self, item: Object | None) -> str:
+        """The absolute path of the component an object belongs to."""
+        return ""
+
+    def position(
+        self,
+        item: Object | None,
+        *,
+        tag: str | None = None,
+        word: str | None = None,
+        nth: int = 0,
+        attribute: str | None = None,
+        number: int | None = None,
+    ) -> Position | None:
+        """Where something is in the text."""
+        return None
+
+    def outside(self) -> list[str] | None:
+        """Every path outside the text that findings may depend on; None if nobody can say."""
+        return []

@@ -1,0 +1,157 @@
+"""OSIM81x: what is special to marker files (.trc)."""
+
+from __future__ import annotations
+
+from osimlite.document.source import Position
+from osimlite.lint.engine import INFO, WARNING, Found, rule
+from osimlite.lint.table import METRES, Table
+from osimlite.lint.words import times
+
+_LARGEST, _SMALLEST = 8.0, 0.02
+"""Between these, m, is how far the markers of one frame are spread."""
+
+
+@rule("OSIM811", "marker-units", severity=WARNING, about="table")
+def marker_units(table: Table, found: Found) -> None:
+    """The units of a marker file do not fit its numbers.
+
+    ## What it does
+    Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving body.
+
+    ## Why is this bad
+    OpenSim takes millimetres for metres without a word: inverse kinematics ends with errors of kilometres, and a scaled
+    model is a thousand times too large.
+
+    ## Example
+    ```trc
+    PathFileType→4→(X/Y/Z)→walk.trc
+    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    100→100→1→2→m→100→1→1
+    Frame#→Time→knee→→→hip→→→
+    →→X1→Y1→Z1→X2→Y2→Z2
+
+    1→0.01→617.2→1055.2→170.7→639.6→1400.1→158.1
+    ```
+
+    ## Use instead
+    ```trc
+    PathFileType→4→(X/Y/Z)→walk.trc
+    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    100→100→1→2→mm→100→1→1
+    Frame#→Time→knee→→→hip→→→
+    →→X1→Y1→Z1→X2→Y2→Z2
+
+    1→0.01→617.2→1055.2→170.7→639.6→1400.1→158.1
+    ```
+    """
+    units = table.entries.get("Units")
+    unit = METRES.get(units.value.text) if units is not None else None
+    if units is None or unit is None or len(table.labels) < 2:
+        return
+    spreads = sorted(spread for sample in table.rows.samples if (spread := _spread(sample)) is not None)
+    if not spreads:
+        return
+    usual = spreads[len(spreads) // 2]
+    if not _SMALLEST <= usual * unit <= _LARGEST:
+        right = next((name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES[name] <= 3.0), None)
+        found(
+            f"the markers of a frame are spread over {usual * unit:.3g} m if the units are '{units.value.text}'",
+            at=units.value.at, suggestion=right,
+        )  # fmt: skip
+
+
+def _spread(sample: list[float]) -> float | None:
+    """The diagonal of the box around the markers of a row."""
+    axes = [[number for number in sample[2 + axis :: 3] if number == number] for axis in range(3)]
+    if any(len(numbers) < 2 for numbers in axes):
+        return None
+    return float(sum((max(numbers) - min(numbers)) ** 2 for numbers in axes) ** 0.5)
+
+
+@rule("OSIM812", "marker-gap", severity=WARNING, about="table")
+def marker_gap(table: Table, found: Found) -> None:
+    """A marker is at the origin, or only a part of it is there.
+
+    ## What it does
+    Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two cells are empty, and
+    (for information) markers that no frame has.
+
+    ## Why is this bad
+    OpenSim takes 0 0 0 for where the marker is and bends the model towards it. A marker with one empty cell is not
+    seen at all in that frame.
+
+    ## Example
+    ```trc
+    PathFileType→4→(X/Y/Z)→walk.trc
+    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    100→100→1→2→m→100→1→1
+    Frame#→Time→knee→→→hip→→→
+    →→X1→Y1→Z1→X2→Y2→Z2
+
+    1→0.01→0.6→0.5→0.1→0→0→0
+    ```
+
+    ## Use instead
+    ```trc
+    PathFileType→4→(X/Y/Z)→walk.trc
+    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    100→100→2→2→m→100→1→2
+    Frame#→Time→knee→→→hip→→→
+    →→X1→Y1→Z1→X2→Y2→Z2
+
+    1→0.01→0.6→0.5→0.1→→→
+    2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
+    ```
+    """
+    for fault in table.rows.of("zero", "part"):
+        name = table.labels[(fault.number - 2) // 3].text
+        what = "is at 0 0 0 as if it had been seen there" if fault.kind == "zero" else "lacks a part of its place"
+        more = f", and in {times(fault.times - 1, 'more row')}" if fault.times > 1 else ""
+        found(f"the marker '{name}' {what}{more}", at=Position(fault.line, fault.column, fault.length))
+    for number in sorted(table.rows.unseen):
+        label = table.labels[number]
+        found(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
+
+
+@rule("OSIM813", "frame-number", severity=INFO, about="table")
+def frame_number(table: Table, found: Found) -> None:
+    """The frames of a marker file are not numbered one after the other.
+
+    ## What it does
+    Compares the number of each frame with that of the frame before.
+
+    ## Why is this bad
+    OpenSim does not look at the numbers; but frames may have been taken out or put in.
+
+    ## Example
+    ```trc
+    PathFileType→4→(X/Y/Z)→walk.trc
+    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    100→100→2→2→m→100→1→2
+    Frame#→Time→knee→→→hip→→→
+    →→X1→Y1→Z1→X2→Y2→Z2
+
+    1→0.01→0.6→0.5→0.1→0.6→0.9→0.1
+    4→0.02→0.6→0.5→0.1→0.6→0.9→0.1
+    ```
+
+    ## Use instead
+    ```trc
+    PathFileType→4→(X/Y/Z)→walk.trc
+    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    100→100→2→2→m→100→1→2
+    Frame#→Time→knee→→→hip→→→
+    →→X1→Y1→Z1→X2→Y2→Z2
+
+    1→0.01→0.6→0.5→0.1→0.6→0.9→0.1
+    2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
+    ```
+    """
+    for fault in table.rows.of("frame"):
+        more = f"; so it is in {times(fault.times - 1, 'more row')}" if fault.times > 1 else ""
+        what = (
+            f"'{fault.text}' does not follow on the frame before"
+            if fault.text
+            else "the number of the frame is missing"
+        )
+        found(f"{what}{more}", at=Position(fault.line, fault.column, max(1, fault.length)))

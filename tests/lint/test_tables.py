@@ -1,0 +1,116 @@
+"""Tables: what is found in files that differ from a good one in one thing, and what is not."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.lint import Config
+from osimlite.lint.engine import run, subject_of
+from osimlite.lint.many import check_files
+from osimlite.lint.rows import Scan
+from osimlite.lint.table import Table
+
+
+def numbers(draw: random.Random) -> str:
+    value = draw.choice([0.0, draw.gauss(0, 500), draw.gauss(0, 1e-6), float(draw.randint(-9, 9))])
+    return draw.choice(["%.6f", "%16.8f", "%g", "%.17g", "%.3e", "%+.2f"]) % value
+
+
+@given(st.randoms(use_true_random=False), st.integers(1, 8), st.integers(1, 40), st.sampled_from(["\t", " ", "  \t "]))
+def test_rows_of_numbers_in_any_form_have_no_fault(draw, columns, count, separator):
+    lines = [separator.join([str(row / 8), *(numbers(draw) for _ in range(columns))]) for row in range(count)]
+    text = draw.choice(["\n", "\r\n"]).join([*lines, ""])
+    rows = Scan(columns + 1).run(text.encode(), 0, 1)
+    assert (rows.count, list(rows.times), rows.faults) == (count, [row / 8 for row in range(count)], {})
+
+
+WRONG = [
+    "nan",
+    "NaN",
+    "inf",
+    "x",
+    "1,5",
+    "1.2.3",
+    "1-2",
+    "-",
+    "+",
+    ".",
+    "e5",
+    "5e",
+    "1e-",
+    "--1",
+    "1_0",
+    "0x10",
+    "#N/A",
+]
+
+
+@given(st.randoms(use_true_random=False), st.integers(1, 6), st.integers(2, 30), st.sampled_from(WRONG))
+def test_a_cell_that_is_no_number_is_found_where_it_is(draw, columns, count, wrong):
+    rows = [[str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)]
+    row, column = draw.randrange(count), draw.randint(1, columns)
+    rows[row][column] = wrong
+    found = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 5)
+    (fault,) = found.faults.values()
+    place = sum(map(len, rows[row][:column])) + column + 1
+    assert (fault.kind, fault.number, fault.line, fault.column) == ("cell", column, row + 5, place)
+
+
+@given(st.randoms(use_true_random=False), st.integers(2, 6), st.integers(3, 30), st.booleans())
+def test_a_row_of_another_length_is_found(draw, columns, count, longer):
+    rows = [[str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)]
+    row = draw.randrange(count)
+    rows[row] = [*rows[row], "7"] if longer else rows[row][:-1]
+    found = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1)
+    (fault,) = found.faults.values()
+    assert (fault.kind, fault.line, fault.text) == ("row", row + 1, str(len(rows[row])))
+
+
+@given(st.binary(max_size=300), st.sampled_from(["a.sto", "a.mot", "a.trc"]), st.data())
+def test_no_bytes_make_the_check_fail(data, name, more):
+    start = more.draw(
+        st.sampled_from([b"", b"x\nversion=1\nnRows=1\nendheader\ntime\ta\n0\t1\n", b"PathFileType\t4\n"])
+    )
+    run(Table(start + data, name))
+
+
+@pytest.mark.parametrize("name", ["walk.trc", "walk.mot"])
+def test_no_cut_and_no_changed_byte_makes_the_check_fail(fixtures, name):
+    good = next((fixtures / "lint" / "OSIM801").glob("pass-*" + name[-4:])).read_bytes()
+    draw = random.Random(1)
+    for size in range(0, len(good), 3):
+        run(Table(good[:size], name))
+    for _ in range(300):
+        damaged = bytearray(good)
+        for _ in range(draw.randint(1, 4)):
+            damaged[draw.randrange(len(damaged))] = draw.choice(b"\t\n\r 019.-eEnaN,=\xff#")
+        run(Table(bytes(damaged), name))
+
+
+def test_a_table_is_taken_from_the_cache(fixtures, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    text = next((fixtures / "lint" / "OSIM807").glob("fail-02-nan*")).read_text()
+    Path("walk.sto").write_text(text)
+    first = check_files(["walk.sto"], Config())
+    assert dict(first.codes) == {"OSIM807": 2}
+    monkeypatch.setattr("osimlite.lint.many.check_one", None)
+    assert check_files(["walk.sto"], Config()).findings == first.findings
+
+
+def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
+    monkeypatch.setattr("osimlite.lint.rows.BLOCK", 60)
+    lines = [f"{row / 100:.2f}\t{row}\t-1.5" for row in range(200)]
+    lines[150] = lines[150].replace("-1.5", "nan")
+    path = tmp_path / "walk.sto"
+    path.write_text("x\nversion=1\nnRows=200\nnColumns=3\nendheader\ntime\ta\tb\n" + "\n".join(lines))
+    table = subject_of(str(path))
+    (finding,) = run(table).findings
+    assert (finding.code, finding.line, finding.column) == ("OSIM807", 157, 10)
+    assert isinstance(table, Table)
+    assert (table.span, round(table.step, 9), table.rows.line_of(199)) == ((0.0, 1.99), 0.01, 206)
