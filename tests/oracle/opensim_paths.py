@@ -15,7 +15,8 @@ from tests.oracle.opensim_runs import put
 def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     """Compare at random poses within the ranges of the coordinates, and random speeds; locked coordinates rest.
 
-    Where bodies are tied to each other, the poses are near the default one.
+    Where bodies are tied to each other, the poses are near the default one. Paths whose lengths jump at a pose are left
+    out: there rounding decides.
     """
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
@@ -25,8 +26,7 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     infos, tied = paths.mechanism.coordinates, any(item.bodies for item in paths.mechanism.constraints)
     coordinates = [opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos]
     along = [_path(theirs, model, name) for name in paths.names]
-    # On a torus OpenSim divides by small differences; and it projects speeds to 1e-10 only.
-    short = 1e-10 if list(model.components(osimlite.WrapTorus)) else 1e-12
+    # OpenSim projects speeds to 1e-10 only.
     coupled = 1e-8 if any(not isinstance(item, Lock) for item in paths.mechanism.constraints) else 0.0
     rng = np.random.default_rng(seed)
     for _ in range(poses):
@@ -39,8 +39,11 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
         put(coordinates, state, q, u)
         theirs.realizeVelocity(state)
         lengths, speeds, arms = paths.lengths(q), paths.speeds(q, u), paths.moment_arms(q)
+        shaken = [paths.lengths(q + shift) for shift in (-1e-13, -1e-15, 1e-15, 1e-13)]
         for name, path in zip(paths.names, along, strict=True):
-            assert abs(lengths[name] - path.getLength(state)) < short, name
+            if any(abs(near[name] - lengths[name]) > 1e-11 for near in shaken):
+                continue
+            assert abs(lengths[name] - path.getLength(state)) < 1e-12, name
             assert abs(speeds[name] - path.getLengtheningSpeed(state)) < 1e-10, name
             expected = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
             found = [arms[name].get(info.path, 0.0) for info in infos]

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import osimlite
-from osimlite import Body, Coordinate, Model, WrapCylinder, WrapEllipsoid, WrapSphere
+from osimlite import Body, Coordinate, Model, WrapCylinder, WrapEllipsoid, WrapSphere, WrapTorus
 from osimlite.schema.functions import LinearFunction, MultiplierFunction, SimmSpline, Sine
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
@@ -157,12 +157,13 @@ def wrapped(draw):
     count = draw(st.integers(1, 3))
     for number in range(count):
         # The tangent points of a cylinder that is not alone slide away, and magnify rounding.
-        kinds = (WrapSphere, WrapEllipsoid) if count > 1 else (WrapCylinder,)
+        kinds = (WrapSphere, WrapEllipsoid) if count > 1 else (WrapCylinder, WrapEllipsoid, WrapTorus)
         kind, radius = draw(st.sampled_from(kinds)), draw(st.floats(0.02, 0.06))
         sizes = {
             WrapSphere: {"radius": radius},
             WrapEllipsoid: {"dimensions": (radius, 1.3 * radius, 0.8 * radius)},
             WrapCylinder: {"radius": radius, "length": 0.2},
+            WrapTorus: {"inner_radius": 0.5 * radius, "outer_radius": 2.0 * radius},
         }
         surface = kind(
             name=f"surface{number}",

@@ -43,8 +43,8 @@ TOLERANCE, FIRST_RADIUS, EVALUATIONS = 1e-4, 0.2, 500
 """What lmdif is called with."""
 WORTHWHILE = 1e-4
 """Part of the expected decrease that a step must bring."""
-STEP = sqrt(1.2e-16)
-"""Of the forward differences, from what lmdif takes for the precision of a double."""
+STEP = 1e-5
+"""Of the forward differences, m."""
 DOWN = (0.0, 0.0, -1.0)
 
 
@@ -114,9 +114,7 @@ def least_squares(start: float, flat_start: float, flat: float, square: float, r
     u = damping = scale = 0.0
     value, radius, moved, evaluations = residual(u, start, flat_start, flat, square, ring), FIRST_RADIUS, False, 1
     while True:
-        step = STEP * abs(u) if u != 0.0 else STEP
-        slope = (residual(u + step, start, flat_start, flat, square, ring) - value) / step
-        evaluations += 1
+        slope = (residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
         if not abs(slope * value) > 0.0:
             return u
         scale = max(scale, abs(slope))
