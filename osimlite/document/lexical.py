@@ -87,6 +87,13 @@ def legacy_flag(word: str) -> bool:
     return lowered == "true"
 
 
+def _exact_flag(word: str) -> bool:
+    """A switch in a list of the first property system, where everything but ``true`` in these letters is false."""
+    if word not in _PLAIN_FLAGS:
+        raise Unclean("cut", word, False)
+    return _PLAIN_FLAGS[word]
+
+
 def text(raw: str) -> str:
     """A text: white space trimmed, inner runs of it collapsed to one space."""
     return " ".join(split(raw))
@@ -115,7 +122,7 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     if kind.shape == "vector":
         return _words(word, 0, None)
     if kind.legacy and kind.scalar != "string":
-        return _legacy_list(word)
+        return _legacy_list(_exact_flag if kind.scalar == "bool" else word)
     return _words(word, kind.least, kind.most)
 
 
@@ -279,6 +286,8 @@ def _formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
         word = str
     if kind.shape in ("single", "optional"):
         return lambda value: "" if value is None else word(value)
+    if kind.legacy and kind.scalar == "bool":
+        return lambda values: "".join(f"{word(value)} " for value in values)
     lead = " " if kind.legacy else ""
     return lambda values: lead + " ".join(map(word, values)) if values else ""
 

@@ -139,8 +139,8 @@ class _Printer:
             if value is None and not (isinstance(kind, Value) and kind.scalar != "string"):
                 return  # An empty element would be an empty text.
             text = self._text(item, spec, value)
-            # OpenSim closes empty lists of its first property system like this, and all else with an end tag.
-            short = not text and spec.legacy and kind.shape == "list"  # type: ignore[attr-defined]
+            # OpenSim closes what is empty in its first property system like this, and all else with an end tag.
+            short = not text and spec.legacy
             self.lines.append(f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>")
         elif kind.form == "single" and not (isinstance(value, Unknown) and value.class_name in field_specs(type(item))):
             self.object(value, spec.tag, depth)

@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent
-from osimlite.schema.fields import Flag, Optional, real, reals
+from osimlite.schema.base import ModelComponent, Object, none
+from osimlite.schema.fields import Flag, LegacyMany, Optional, real, reals
 from osimlite.schema.functions import Function
+from osimlite.schema.sets import ObjectGroup
 
 
 class Coordinate(ModelComponent):
@@ -26,3 +27,12 @@ class Coordinate(ModelComponent):
     """Whether the coordinate follows `prescribed_function`; without a function it is free."""
     is_free_to_satisfy_constraints: Flag = False
     """Whether assembly may move the coordinate at will; otherwise it keeps near the default value."""
+
+
+class CoordinateSet(Object):
+    """Coordinates in a document of their own."""
+
+    objects: LegacyMany[Coordinate] = none()
+    """The coordinates."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the coordinates; the mechanics ignore them."""

@@ -47,7 +47,7 @@ class Value(Kind):
     `least` and `most` bound the number of words of a list (`most` None: no bound). `domain` is a condition on every
     number such as ``"> 0"``; it is what a sane model satisfies, not something the reader enforces. `choices` lists
     the words or numbers that have a meaning. `legacy` marks properties of OpenSim's first property system, which are
-    printed after the others and read by stricter rules.
+    printed after the others and read by stricter rules. An `optional` vector may be left out.
     """
 
     scalar: Scalar
@@ -58,6 +58,7 @@ class Value(Kind):
     most: int | None = UNBOUNDED
     legacy: bool = False
     choices: tuple[str | int, ...] = ()
+    optional: bool = False
 
     @property
     def size(self) -> int | None:
@@ -70,8 +71,10 @@ class Value(Kind):
         """Return the number, switch or text, or a tuple of them; ValueError if it is none."""
         if self.shape == "single":
             return _scalar(self.scalar, value)
+        if value is None and (self.optional or self.shape == "optional"):
+            return None
         if self.shape == "optional":
-            return None if value is None else _scalar(self.scalar, value)
+            return _scalar(self.scalar, value)
         if isinstance(value, str) or not isinstance(value, Iterable):
             raise ValueError(f"expected {self.words()}, got {value!r}")
         items = tuple(_scalar(self.scalar, item) for item in value)

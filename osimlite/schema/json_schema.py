@@ -131,7 +131,8 @@ def _value(kind: Value) -> dict[str, Any]:
     if kind.shape == "optional":
         return {"anyOf": [scalar, {"type": "null"}]}
     bounds = {"minItems": kind.size or kind.least, "maxItems": kind.size or kind.most}
-    return {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
+    found = {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
+    return {"anyOf": [found, {"type": "null"}]} if kind.optional else found
 
 
 def _text(spec: FieldSpec) -> str:

@@ -37,7 +37,7 @@ _AREAS = {
     ),
     "controllers": "Controller ControllerSet",
     "coordinate_stops": "CoordinateLinearStopForce ExponentialCoordinateLimitForce",
-    "coordinates": "Coordinate",
+    "coordinates": "Coordinate CoordinateSet",
     "custom_joint": "CustomJoint SpatialTransform TransformAxis",
     "examples": "HopperDevice ToyPropMyoController ToyReflexController",
     "forces": (
@@ -66,6 +66,31 @@ _AREAS = {
         "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter "
         "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet"
     ),
+    "moco.goals": (
+        "MocoAverageSpeedGoal MocoControlGoal MocoExpressionBasedParameterGoal MocoFinalOutputGoal MocoFinalTimeGoal "
+        "MocoGoal MocoInitialActivationGoal MocoInitialForceEquilibriumDGFGoal MocoInitialOutputGoal "
+        "MocoInitialVelocityEquilibriumDGFGoal MocoJointReactionGoal MocoMarkerFinalGoal MocoOutputBase "
+        "MocoOutputGoal MocoPeriodicityGoal MocoPeriodicityGoalPair MocoStepLengthAsymmetryGoal "
+        "MocoStepTimeAsymmetryGoal MocoStepTimeAsymmetryGoalGroup MocoSumSquaredStateGoal"
+    ),
+    "moco.parts": (
+        "MocoBounds MocoConstraintInfo MocoFinalBounds MocoInitialBounds MocoParameter MocoScaleFactor "
+        "MocoVariableInfo MocoWeight MocoWeightSet"
+    ),
+    "moco.path_constraints": (
+        "MocoControlBoundConstraint MocoFrameDistanceConstraint MocoFrameDistanceConstraintPair "
+        "MocoOutputBoundConstraint MocoPathConstraint MocoStateBoundConstraint"
+    ),
+    "moco.studies": (
+        "MocoCasADiSolver MocoDirectCollocationSolver MocoInverse MocoPhase MocoProblem MocoSolver MocoStudy MocoTool "
+        "MocoTrack"
+    ),
+    "moco.tracking": (
+        "MocoAccelerationTrackingGoal MocoAngularVelocityTrackingGoal MocoContactImpulseTrackingGoal "
+        "MocoContactImpulseTrackingGoalGroup MocoContactTrackingGoal MocoContactTrackingGoalGroup "
+        "MocoControlTrackingGoal MocoControlTrackingGoalReference MocoGeneralizedForceTrackingGoal "
+        "MocoMarkerTrackingGoal MocoOrientationTrackingGoal MocoStateTrackingGoal MocoTranslationTrackingGoal"
+    ),
     "model": "Model",
     "motions": "AccelerationMotion DiscreteForces PositionMotion",
     "muscle_curves": (
@@ -90,6 +115,14 @@ _AREAS = {
     "prescribed": "ExternalForce ExternalLoads PrescribedForce",
     "probe_types": "ActuatorForceProbe ActuatorPowerProbe JointInternalPowerProbe SystemEnergyProbe",
     "probes": "Probe ProbeSet",
+    "processors": (
+        "FunctionBasedPathSet ModOpAddExternalLoads ModOpAddReserves ModOpIgnoreActivationDynamics "
+        "ModOpIgnorePassiveFiberForcesDGF ModOpIgnoreTendonCompliance ModOpRemoveMuscles ModOpReplaceJointsWithWelds "
+        "ModOpReplaceMusclesWithDeGrooteFregly2016 ModOpReplaceMusclesWithPathActuators "
+        "ModOpReplacePathsWithFunctionBasedPaths ModOpScaleActiveFiberForceCurveWidthDGF ModOpScaleMaxIsometricForce "
+        "ModOpTendonComplianceDynamicsModeDGF ModelOperator ModelProcessor TabOpAppendCoupledCoordinateValues "
+        "TabOpLowPassFilter TabOpUseAbsoluteStateNames TableOperator TableProcessor"
+    ),
     "reporters": (
         "AbstractReporter ConsoleReporter__Vec3_ ConsoleReporter__double_ NumberReporter SignalGenerator "
         "StatesTrajectoryReporter TableReporter__Vec3_ TableReporter__Vector_ TableReporter__double_ TableSource "
@@ -112,12 +145,15 @@ _AREAS = {
     "tools.dynamics": "AbstractTool AnalyzeTool DynamicsTool ForwardTool InverseDynamicsTool",
     "tools.inverse_kinematics": (
         "IKCoordinateTask IKMarkerTask IKTask IKTaskSet IMUInverseKinematicsTool InverseKinematicsTool "
-        "InverseKinematicsToolBase OrientationWeight OrientationWeightSet Tool"
+        "InverseKinematicsToolBase MarkerWeight MarkerWeightSet MarkersReference OrientationWeight "
+        "OrientationWeightSet Tool"
     ),
+    "tools.path_fitting": "PolynomialPathFitter PolynomialPathFitterBounds",
     "tools.scale": (
         "BodyScale BodyScaleSet GenericModelMaker MarkerPair MarkerPairSet MarkerPlacer Measurement MeasurementSet "
         "ModelScaler Scale ScaleSet ScaleTool"
     ),
+    "tools.sensors": "APDMDataReaderSettings ExperimentalSensor IMUPlacer XsensDataReaderSettings",
     "tools.tracking": (
         "CMCTool CMC_Joint CMC_Point CMC_Task CMC_TaskSet MuscleStateTrackingTask RRATool SMC_Joint StateTrackingTask "
         "TrackingTask"
@@ -130,6 +166,8 @@ _TAGS = {
     "ElasticFoundationForce::ContactParametersSet": "ElasticFoundationContactParametersSet",
     "HuntCrossleyForce::ContactParameters": "HuntCrossleyContactParameters",
     "HuntCrossleyForce::ContactParametersSet": "HuntCrossleyContactParametersSet",
+    "Set_FunctionBasedPath_": "FunctionBasedPathSet",
+    "Set_MarkerWeight_": "MarkerWeightSet",
 }
 """Tags that are not the name of their class."""
 

@@ -151,6 +151,7 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "input": _nothing_to_resolve,
     "file": _nothing_to_resolve,
     "output-file": _nothing_to_resolve,
+    "input-folder": _nothing_to_resolve,
     "output-folder": _nothing_to_resolve,
     "column": _nothing_to_resolve,
     "positional": _nothing_to_resolve,

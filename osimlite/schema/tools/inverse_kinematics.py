@@ -119,3 +119,30 @@ class IMUInverseKinematicsTool(InverseKinematicsToolBase):
     """Measured orientations, a column of quaternions for each sensor (.sto)."""
     orientation_weights: Single[OrientationWeightSet] = made(OrientationWeightSet, name="orientation_weights")
     """How much each sensor counts."""
+
+
+class MarkerWeight(Object):
+    """How much the deviation of one marker counts; the name is that of the marker."""
+
+    weight: Number = 1.0
+    """Beside those of the others."""
+
+
+class MarkerWeightSet(Object, tag="Set_MarkerWeight_"):
+    """Weights of markers."""
+
+    objects: LegacyMany[MarkerWeight] = none()
+    """The weights."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the weights; nothing uses them."""
+
+
+class MarkersReference(Object):
+    """Measured markers and their weights."""
+
+    marker_file: Annotated[str, reads("marker data")] = ""
+    """The measured markers (.trc, .sto)."""
+    marker_weights: Single[MarkerWeightSet] = made(MarkerWeightSet, name="marker_weights")
+    """Weights by names of markers."""
+    default_weight: Number = 1.0
+    """Weight of markers that have none."""

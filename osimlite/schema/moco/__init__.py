@@ -1,0 +1,1 @@
+"""Documents of Moco: optimal control problems, their goals and their solvers."""

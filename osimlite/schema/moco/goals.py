@@ -1,0 +1,241 @@
+"""Goals of Moco: what an optimization makes small, or keeps at given values."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made, none
+from osimlite.schema.fields import (
+    Flag,
+    Integer,
+    Many,
+    Number,
+    Reference,
+    Single,
+    Text,
+    Unnamed,
+    Value,
+    Vec3,
+    real,
+    vec3,
+    word,
+)
+from osimlite.schema.moco.parts import (
+    MocoConstraintInfo,
+    MocoParameter,
+    MocoScaleFactor,
+    MocoWeightSet,
+    Strings,
+)
+from osimlite.schema.references import Named, Names
+
+DIRECTIONS = ("positive-x", "positive-y", "positive-z", "negative-x", "negative-y", "negative-z")
+
+OutputPath = Annotated[str, Reference("input", "Output")]
+SecondOutputPath = Annotated[str, Reference("input", "Output", required=False)]
+Operation = Annotated[str, word("", "addition", "subtraction", "multiplication", "division")]
+Variable = Annotated[str, Reference("state-path", "state or control variable")]
+FramePath = Annotated[Named, Reference("model-path", "Frame")]
+FramePaths = Annotated[Names, Reference("model-path", "Frame", "list", required=False)]
+FootFrame = Annotated[Named, Reference("model-path", "PhysicalFrame")]
+ContactForcePaths = Annotated[Names, Reference("model-path", "SmoothSphereHalfSpaceForce", "list")]
+Direction = Annotated[str, word(*DIRECTIONS)]
+
+
+class MocoGoal(Object, abstract=True):
+    """A number that belongs to a motion."""
+
+    enabled: Flag = True
+    """Whether the goal counts."""
+    weight: Number = 1.0
+    """How much a cost counts beside others."""
+    mode: Annotated[str | None, Value("string", "optional", choices=("cost", "endpoint_constraint"))] = None
+    """Whether it is a cost or a constraint; left out, what is usual for the goal."""
+    moco_constraint_info: Unnamed[MocoConstraintInfo] = made(MocoConstraintInfo)
+    """Bounds of the values if it is a constraint."""
+    scale_factors: Many[MocoScaleFactor] = none()
+    """Factors that the optimization finds for reference data."""
+    divide_by_displacement: Flag = False
+    """Whether the number is divided by the way of the center of mass."""
+    divide_by_duration: Flag = False
+    """Whether the number is divided by the duration."""
+    divide_by_mass: Flag = False
+    """Whether the number is divided by the mass of the model."""
+
+
+class MocoFinalTimeGoal(MocoGoal):
+    """The time at the end."""
+
+
+class MocoAverageSpeedGoal(MocoGoal):
+    """How far the average speed of the center of mass is from a given one."""
+
+    desired_average_speed: Annotated[float, real("m/s")] = 0.0
+    """The speed that is wanted."""
+
+
+class MocoInitialActivationGoal(MocoGoal):
+    """Activations equal to excitations at the start."""
+
+
+class MocoInitialForceEquilibriumDGFGoal(MocoGoal):
+    """Muscles of DeGroote and Fregly in equilibrium of forces at the start."""
+
+
+class MocoInitialVelocityEquilibriumDGFGoal(MocoGoal):
+    """Muscles of DeGroote and Fregly in equilibrium of velocities at the start."""
+
+
+class MocoControlGoal(MocoGoal):
+    """Controls, each to a power, over the motion."""
+
+    control_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="control_weights")
+    """Weights by paths of controls."""
+    control_weights_pattern: Single[MocoWeightSet] = made(MocoWeightSet, name="control_weights_pattern")
+    """Weights by patterns of paths, for controls that have none by path."""
+    exponent: Integer = 2
+    """The power, at least two."""
+    ignore_controlled_actuators: Flag = False
+    """Whether controls that controllers of the model set are left out."""
+    ignore_input_controls: Flag = False
+    """Whether controls that are inputs of controllers are left out."""
+
+
+class MocoSumSquaredStateGoal(MocoGoal):
+    """Squares of states over the motion."""
+
+    state_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="state_weights")
+    """Weights by paths of states."""
+    pattern: Annotated[str | None, Value("string", "optional")] = None
+    """A regular expression; only states whose paths match it count."""
+
+
+class MocoExpressionBasedParameterGoal(MocoGoal):
+    """An expression of parameters."""
+
+    expression: Text = ""
+    """The expression, in names of `variables`."""
+    parameters: Many[MocoParameter] = none()
+    """Parameters that stand in the expression."""
+    variables: Strings = ()
+    """The name of each parameter in the expression."""
+
+
+class MocoPeriodicityGoalPair(Object):
+    """Two variables, the first at the start and the second at the end, that are to be equal."""
+
+    initial_variable: Variable = ""
+    """Path of the state or control at the start."""
+    final_variable: Variable = ""
+    """Path of the state or control at the end; left out, the same."""
+    negate: Flag = False
+    """Whether the one is to be the negative of the other."""
+
+
+class MocoPeriodicityGoal(MocoGoal):
+    """A motion that ends as it began."""
+
+    state_pairs: Many[MocoPeriodicityGoalPair] = none()
+    """Pairs of states."""
+    control_pairs: Many[MocoPeriodicityGoalPair] = none()
+    """Pairs of controls."""
+
+
+class MocoMarkerFinalGoal(MocoGoal):
+    """How far a point is from a given place at the end."""
+
+    point_name: Annotated[Named, Reference("model-path", "Point")] = ""
+    """Path of the point."""
+    reference_location: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
+    """Where the point is wanted, in ground."""
+
+
+class MocoJointReactionGoal(MocoGoal):
+    """The load that a joint carries."""
+
+    joint_path: Annotated[Named, Reference("model-path", "Joint")] = ""
+    """Path of the joint."""
+    loads_frame: Annotated[str, word("parent", "child")] = "parent"
+    """Which of its two frames the load acts on."""
+    expressed_in_frame_path: Annotated[Named, Reference("model-path", "Frame", required=False)] = ""
+    """The frame along whose axes the load counts; left out, that of `loads_frame`."""
+    reaction_measures: Strings = ()
+    """Components that count, such as force-x or moment-z; left out, all six."""
+    reaction_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="reaction_weights")
+    """Weights by components."""
+
+
+class MocoOutputBase(MocoGoal, abstract=True):
+    """A goal made of outputs of components."""
+
+    output_path: OutputPath = ""
+    """The output, as `path|output`."""
+    second_output_path: SecondOutputPath = ""
+    """Another output, which `operation` joins to the first."""
+    operation: Operation = ""
+    """How the two are joined."""
+    exponent: Integer = 1
+    """The power that the result is raised to."""
+    output_index: Integer = -1
+    """Which component of an output of several numbers counts; -1 for its length."""
+
+
+class MocoOutputGoal(MocoOutputBase):
+    """An output over the motion."""
+
+
+class MocoInitialOutputGoal(MocoOutputBase):
+    """An output at the start."""
+
+
+class MocoFinalOutputGoal(MocoOutputBase):
+    """An output at the end."""
+
+
+class MocoStepTimeAsymmetryGoalGroup(Object):
+    """The contacts of a foot; OpenSim writes it and does not read it again."""
+
+    contact_force_paths: Strings = ()
+    """Paths of the contact forces that tell when the foot is on the ground."""
+    foot_position_contact_force_path: Text = ""
+    """Path of the contact force whose sphere says where the foot is."""
+
+
+class MocoStepTimeAsymmetryGoal(MocoGoal):
+    """How far the asymmetry of step times is from a given one."""
+
+    left_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = made(
+        MocoStepTimeAsymmetryGoalGroup, name="left_contact_group"
+    )
+    """Contacts of the left foot."""
+    right_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = made(
+        MocoStepTimeAsymmetryGoalGroup, name="right_contact_group"
+    )
+    """Contacts of the right foot."""
+    target_asymmetry: Number = 0.0
+    """Difference of step times over their sum, right less left."""
+    contact_force_threshold: Annotated[float, real("N")] = 25.0
+    """Force above which a foot is on the ground."""
+    contact_force_direction: Direction = "positive-y"
+    """Direction of that force, in ground."""
+    walking_direction: Direction = "positive-x"
+    """Where the walk goes, in ground."""
+    contact_detection_smoothing: Number = 0.25
+    """How sharply contact is told from none; greater is sharper."""
+    asymmetry_smoothing: Number = 10.0
+    """How sharply the foot in front is told; greater is sharper."""
+
+
+class MocoStepLengthAsymmetryGoal(MocoGoal):
+    """How far the asymmetry of step lengths is from a given one."""
+
+    left_foot_frame: FootFrame = ""
+    """Path of the frame of the left foot."""
+    right_foot_frame: FootFrame = ""
+    """Path of the frame of the right foot."""
+    walking_direction: Direction = "positive-x"
+    """Where the walk goes, in ground."""
+    asymmetry_smoothing: Number = 5.0
+    """How sharply the foot in front is told; greater is sharper."""
+    target_asymmetry: Number = 0.0
+    """Difference of step lengths over their sum, right less left."""
+    stride_length: Annotated[float, real("m")] = -1.0
+    """Length of a stride; negative, that of the motion is taken."""

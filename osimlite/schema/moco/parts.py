@@ -1,0 +1,86 @@
+"""What goals, constraints and problems of Moco are made of: bounds, weights, parameters."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Component, Object, made, none
+from osimlite.schema.fields import LegacyMany, Many, Number, Reals, Reference, Text, Unnamed, Value, reals
+from osimlite.schema.references import Names
+from osimlite.schema.sets import ObjectGroup
+
+Bounds = Annotated[Reals, reals(most=2)]
+Strings = Annotated[tuple[str, ...], Value("string", "list")]
+
+
+class MocoBounds(Object):
+    """Least and greatest value of a variable."""
+
+    bounds: Bounds = ()
+    """Both ends of the range, one number where the variable is fixed, none where it is free."""
+
+
+class MocoInitialBounds(MocoBounds):
+    """Bounds of a variable at the start."""
+
+
+class MocoFinalBounds(MocoBounds):
+    """Bounds of a variable at the end."""
+
+
+class MocoWeight(Object):
+    """How much something counts; the name is that of a state, a control, a marker, a frame or what else is weighted."""
+
+    weight: Number = 1.0
+    """Beside those of the others."""
+
+
+class MocoWeightSet(Object):
+    """Weights by name."""
+
+    objects: LegacyMany[MocoWeight] = none()
+    """The weights; what has none counts one."""
+    groups: LegacyMany[ObjectGroup] = none()
+    """Named selections of the weights; Moco ignores them."""
+
+
+class MocoConstraintInfo(Object):
+    """Bounds of the equations of a constraint; OpenSim writes it and does not read it again."""
+
+    bounds: Many[MocoBounds] = none()
+    """For each equation its bounds; left out, they are zero."""
+    suffixes: Strings = ()
+    """What tells the equations apart in names."""
+
+
+class MocoScaleFactor(Component):
+    """A factor that an optimization finds for a goal."""
+
+    bounds: Bounds = ()
+    """The range that the factor is looked for in."""
+    scale_factor: Number = 1.0
+    """The factor itself, which the optimization sets."""
+
+
+class MocoVariableInfo(Object):
+    """Bounds of a state or a control; the name is its path."""
+
+    name_reference = Reference("state-path", "state or control variable", required=False)
+
+    bounds: Bounds = ()
+    """The range over the whole phase."""
+    initial_bounds: Bounds = ()
+    """The range at the start."""
+    final_bounds: Bounds = ()
+    """The range at the end."""
+
+
+class MocoParameter(Object):
+    """A property of the model that an optimization finds."""
+
+    moco_bounds: Unnamed[MocoBounds] = made(MocoBounds)
+    """The range that the value is looked for in."""
+    component_paths: Annotated[Names, Reference("model-path", "Component", "list")] = ()
+    """Paths of the components that all get the value."""
+    property_name: Text = ""
+    """The property of those components."""
+    property_element: Annotated[int | None, Value("int", "optional")] = None
+    """Which number of the property, from 0; left out for a property of one number."""

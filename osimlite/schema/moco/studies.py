@@ -1,0 +1,263 @@
+"""Studies of Moco: an optimal control problem and its solver; and the tools that make studies."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made, none
+from osimlite.schema.fields import (
+    Flag,
+    Integer,
+    Many,
+    MaybeFlag,
+    Number,
+    Reals,
+    Reference,
+    Single,
+    Value,
+    maybe,
+    real,
+    reals,
+    word,
+)
+from osimlite.schema.moco.goals import MocoGoal
+from osimlite.schema.moco.parts import (
+    MocoBounds,
+    MocoFinalBounds,
+    MocoInitialBounds,
+    MocoParameter,
+    MocoVariableInfo,
+    MocoWeightSet,
+)
+from osimlite.schema.moco.path_constraints import MocoPathConstraint
+from osimlite.schema.model import Model
+from osimlite.schema.processors import ModelProcessor, TableProcessor
+from osimlite.schema.references import InputTable, OutputFolder
+
+
+class MocoPhase(Object):
+    """A stretch of time in which one model moves under one set of goals."""
+
+    model: Single[ModelProcessor] = made(
+        ModelProcessor, name="model", model=lambda: Model.build({"name": "model"}, set())
+    )
+    """The model."""
+    time_initial_bounds: Single[MocoInitialBounds] = made(MocoInitialBounds, name="time_initial_bounds")
+    """When the phase begins."""
+    time_final_bounds: Single[MocoFinalBounds] = made(MocoFinalBounds, name="time_final_bounds")
+    """When the phase ends."""
+    default_speed_bounds: Single[MocoBounds] = made(MocoBounds, name="default_speed_bounds", bounds=(-50.0, 50.0))
+    """Bounds of speeds that have none of their own."""
+    bound_activation_from_excitation: Flag = True
+    """Whether activations without bounds have those of their excitations."""
+    state_infos: Many[MocoVariableInfo] = none()
+    """Bounds of states by path."""
+    state_infos_pattern: Many[MocoVariableInfo] = none()
+    """Bounds of states by patterns of paths."""
+    control_infos: Many[MocoVariableInfo] = none()
+    """Bounds of controls by path."""
+    control_infos_pattern: Many[MocoVariableInfo] = none()
+    """Bounds of controls by patterns of paths."""
+    input_control_infos: Many[MocoVariableInfo] = none()
+    """Bounds of inputs of controllers by path."""
+    input_control_infos_pattern: Many[MocoVariableInfo] = none()
+    """Bounds of inputs of controllers by patterns of paths."""
+    parameters: Many[MocoParameter] = none()
+    """Properties of the model that are looked for."""
+    goals: Many[MocoGoal] = none()
+    """Costs and constraints at the ends."""
+    path_constraints: Many[MocoPathConstraint] = none()
+    """What must hold at every moment."""
+    kinematic_constraint_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="kinematic_constraint_bounds", bounds=(0.0,)
+    )
+    """Bounds of the errors of the model's constraints."""
+    multiplier_bounds: Single[MocoBounds] = made(MocoBounds, name="multiplier_bounds", bounds=(-1000.0, 1000.0))
+    """Bounds of the multipliers of the model's constraints."""
+
+
+class MocoProblem(Object):
+    """An optimal control problem."""
+
+    phases: Single[MocoPhase] = made(MocoPhase, name="phases")
+    """Its phases; there is one so far."""
+
+
+class MocoSolver(Object, abstract=True):
+    """What solves a problem."""
+
+
+class MocoDirectCollocationSolver(MocoSolver, abstract=True):
+    """Makes a problem of many variables of a motion, by values at the nodes of a mesh."""
+
+    num_mesh_intervals: Integer = 100
+    """Number of equal intervals of the mesh."""
+    mesh: Annotated[Reals, reals()] = ()
+    """Nodes of a mesh of unequal intervals, from 0 to 1."""
+    verbosity: Annotated[int, Value("int", choices=(0, 1, 2))] = 2
+    """How much the solver prints."""
+    transcription_scheme: Annotated[
+        str,
+        word(
+            "trapezoidal",
+            "hermite-simpson",
+            *(f"legendre-gauss-{degree}" for degree in range(1, 10)),
+            *(f"legendre-gauss-radau-{degree}" for degree in range(1, 10)),
+        ),
+    ] = "hermite-simpson"
+    """How the equations of motion are met between nodes."""
+    interpolate_control_mesh_interior_points: Flag = True
+    """Whether controls within intervals lie on lines between nodes."""
+    enforce_constraint_derivatives: MaybeFlag = True
+    """Whether the derivatives of the model's constraints are met too."""
+    multibody_dynamics_mode: Annotated[str, word("explicit", "implicit")] = "explicit"
+    """Whether accelerations are computed, or are variables."""
+    optim_solver: Annotated[str, word("ipopt", "snopt")] = "ipopt"
+    """The optimizer."""
+    optim_max_iterations: Integer = -1
+    """How many iterations the optimizer may take; -1 for its own number."""
+    optim_convergence_tolerance: Number = -1.0
+    """How far the optimizer goes; -1 for its own number."""
+    optim_constraint_tolerance: Number = -1.0
+    """How well constraints are met; -1 for the optimizer's own number."""
+    optim_hessian_approximation: Annotated[str, word("limited-memory", "exact")] = "limited-memory"
+    """Where the optimizer has second derivatives from."""
+    optim_ipopt_print_level: Integer = -1
+    """How much Ipopt prints, from 0 to 12; -1 for its own number."""
+    guess_file: InputTable = ""
+    """A motion to start from."""
+    velocity_correction_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="velocity_correction_bounds", bounds=(-0.1, 0.1)
+    )
+    """Bounds of the corrections that constraints make to velocities."""
+    implicit_multibody_acceleration_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="implicit_multibody_acceleration_bounds", bounds=(-1000.0, 1000.0)
+    )
+    """Bounds of accelerations that are variables."""
+    implicit_auxiliary_derivative_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="implicit_auxiliary_derivative_bounds", bounds=(-1000.0, 1000.0)
+    )
+    """Bounds of derivatives of auxiliary states that are variables."""
+    minimize_lagrange_multipliers: Flag = False
+    """Whether multipliers of constraints are a cost."""
+    lagrange_multiplier_weight: Number = 1.0
+    """How much that cost counts."""
+    kinematic_constraint_method: Annotated[str, word("Posa2016", "Bordalba2023")] = "Posa2016"
+    """How the model's constraints are met, by the authors of the method."""
+
+
+class MocoCasADiSolver(MocoDirectCollocationSolver):
+    """Solves a problem with CasADi."""
+
+    scale_variables_using_bounds: Flag = False
+    """Whether variables are scaled by their bounds."""
+    parameters_require_initsystem: Flag = True
+    """Whether the model is made anew for each value of the parameters."""
+    optim_sparsity_detection: Annotated[str, word("none", "random", "initial-guess")] = "none"
+    """How it is found which derivatives are always zero."""
+    optim_write_sparsity: Annotated[str, Value("string")] = ""
+    """What the names of files of sparsity patterns begin with; left out, there are none."""
+    optim_finite_difference_scheme: Annotated[str, word("central", "forward", "backward")] = "central"
+    """How derivatives are computed."""
+    parallel: Annotated[int | None, Value("int", "optional")] = None
+    """Number of threads: 0 for one, 1 for as many as there are processors."""
+    output_interval: Integer = 0
+    """Every how many iterations the motion is written; 0 for never."""
+    minimize_implicit_multibody_accelerations: Flag = False
+    """Whether accelerations that are variables are a cost."""
+    implicit_multibody_accelerations_weight: Number = 1.0
+    """How much that cost counts."""
+    minimize_implicit_auxiliary_derivatives: Flag = False
+    """Whether derivatives of auxiliary states that are variables are a cost."""
+    implicit_auxiliary_derivatives_weight: Number = 1.0
+    """How much that cost counts."""
+    enforce_path_constraint_mesh_interior_points: Flag = False
+    """Whether path constraints are met within intervals too."""
+    minimize_state_projection_distance: Flag = True
+    """Whether the way that states are moved onto the constraints is a cost."""
+    state_projection_distance_weight: Number = 1e-6
+    """How much that cost counts."""
+    projection_slack_variable_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="projection_slack_variable_bounds", bounds=(-0.001, 0.001)
+    )
+    """Bounds of the variables that move states onto the constraints."""
+
+
+class MocoStudy(Object):
+    """A problem with its solver."""
+
+    write_solution: Flag = False
+    """Whether the solution is written."""
+    results_directory: OutputFolder = "./"
+    """Folder for the solution."""
+    problem: Single[MocoProblem] = made(MocoProblem, name="problem")
+    """What is to be solved."""
+    solver: Single[MocoSolver] = made(MocoCasADiSolver, name="solver")
+    """What solves it."""
+
+
+class MocoTool(Object, abstract=True):
+    """Makes a study for a usual task."""
+
+    initial_time: Annotated[float | None, maybe("s")] = None
+    """Where the motion begins; left out, where the data do."""
+    final_time: Annotated[float | None, maybe("s")] = None
+    """Where the motion ends; left out, where the data do."""
+    mesh_interval: Annotated[float, real("s")] = 0.02
+    """Length of an interval of the mesh."""
+    clip_time_range: Flag = False
+    """Whether the times are moved a little into the data."""
+    model: Single[ModelProcessor] = made(ModelProcessor, name="model")
+    """The model."""
+
+
+class MocoInverse(MocoTool):
+    """Finds controls of muscles for a motion that is given exactly."""
+
+    kinematics: Single[TableProcessor] = made(TableProcessor, name="kinematics")
+    """The motion."""
+    kinematics_allow_extra_columns: Flag = False
+    """Whether the table may have columns that are no states."""
+    minimize_sum_squared_activations: Flag = False
+    """Whether squares of activations are a cost."""
+    max_iterations: Annotated[int | None, Value("int", "optional")] = None
+    """How many iterations the optimizer may take."""
+    convergence_tolerance: Number = 1e-3
+    """How far the optimizer goes."""
+    constraint_tolerance: Number = 1e-3
+    """How well constraints are met."""
+    output_paths: Annotated[tuple[str, ...], Reference("input", "Output", "list", required=False)] = ()
+    """Outputs that are computed for the solution, as patterns of `path|output`."""
+    reserves_weight: Number = 1.0
+    """How much reserve actuators cost."""
+
+
+class MocoTrack(MocoTool):
+    """Finds a motion that follows measured states or markers."""
+
+    states_reference: Single[TableProcessor] = made(TableProcessor, name="states_reference")
+    """States to follow."""
+    states_global_tracking_weight: Number = 1.0
+    """How much deviations of states count."""
+    states_weight_set: Single[MocoWeightSet] = made(MocoWeightSet, name="states_weight_set")
+    """Weights by paths of states."""
+    scale_state_weights_with_range: Flag = False
+    """Whether deviations are divided by the ranges of the coordinates."""
+    track_reference_position_derivatives: Flag = False
+    """Whether speeds are followed that are derivatives of the measured values."""
+    markers_reference: Single[TableProcessor] = made(TableProcessor, name="markers_reference")
+    """Markers to follow."""
+    markers_global_tracking_weight: Number = 1.0
+    """How much deviations of markers count."""
+    markers_weight_set: Single[MocoWeightSet] = made(MocoWeightSet, name="markers_weight_set")
+    """Weights by names of markers."""
+    allow_unused_references: Flag = False
+    """Whether tables may have columns that the model has not."""
+    guess_file: InputTable = ""
+    """A motion to start from."""
+    apply_tracked_states_to_guess: Flag = False
+    """Whether the measured states are part of what is started from."""
+    minimize_control_effort: Flag = True
+    """Whether squares of controls are a cost."""
+    control_effort_weight: Number = 0.001
+    """How much that cost counts."""
+    controls_weight_set: Single[MocoWeightSet] = made(MocoWeightSet, name="controls_weight_set")
+    """Weights by paths of controls."""

@@ -1,0 +1,56 @@
+"""The fit of polynomials to the paths of muscles."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, made, none
+from osimlite.schema.fields import Flag, Integer, Many, Number, Reference, Single, Value, Vec2, real, word
+from osimlite.schema.processors import ModelProcessor, TableProcessor
+from osimlite.schema.references import Named, OutputFolder
+
+Range = Annotated[Vec2, Value("double", "Vec2")]
+
+
+class PolynomialPathFitterBounds(Object):
+    """How far a coordinate is varied."""
+
+    coordinate_path: Annotated[Named, Reference("model-path", "Coordinate")] = ""
+    """Path of the coordinate."""
+    bounds: Range = (-10.0, 10.0)
+    """Least and greatest deviation, in degrees or metres."""
+
+
+class PolynomialPathFitter(Object):
+    """Finds polynomials of the coordinates for lengths and moment arms of paths."""
+
+    model: Single[ModelProcessor] = made(ModelProcessor, name="model")
+    """The model."""
+    coordinate_values: Single[TableProcessor] = made(TableProcessor, name="coordinate_values")
+    """The motion around which coordinates are varied."""
+    output_directory: OutputFolder = ""
+    """Folder for the polynomials and what they were fitted to."""
+    use_stepwise_regression: Flag = False
+    """Whether only terms that improve the fit are taken."""
+    moment_arm_threshold: Number = 0.001
+    """Moment arm below which a coordinate does not count for a path, in metres."""
+    moment_arm_tolerance: Annotated[float, real("m")] = 1e-4
+    """How well moment arms must be met."""
+    path_length_tolerance: Annotated[float, real("m")] = 1e-4
+    """How well lengths must be met."""
+    minimum_polynomial_order: Integer = 2
+    """Least order that is tried."""
+    maximum_polynomial_order: Integer = 6
+    """Greatest order that is tried."""
+    num_parallel_threads: Integer = 2
+    """Number of threads."""
+    global_coordinate_sampling_bounds: Annotated[Vec2, Value("double", "Vec2", unit="deg")] = (-10.0, 10.0)
+    """Least and greatest deviation of coordinates that have none of their own."""
+    coordinate_sampling_bounds: Many[PolynomialPathFitterBounds] = none()
+    """Deviations of single coordinates."""
+    num_samples_per_frame: Integer = 25
+    """How many variations there are of each row of the motion."""
+    latin_hypercube_algorithm: Annotated[str, word("random", "ESEA")] = "random"
+    """How variations are spread."""
+    include_moment_arm_functions: Flag = False
+    """Whether polynomials of moment arms are written too."""
+    include_lengthening_speed_function: Flag = False
+    """Whether polynomials of lengthening speeds are written too."""

@@ -1,0 +1,53 @@
+"""Inertial sensors: how they are put onto a model, and how their files are read."""
+
+from typing import Annotated
+
+from osimlite.schema.base import Object, none
+from osimlite.schema.fields import Many, Reference, Text, Vec3, real, vec3, word
+from osimlite.schema.references import InputModel, InputTable, writes
+
+
+class IMUPlacer(Object):
+    """Turns the sensors of a model as they were worn, from one moment in a known pose."""
+
+    model_file: InputModel = ""
+    """The model, in the pose in which the subject stood."""
+    base_imu_label: Annotated[str, Reference("column", "column", required=False)] = ""
+    """Label of the sensor that tells where the subject faces; left out, the data are not turned."""
+    base_heading_axis: Annotated[str, word("", "x", "y", "z", "-x", "-y", "-z")] = ""
+    """Axis of that sensor that points forwards."""
+    sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
+    """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
+    orientation_file_for_calibration: InputTable = ""
+    """Measured orientations, of which the first row counts (.sto)."""
+    output_model_file: Annotated[str, writes("Model")] = ""
+    """File for the model with its sensors."""
+
+
+class ExperimentalSensor(Object):
+    """A sensor of the data; the name is its name there."""
+
+    name_in_model: Annotated[str, Reference("column", "column")] = ""
+    """Label of its column, which is the name of a frame of the model with the ending _imu."""
+
+
+class APDMDataReaderSettings(Object):
+    """How files of APDM sensors are read."""
+
+    ExperimentalSensors: Many[ExperimentalSensor] = none()
+    """The sensors."""
+
+
+class XsensDataReaderSettings(Object):
+    """How files of Xsens sensors are read."""
+
+    data_folder: Annotated[str, Reference("input-folder", "folder", required=False)] = ""
+    """Folder of the files."""
+    trial_prefix: Text = ""
+    """What the names of the files begin with."""
+    trial_extension: Text = ".txt"
+    """What the names of the files end with."""
+    sampling_rate: Annotated[float, real("Hz")] = 40.0
+    """How often the sensors measured, if the files do not say."""
+    ExperimentalSensors: Many[ExperimentalSensor] = none()
+    """The sensors."""
