@@ -48,6 +48,17 @@ def station(state: Kinematics, place: StationPlacement) -> MovingVector:
     )
 
 
+def meeting(state: Kinematics, first: StationPlacement, second: StationPlacement) -> MovingVector:
+    """From one station to another, and how fast the second leaves the point of the first body that is there.
+
+    This is what Simbody holds still: as the first body sees it, the rate of the vector.
+    """
+    end = station(state, second)
+    body = first.body
+    start = station(state, StationPlacement(body, state.rotations[body].T @ (end.value - state.origins[body])))
+    return end.minus(start)._replace(value=end.value - station(state, first).value)
+
+
 def direction(state: Kinematics, body: int, axis: Array) -> MovingVector:
     """A vector fixed in a body."""
     value = state.rotations[body] @ axis
@@ -87,7 +98,7 @@ class PointConstraint(Holonomic):
 
     def bond(self, state: Kinematics) -> Bond:
         """The vector between the stations vanishes."""
-        return station(state, self.second).minus(station(state, self.first)).bond()
+        return meeting(state, self.first, self.second).bond()
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,9 +181,7 @@ class WeldConstraint(Holonomic):
     def bond(self, state: Kinematics) -> Bond:
         """The origins coincide, and each axis of one frame is square to the next axis of the other."""
         (one, inner), (two, outer) = self.first, self.second
-        arm = station(state, StationPlacement(two, outer[:3, 3])).minus(
-            station(state, StationPlacement(one, inner[:3, 3]))
-        )
+        arm = meeting(state, StationPlacement(one, inner[:3, 3]), StationPlacement(two, outer[:3, 3]))
         turns = [
             product(direction(state, two, outer[:3, axis]), direction(state, one, inner[:3, (axis + 1) % 3]))
             for axis in range(3)

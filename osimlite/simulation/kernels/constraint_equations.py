@@ -46,8 +46,9 @@ from osimlite.simulation.kernels.points import (
 )
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
-AXIS, ARM = 0, 1
-"""Kinds of vectors."""
+AXIS, ARM, MEETING = 0, 1, 2
+"""Kinds of vectors; that of a meeting is an arm whose rate is how fast its end leaves the point of its first link that
+is there."""
 PRODUCT, DISTANCE, SLIP = 0, 1, 2
 """Kinds of equations between bodies: the product of two vectors has a certain value; the second has a certain length;
 the end of the second is a roller whose point at its start moves along with that, as far as the first tells."""
@@ -182,9 +183,12 @@ def follow(s: Ints, x: Floats, w: Floats, vector: Ints, p: Floats, found: Floats
         return
     ax, ay, az = station(s, w, one, p[0], p[1], p[2])
     bx, by, bz = station(s, w, two, p[3], p[4], p[5])
+    found[0], found[1], found[2] = bx - ax, by - ay, bz - az
+    if vector[0] == MEETING:
+        ax, ay, az = bx, by, bz
     ux, uy, uz = velocity(s, w, one, ax, ay, az)
     vx, vy, vz = velocity(s, w, two, bx, by, bz)
-    found[0], found[1], found[2], found[3], found[4], found[5] = bx - ax, by - ay, bz - az, vx - ux, vy - uy, vz - uz
+    found[3], found[4], found[5] = vx - ux, vy - uy, vz - uz
     ux, uy, uz = acceleration(s, x, w, one, ax, ay, az)
     vx, vy, vz = acceleration(s, x, w, two, bx, by, bz)
     found[6], found[7], found[8] = vx - ux, vy - uy, vz - uz
@@ -199,6 +203,8 @@ def lean(s: Ints, w: Floats, vector: Ints, p: Floats, dx: float, dy: float, dz: 
         return
     ax, ay, az = station(s, w, one, p[0], p[1], p[2])
     bx, by, bz = station(s, w, two, p[3], p[4], p[5])
+    if vector[0] == MEETING:
+        ax, ay, az = bx, by, bz
     add_force(s, w, one, ax, ay, az, -dx, -dy, -dz, row)
     add_force(s, w, two, bx, by, bz, dx, dy, dz, row)
 

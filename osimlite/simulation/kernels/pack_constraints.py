@@ -16,7 +16,7 @@ from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels import layout as at
-from osimlite.simulation.kernels.constraint_equations import ARM, AXIS, DISTANCE, PRODUCT, SLIP
+from osimlite.simulation.kernels.constraint_equations import ARM, AXIS, DISTANCE, MEETING, PRODUCT, SLIP
 from osimlite.simulation.kernels.functions import function_table, table_of_one
 from osimlite.simulation.kernels.least_squares import factor_room
 
@@ -79,7 +79,7 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
             arm = _arm(places, constraint.first, constraint.second)
             return _between([_Equation(DISTANCE, arm, arm, constraint.distance)])
         case b.PointConstraint():
-            return _between(_vanishing(_arm(places, constraint.first, constraint.second)))
+            return _between(_meeting(places, constraint.first, constraint.second))
         case b.PointOnLineConstraint():
             arm = _arm(places, constraint.line, constraint.follower)
             axes = (_axis(places, constraint.line.body, axis) for axis in constraint.across())
@@ -147,8 +147,10 @@ def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _
     return _Vector([ARM, one, two], [*start, *end])
 
 
-def _vanishing(arm: _Vector) -> list[_Equation]:
+def _meeting(places: Places, first: StationPlacement, second: StationPlacement) -> list[_Equation]:
     """No component of an arm along ground's axes is left."""
+    arm = _arm(places, first, second)
+    arm.ints[0] = MEETING
     axes = (_Vector([AXIS, GROUND, GROUND], [*axis, 0.0, 0.0, 0.0]) for axis in np.eye(3).tolist())
     return [_Equation(PRODUCT, axis, arm) for axis in axes]
 
@@ -159,7 +161,7 @@ def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
         _Equation(PRODUCT, _axis(places, two, outer[:3, axis]), _axis(places, one, inner[:3, (axis + 1) % 3]))
         for axis in range(3)
     ]
-    return [*turns, *_vanishing(_arm(places, _origin(constraint.first), _origin(constraint.second)))]
+    return [*turns, *_meeting(places, _origin(constraint.first), _origin(constraint.second))]
 
 
 def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
