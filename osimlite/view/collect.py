@@ -82,8 +82,7 @@ class _Collector:
             with self._remarked(path):
                 self._component(component, path)
         bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
-        for body, start, end in sticks(self.mechanism, bare):
-            ends = LinePoint(body, start), LinePoint(body, end)
+        for body, ends in sticks(self.mechanism, bare):
             self.lines.append(Line(self.mechanism.bodies[body].path, "geometry", ends, STICK, 0.008))
         hints = self.model.model_visual_preferences.model_display_hints
         wanted: dict[Layer, bool] = {

@@ -246,20 +246,18 @@ def _box_corners(low: Array, high: Array) -> Array:
     return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
-def sticks(mechanism: Mechanism, bodies: Iterable[int]) -> Iterator[tuple[int, Array, Array]]:
-    """Lines for bodies without shape, each as body and two points (3,) in its frame.
+def sticks(mechanism: Mechanism, bodies: Iterable[int]) -> Iterator[tuple[int, tuple[LinePoint, LinePoint]]]:
+    """Lines for bodies without shape, each as body and ends.
 
     They run from the body's own joint to the joints of what it carries, or to its mass centre if it carries nothing.
     """
     everyone = mechanism.bodies
-    for index in bodies:
+
+    def joint(index: int) -> LinePoint:
         own = everyone[index].mobilizer
-        start = (own.parent_frame if own.reversed else own.child_frame)[:3, 3]
-        ends = [
-            (joint.child_frame if joint.reversed else joint.parent_frame)[:3, 3]
-            for other in everyone
-            for joint in (other.mobilizer,)
-            if other.parent == index
-        ]
-        for end in ends or [everyone[index].mass_properties.center]:
-            yield index, start, end
+        return LinePoint(index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3])
+
+    for index in bodies:
+        ends = [joint(place) for place, other in enumerate(everyone) if other.parent == index]
+        for end in ends or [LinePoint(index, everyone[index].mass_properties.center)]:
+            yield index, (joint(index), end)

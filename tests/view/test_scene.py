@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from osimlite import Body, Coordinate, Model, SliderJoint
 from osimlite.errors import OsimliteError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
@@ -168,3 +169,16 @@ def test_sticks_join_the_joints():
     # The last body of a limb ends at its mass centre.
     assert np.linalg.norm(shank[1] - shank[0]) == pytest.approx(0.2175)
     assert shank[0] == pytest.approx(thigh[1])
+
+
+def test_sticks_go_where_a_joint_moves_what_it_carries():
+    model = Model(name="knee")
+    carrier = model.ground
+    for name in ("femur", "tibia"):
+        body = model.add(Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        model.add(SliderJoint(name=f"{name}_slides", coordinates=[Coordinate(name=name)]).between(carrier, body))
+        carrier = body
+    scene, mechanism = scene_of(model)
+    q = mechanism.values({"femur": 0.5, "tibia": -0.4})
+    (femur,) = (line for line in scene.lines if line.path == "/bodyset/femur")
+    assert femur.corners(q, scene.at(q)) == pytest.approx(np.array([(0.5, 0.0, 0.0), (0.1, 0.0, 0.0)]))
