@@ -38,6 +38,10 @@ class DoubtfulWarning(UserWarning):
     """Something can be done as it is asked for, but was hardly meant so."""
 
 
+class UnitWarning(DoubtfulWarning):
+    """A number without a unit was hardly meant in rad."""
+
+
 class DocumentError(OsimliteError):
     """The text cannot be read as an OpenSim document."""
 

@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.errors import DoubtfulWarning
+from osimlite.errors import DoubtfulWarning, UnitWarning
 
 _FORM = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|cm|mm|m)?(?:/s)?")
 _SIZES = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -54,14 +54,18 @@ def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
     )
 
 
-def tell(odd: str) -> None:
-    """Warn of what :func:`doubt` says, where the program of the user called; an empty text is nothing to tell of."""
-    if not odd:
-        return
+def tell_doubt(odd: str) -> None:
+    """Warn of what :func:`doubt` says; an empty text is nothing to tell of."""
+    if odd:
+        tell(odd, UnitWarning)
+
+
+def tell(odd: str, category: type[DoubtfulWarning] = DoubtfulWarning) -> None:
+    """Warn where the program of the user called."""
     level, frame, ours = 1, sys._getframe(), str(Path(__file__).parent)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(ours):
         level, frame = level + 1, frame.f_back
-    warnings.warn(odd, DoubtfulWarning, stacklevel=level)
+    warnings.warn(odd, category, stacklevel=level)
 
 
 def quantity(text: str) -> Quantity | None:

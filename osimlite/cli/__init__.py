@@ -132,7 +132,7 @@ def _run(words: list[str]) -> None:
     import warnings
 
     from osimlite.cli._console import complain
-    from osimlite.errors import DoubtfulWarning, OsimliteError
+    from osimlite.errors import DoubtfulWarning, OsimliteError, UnitWarning
 
     # What is imported makes many objects and drops none: the collector would look through them again and again.
     gc.set_threshold(100_000)
@@ -160,8 +160,13 @@ def _run(words: list[str]) -> None:
 
             tell_of_compiling()
         with warnings.catch_warnings():
-            # Commands say themselves what is odd about what was typed.
-            warnings.simplefilter("ignore", DoubtfulWarning)
+            shown = warnings.showwarning
+            warnings.showwarning = lambda message, category, *place: (
+                complain(message) if issubclass(category, DoubtfulWarning) else shown(message, category, *place)
+            )
+            warnings.simplefilter("once", DoubtfulWarning)
+            # Options refuse such a number, or were given its unit.
+            warnings.simplefilter("ignore", UnitWarning)
             raise SystemExit(app(names)(args=words, prog_name="osimlite", standalone_mode=False))
     except OsimliteError as error:
         complain(f"{error}{_built_in(error)}")

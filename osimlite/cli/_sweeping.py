@@ -69,7 +69,7 @@ def make_plan(
     """
     import warnings
 
-    from osimlite.errors import DoubtfulWarning, SettingError
+    from osimlite.errors import SettingError, UnitWarning
     from osimlite.sweep.variables import parse
 
     ranges = parse(vary or [])
@@ -77,10 +77,10 @@ def make_plan(
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
     levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
     with warnings.catch_warnings():
-        warnings.simplefilter("error", DoubtfulWarning)
+        warnings.simplefilter("error", UnitWarning)
         try:
             return _plan(source, ranges, parameter, **levels, **choices)
-        except DoubtfulWarning as odd:
+        except UnitWarning as odd:
             raise SettingError(f"{odd} (if not, write rad after the number)") from None
 
 

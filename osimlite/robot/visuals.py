@@ -165,12 +165,11 @@ def mesh_shape(
         note: is told what became of the file.
         scale: factors, of which negative ones mirror the surface.
     """
-    what = f"a mesh in the file {name}"
     signs = (copysign(1.0, scale[0]), copysign(1.0, scale[1]), copysign(1.0, scale[2]))
     try:
         copy = mesh_files.copy(name, signs)
     except MeshProblem as problem:
-        note("mesh", path, what, str(problem))
+        note("mesh", path, "a mesh whose file cannot be taken", str(problem), name)
         return None
     if copy.converted:
         form = "VTK's format" if copy.source.suffix.lower() == ".vtp" else "a form that not every program reads"

@@ -99,8 +99,8 @@ class RecordedMotion:
         for column, label in enumerate(table.columns):
             place = names.get(label.removesuffix("/value"), -1)
             if place < 0:
-                # Speeds in a file of states follow from the values.
-                if label.removesuffix("/speed") not in names:
+                # Speeds in a file of states follow from the values, and states of forces are no part of a pose.
+                if label.removesuffix("/speed") not in names and not label.startswith("/forceset/"):
                     ignored.append(label)
             elif place not in found:
                 found.add(place)

@@ -17,7 +17,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import require_numbers
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import tell
+from osimlite.quantity import tell_doubt
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import constraints_on, kept_state
 from osimlite.simulation.elements import force_elements
@@ -149,7 +149,8 @@ class Simulation:
             initial = self.state_in(initial)
         for name, value in (initial or {}).items():
             if name not in self.paths:
-                tell(suspect_value(self.mechanism.coordinates[self.mechanism.coordinate_index(name)], name, value))
+                info = self.mechanism.coordinates[self.mechanism.coordinate_index(name)]
+                tell_doubt(suspect_value(info, name, value))
         initial, initial_speeds = (
             {
                 name: float(value) if name in self.paths else in_units_of(self.mechanism, name, value)

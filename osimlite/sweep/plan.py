@@ -15,7 +15,7 @@ from osimlite.document.reader import read_text
 from osimlite.errors import SettingError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import tell
+from osimlite.quantity import tell_doubt
 from osimlite.schema.model import Model
 from osimlite.simulation.engines import engine_name
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
@@ -175,7 +175,7 @@ def plan(
     mechanism = build_mechanism(model)
     found = variables(vary, model, mechanism, parameters)
     for item in found:
-        tell(item.doubt)
+        tell_doubt(item.doubt)
     needs_maker = any(isinstance(item.target, Parameter) for item in found)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), found, make=make)
@@ -206,5 +206,5 @@ def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -
     level = in_units_of(mechanism, name, given)
     if not isfinite(level):
         raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")
-    tell(suspect_value(infos[name], name, given))
+    tell_doubt(suspect_value(infos[name], name, given))
     return Stop(name, level, is_below)

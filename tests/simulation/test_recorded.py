@@ -83,8 +83,9 @@ def test_where_bodies_and_markers_are(arm):
 
 def test_files_name_coordinates_in_either_way_and_in_degrees(arm, tmp_path: Path):
     path = tmp_path / "motion.mot"
-    columns = ("elbow_0", "/jointset/shoulder/shoulder_1/value", "/jointset/elbow/elbow_0/speed", "emg")
-    write_sto(path, "motion", [0.0, 0.1], columns, [[90.0, 0.0, 1.0, 2.0], [45.0, 30.0, 3.0, 4.0]], in_degrees=True)
+    states = "/jointset/shoulder/shoulder_1/value", "/jointset/elbow/elbow_0/speed", "/forceset/biceps/activation"
+    rows = [[90.0, 0.0, 1.0, 0.5, 2.0], [45.0, 30.0, 3.0, 0.5, 4.0]]
+    write_sto(path, "motion", [0.0, 0.1], ("elbow_0", *states, "emg"), rows, in_degrees=True)
     motion = RecordedMotion.read(arm, path)
     assert motion.values[:, 3] == pytest.approx(np.radians((90.0, 45.0)))
     assert motion.values[:, 1] == pytest.approx(np.radians((0.0, 30.0)))

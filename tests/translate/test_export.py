@@ -231,7 +231,11 @@ def test_what_cannot_be_drawn_is_told():
     assert found["mesh"] == ["/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4"]
     assert found["appearance"] == ["/bodyset/block/block_geom_5"]
     details = [record for record in urdf.fidelity if record.kind == "mesh"]
-    assert "bone.vtp" in details[0].cannot_say and "--geometry" in details[0].done
+    assert [record.detail for record in details] == ["bone.vtp", "gone.obj"] and "--geometry" in details[0].done
+    # A row of the table tells of all files that are not there.
+    assert ("/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4") in {
+        group.components for group in urdf.fidelity.groups()
+    }
     assert len(visuals(urdf)) == 1
     assert unaccounted(model, urdf) == []
 
