@@ -99,7 +99,7 @@ def test_the_rest_of_a_folder_is_checked(tmp_path: Path) -> None:
 
 def test_tables_and_data_come_from_files(tmp_path: Path) -> None:
     from osimlite.document.data import read_data
-    from osimlite.simulation.table_stream import TableStream
+    from osimlite.simulation.files.table_stream import TableStream
 
     for name in ("model.json", "model.yaml", "motion.sto"):
         os.mkfifo(tmp_path / name)

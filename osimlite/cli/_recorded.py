@@ -10,8 +10,8 @@ from osimlite.errors import OsimliteError
 from osimlite.files import make_folder
 from osimlite.multibody import build_mechanism
 from osimlite.schema.model import Model
-from osimlite.simulation.recorded import RecordedMotion
-from osimlite.simulation.storage import StoTable, write_sto
+from osimlite.simulation.files.recorded import RecordedMotion
+from osimlite.simulation.files.storage import StoTable, write_sto
 from osimlite.text import listed
 
 
@@ -32,7 +32,7 @@ def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Pa
         )
     names = list(tables)
     if trc:
-        from osimlite.simulation.trc import write_trc
+        from osimlite.simulation.files.trc import write_trc
 
         markers = tables["markers.sto"]
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]

@@ -35,7 +35,7 @@ def inverse_dynamics(
     from osimlite.cli._recorded import opened, written
     from osimlite.document.reader import read
     from osimlite.simulation.elements import force_elements
-    from osimlite.simulation.recorded import exclude_forces
+    from osimlite.simulation.files.recorded import exclude_forces
 
     model = read(file)
     recorded = opened(model, motion, lowpass)

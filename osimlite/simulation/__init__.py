@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
+    from osimlite.simulation.files.storage import StoTable as StoTable
+    from osimlite.simulation.files.storage import read_sto as read_sto
+    from osimlite.simulation.files.storage import write_sto as write_sto
+    from osimlite.simulation.files.table_stream import stream_table as stream_table
     from osimlite.simulation.options import Options as Options
     from osimlite.simulation.run import Simulation as Simulation
     from osimlite.simulation.run import simulate as simulate
-    from osimlite.simulation.storage import StoTable as StoTable
-    from osimlite.simulation.storage import read_sto as read_sto
-    from osimlite.simulation.storage import write_sto as write_sto
-    from osimlite.simulation.table_stream import stream_table as stream_table
     from osimlite.simulation.trajectory import Interrupted as Interrupted
     from osimlite.simulation.trajectory import Trajectory as Trajectory
 
@@ -23,11 +23,11 @@ __getattr__ = imported_when_used(
         "Interrupted": "osimlite.simulation.trajectory",
         "Options": "osimlite.simulation.options",
         "Simulation": "osimlite.simulation.run",
-        "StoTable": "osimlite.simulation.storage",
+        "StoTable": "osimlite.simulation.files.storage",
         "Trajectory": "osimlite.simulation.trajectory",
-        "read_sto": "osimlite.simulation.storage",
+        "read_sto": "osimlite.simulation.files.storage",
         "simulate": "osimlite.simulation.run",
-        "stream_table": "osimlite.simulation.table_stream",
-        "write_sto": "osimlite.simulation.storage",
+        "stream_table": "osimlite.simulation.files.table_stream",
+        "write_sto": "osimlite.simulation.files.storage",
     },
 )

@@ -20,7 +20,7 @@ from osimlite.simulation.elements.control_sets import ControlCurves
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.signals import TableColumn
-from osimlite.simulation.storage import StoTable
+from osimlite.simulation.files.storage import StoTable
 from osimlite.text import did_you_mean, listed
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.errors import SettingError
+from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.stepper import Progress
-from osimlite.simulation.storage import StoTable
 from osimlite.text import or_known
 
 PER_RUN = (

@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.errors import ModelError, SettingError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, doubt, quantity
-from osimlite.simulation.storage import read_sto
+from osimlite.simulation.files.storage import read_sto
 
 if TYPE_CHECKING:
     from osimlite.multibody.parts import CoordinateInfo

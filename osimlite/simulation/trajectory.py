@@ -16,7 +16,7 @@ from osimlite._require import require
 from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.storage import sto_text
+from osimlite.simulation.files.storage import sto_text
 
 
 class Trajectory:

@@ -13,8 +13,8 @@ from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.recorded import RecordedMotion
-from osimlite.simulation.storage import StoTable, read_sto
+from osimlite.simulation.files.recorded import RecordedMotion
+from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.view.motion import at_times
 
 
@@ -57,7 +57,7 @@ def read_recording(
         folder: where the model's file is, for the files that contact meshes name.
 
     Raises:
-        OsimliteError: a file is missing or no motion; see :meth:`osimlite.simulation.recorded.RecordedMotion.read`.
+        OsimliteError: a file is missing or no motion; see :meth:`.RecordedMotion.read`.
     """
     recorded = RecordedMotion.read(mechanism, path)
     if not len(recorded.times):

@@ -14,7 +14,7 @@ import pytest
 import osimlite
 from osimlite.cli import main
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.simulation.storage import write_sto
+from osimlite.simulation.files.storage import write_sto
 from tests.view.motions import stroll
 
 

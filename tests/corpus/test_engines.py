@@ -18,7 +18,7 @@ from osimlite.simulation.engines.protocol import Settings
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet import make
+from osimlite.simulation.engines.bullet.engine import make
 from osimlite.simulation.engines.compiled import CompiledEngine
 
 

@@ -63,7 +63,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     many numbers of the records differ from zero.
     """
     busy = 0
-    from osimlite.simulation.engines.bullet import BulletEngine
+    from osimlite.simulation.engines.bullet.engine import BulletEngine
 
     opensim.Logger.setLevelString("off")
     osimlite.write(model, tmp_path / "model.osim")

@@ -12,8 +12,8 @@ from osimlite.document.reader import read_text
 from osimlite.multibody import build_mechanism
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.recorded import RecordedMotion, exclude_forces
-from osimlite.simulation.storage import write_sto
+from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
+from osimlite.simulation.files.storage import write_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
@@ -81,7 +81,7 @@ def write_loads(path, names):
 @pytest.mark.parametrize("within", [False, True], ids=["beside the model", "in the model"])
 @pytest.mark.parametrize("kinds", list(JOINTS.values()), ids=list(JOINTS))
 def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
-    from osimlite.simulation.engines.bullet import BulletEngine
+    from osimlite.simulation.engines.bullet.engine import BulletEngine
 
     monkeypatch.chdir(tmp_path)
     opensim.Logger.setLevelString("off")

@@ -14,8 +14,8 @@ from osimlite import Body, Coordinate, Model, SpringGeneralizedForce
 from osimlite.document.reader import read_text
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.recorded import RecordedMotion, exclude_forces
-from osimlite.simulation.storage import write_sto
+from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
+from osimlite.simulation.files.storage import write_sto
 from tests.oracle.opensim_runs import inverse_dynamics
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

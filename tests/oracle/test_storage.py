@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.simulation import read_sto, write_sto
-from osimlite.simulation.trc import write_trc
+from osimlite.simulation.files.trc import write_trc
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -19,8 +19,8 @@ from osimlite.simulation.elements import Forces, force_elements
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines import bullet_world
-from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.bullet import world as bullet_world
+from osimlite.simulation.engines.bullet.engine import BulletEngine
 
 ROUTES = ("mass-matrix", "articulated-body")
 

@@ -31,7 +31,7 @@ from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.bullet.engine import BulletEngine
 
 INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
 

@@ -15,7 +15,7 @@ from osimlite.simulation.elements import force_elements
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet import BulletEngine
+from osimlite.simulation.engines.bullet.engine import BulletEngine
 
 
 def sled(positions, *, early_return):

@@ -15,7 +15,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
-from osimlite.simulation.storage import write_sto
+from osimlite.simulation.files.storage import write_sto
 from osimlite.view import Shown
 from osimlite.view.page import page_data, page_text
 from osimlite.view.recording import computed_forces, read_recording

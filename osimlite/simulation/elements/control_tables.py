@@ -10,8 +10,8 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function, PiecewiseConstant
 from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.simulation.storage import StoTable
-from osimlite.simulation.table_stream import TableStream, start_of_word
+from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.files.table_stream import TableStream, start_of_word
 
 
 def read_controls(path: str | Path) -> StoTable:

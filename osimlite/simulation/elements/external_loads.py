@@ -21,7 +21,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.storage import StoTable, read_beside
+from osimlite.simulation.files.storage import StoTable, read_beside
 from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:

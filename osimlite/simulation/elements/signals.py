@@ -10,7 +10,7 @@ from osimlite.multibody.functions import Function, PiecewiseLinear
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.storage import beside
+from osimlite.simulation.files.storage import beside
 from osimlite.text import did_you_mean
 
 

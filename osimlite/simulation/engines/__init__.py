@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 require("numpy", extra="sim", purpose="a simulation")
 
 ENGINES = {
-    "bullet": "osimlite.simulation.engines.bullet",
+    "bullet": "osimlite.simulation.engines.bullet.engine",
     "compiled": "osimlite.simulation.engines.compiled",
 }
 """Module of each engine, whose `make` makes one."""

@@ -9,7 +9,7 @@ from osimlite.schema.controller_types import ControlSetController
 from osimlite.simulation.elements.control_sets import ControlCurves
 from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.storage import beside
+from osimlite.simulation.files.storage import beside
 from osimlite.text import did_you_mean
 
 

@@ -11,7 +11,7 @@ from osimlite.schema.controller_types import PrescribedController
 from osimlite.simulation.elements.control_tables import column_function, read_controls
 from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.storage import beside
+from osimlite.simulation.files.storage import beside
 from osimlite.text import did_you_mean
 
 LISTS_OF_PATHS = 40600

@@ -18,8 +18,8 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Thelen2003Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.sets import ObjectGroup
-from osimlite.simulation.recorded import RecordedMotion, exclude_forces
-from osimlite.simulation.storage import write_sto
+from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
+from osimlite.simulation.files.storage import write_sto
 
 
 @pytest.fixture(scope="module")

@@ -21,8 +21,8 @@ from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.schema.tree import is_a
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.lowpass import lowpassed
-from osimlite.simulation.storage import StoTable, read_sto
 from osimlite.simulation.system import System
 from osimlite.text import did_you_mean, listed
 

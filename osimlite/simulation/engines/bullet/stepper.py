@@ -11,7 +11,7 @@ from osimlite.simulation.euler import SemiImplicitEuler, burst
 from osimlite.simulation.stepper import Observer
 
 if TYPE_CHECKING:
-    from osimlite.simulation.engines.bullet import BulletEngine
+    from osimlite.simulation.engines.bullet.engine import BulletEngine
 
 
 class BulletStepper(SemiImplicitEuler):

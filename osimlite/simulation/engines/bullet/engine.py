@@ -26,9 +26,9 @@ from osimlite.robot.robot import Robot
 from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.base import KernelEngine
-from osimlite.simulation.engines.bullet_file import excess, require_masses
-from osimlite.simulation.engines.bullet_stepper import BulletStepper
-from osimlite.simulation.engines.bullet_world import World, bullet
+from osimlite.simulation.engines.bullet.file import excess, require_masses
+from osimlite.simulation.engines.bullet.stepper import BulletStepper
+from osimlite.simulation.engines.bullet.world import World, bullet
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack_chain import Chain
@@ -37,7 +37,7 @@ from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
     from osimlite.robot.visuals import Visuals
-    from osimlite.simulation.engines.bullet_window import Window
+    from osimlite.simulation.engines.bullet.window import Window
 
 MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
@@ -96,7 +96,7 @@ class BulletEngine(KernelEngine):
         files = {} if visuals is None else visuals.files
         self._window: Window | None = None
         if show:
-            from osimlite.simulation.engines.bullet_window import Window
+            from osimlite.simulation.engines.bullet.window import Window
 
             self._window = Window(robot, mechanism.gravity.tolist(), files, self._joint_values)
         is_exact = self.route == ARTICULATED_BODY

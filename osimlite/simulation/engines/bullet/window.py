@@ -12,8 +12,8 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.robot.robot import Robot
-from osimlite.simulation.engines.bullet_file import robot_text, temporary_file
-from osimlite.simulation.engines.bullet_world import bullet, muted
+from osimlite.simulation.engines.bullet.file import robot_text, temporary_file
+from osimlite.simulation.engines.bullet.world import bullet, muted
 
 FRAME = 1.0 / 60.0
 """Time between two pictures, s."""

@@ -20,9 +20,10 @@ from osimlite.simulation.kernels import pack_chain
 
 bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines import bullet_file, bullet_world  # noqa: E402
-from osimlite.simulation.engines.bullet import BulletEngine  # noqa: E402
-from osimlite.simulation.engines.bullet_world import World  # noqa: E402
+from osimlite.simulation.engines.bullet import file as bullet_file  # noqa: E402
+from osimlite.simulation.engines.bullet import world as bullet_world  # noqa: E402
+from osimlite.simulation.engines.bullet.engine import BulletEngine  # noqa: E402
+from osimlite.simulation.engines.bullet.world import World  # noqa: E402
 
 ROUTES = ("mass-matrix", "articulated-body")
 Q = [-0.17453292519943295, 0.1, 0.3, 0.9, 0.4, -0.2, -0.6, -0.3]

@@ -15,7 +15,7 @@ from osimlite._require import require
 from osimlite.errors import SimulationError
 from osimlite.robot.principal_axes import principal_axes
 from osimlite.robot.robot import Robot, RobotJoint
-from osimlite.simulation.engines.bullet_file import excess, robot_text, temporary_file
+from osimlite.simulation.engines.bullet.file import excess, robot_text, temporary_file
 
 __all__ = ["World", "bullet", "muted"]
 

@@ -8,8 +8,8 @@ import pytest
 
 from osimlite.errors import SimulationError
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.simulation.engines import bullet_window as module
-from osimlite.simulation.engines.bullet_world import bullet
+from osimlite.simulation.engines.bullet import window as module
+from osimlite.simulation.engines.bullet.world import bullet
 from osimlite.simulation.run import Simulation
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, UnsupportedError
 from osimlite.simulation import read_sto, stream_table, write_sto
-from osimlite.simulation.storage import sto_text
+from osimlite.simulation.files.storage import sto_text
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 

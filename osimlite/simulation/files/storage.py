@@ -14,7 +14,7 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.files import written_atomically
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.table_stream import TableStream, suffixes
+from osimlite.simulation.files.table_stream import TableStream, suffixes
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from osimlite.files import written_atomically
-from osimlite.simulation.storage import number_text
+from osimlite.simulation.files.storage import number_text
 
 
 def write_trc(

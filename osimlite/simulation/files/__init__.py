@@ -1,0 +1,1 @@
+"""Tables and states in files: .sto, .mot, .trc, and motions that were recorded."""
