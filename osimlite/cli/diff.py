@@ -1,4 +1,4 @@
-"""``osimlite diff``: what changed between two models, in meaning."""
+"""``osimlite diff``: what changed between two models, or two other documents, in meaning."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 
 def diff(
-    files: Annotated[list[Path], typer.Argument(metavar="OLD NEW", help="The two model files.", show_default=False)],
+    files: Annotated[list[Path], typer.Argument(metavar="OLD NEW", help="The two files.", show_default=False)],
     git: Annotated[
         bool, typer.Option("--git", help="Take the seven arguments that git gives an external diff program.")
     ] = False,
 ) -> None:
-    """Show what changed between two models: component, property, old and new value.
+    """Show what changed between two models or setup files: component, property, old and new value.
 
-    Layout, order, comments and number formats do not count, nor does writing a default down. Exits with 1 if the
-    models differ.
+    Layout, order, comments and number formats do not count, nor does writing a default down. Exits with 1 if they
+    differ.
 
     As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in .gitattributes the
     line: *.osim diff=osim
@@ -28,7 +28,7 @@ def diff(
     Example: osimlite diff gait2392.osim gait2392_scaled.osim
     """
     from osimlite.cli._console import complain, say
-    from osimlite.document.reader import read
+    from osimlite.document.reader import read_any
     from osimlite.errors import OsimliteError
     from osimlite.schema.difference import differences
     from osimlite.schema.model import Model
@@ -41,14 +41,16 @@ def diff(
     elif len(files) == 2:
         title, (old, new) = "", files
     else:
-        raise OsimliteError("diff takes two model files")
+        raise OsimliteError("diff takes two files")
     try:
-        models = [Model() if str(file) == "/dev/null" else read(file) for file in (old, new)]
+        read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
+        kind = next((type(top) for top in read if top is not None), Model)
+        tops = [kind() if top is None else top for top in read]
     except OsimliteError as error:
         # 1 says that the models differ.
         complain(error)
         raise typer.Exit(2) from None
-    found = differences(models[0], models[1])
+    found = differences(tops[0], tops[1])
     if git:
         say(f"--- {title}")
         say(f"+++ {title}")

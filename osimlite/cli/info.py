@@ -1,4 +1,4 @@
-"""``osimlite info``: what is in a model file."""
+"""``osimlite info``: what is in a file."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import typer
 from osimlite.cli import _options as options
 
 if TYPE_CHECKING:
+    from osimlite.schema.base import Object
     from osimlite.schema.custom_joint import CustomJoint
     from osimlite.schema.joints import Joint
     from osimlite.schema.model import Model
@@ -24,36 +25,37 @@ def info(
 ) -> None:
     """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
 
-    It also says what of it cannot be simulated.
+    It also says what of it cannot be simulated. Of a setup file it shows what the tool reads and writes.
 
     Example: osimlite info gait2392.osim
     """
-    from rich.table import Table
-
-    from osimlite.cli._console import add_row, plain_console, say, show
+    from osimlite.cli._console import say
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
     from osimlite.lint.words import times
+    from osimlite.schema.base import Object
     from osimlite.schema.coordinates import Coordinate
     from osimlite.schema.joints import Joint
+    from osimlite.schema.model import Model
     from osimlite.schema.tree import is_a
-    from osimlite.text import visible
 
-    document = read_document(Source.of_file(file))
-    model = document.model
+    document = read_document(Source.of_file(file), of=Object)
+    model = document.top
+    size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
+    if not isinstance(model, Model):
+        rows = [(model.tag, model.name), ("file", size), ("document version", str(document.version))]
+        _facts([*rows, *_files(model), ("remarks of the reader", str(len(document.notes)))])
+        _classes([*model.walk()], every_class)
+        return
     components = list(model.components())
     muscles = [component for component in components if is_a(component, "Muscle")]
     wraps = [component for component in components if is_a(component, "PathWrap")]
     surfaces = sum(is_a(component, "WrapObject") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
 
-    console = plain_console()
-    facts = Table(show_header=False, box=None, pad_edge=False)
-    facts.add_column(style="bold")
-    facts.add_column(overflow="fold")
-    for name, value in (
+    _facts([
         ("model", model.name),
-        ("file", f"{file} ({file.stat().st_size / 1000:.0f} kB)"),
+        ("file", size),
         ("document version", str(document.version)),
         ("gravity", " ".join(f"{g:g}" for g in model.gravity) + " m/s^2"),
         ("bodies", f"{len(model.body_set.objects)}, {mass:.6g} kg"),
@@ -68,9 +70,7 @@ def info(
         ("components in all", str(len(components))),
         ("remarks of the reader", str(len(document.notes))),
         ("simulation", _simulation(model, file.parent)),
-    ):
-        add_row(facts, name, value)
-    console.print(facts)
+    ])  # fmt: skip
 
     if any(joint.coordinates for joint in model.components(Joint)):
         say()
@@ -85,11 +85,47 @@ def info(
         for line in _muscles(muscles):
             say(line)
 
-    counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in components)
+    _classes(components, every_class)
+
+
+def _facts(rows: Sequence[tuple[str, str]]) -> None:
+    """Print what is worth a line each."""
+    from rich.table import Table
+
+    from osimlite.cli._console import add_row, plain_console
+
+    facts = Table(show_header=False, box=None, pad_edge=False)
+    facts.add_column(style="bold")
+    facts.add_column(overflow="fold")
+    for name, value in rows:
+        add_row(facts, name, value)
+    plain_console().print(facts)
+
+
+def _files(top: Object) -> Iterator[tuple[str, str]]:
+    """The properties of a document that name files and folders, with what they say."""
+    from osimlite.schema.fields import Reference
+    from osimlite.schema.specs import reference_specs
+
+    for item in top.walk():
+        for spec in reference_specs(type(item)):
+            value = getattr(item, spec.name)
+            said = " ".join(value) if isinstance(value, tuple) else value
+            is_file = isinstance(spec.kind, Reference) and spec.kind.target.endswith(("file", "folder"))
+            if is_file and said not in ("", None, "Unassigned"):
+                yield spec.name if item is top else f"{item.name or item.tag}: {spec.name}", said
+
+
+def _classes(objects: Sequence[Object], every_class: bool) -> None:
+    """Print how many there are of each class."""
+    from osimlite.cli._console import plain_console, say, show
+    from osimlite.text import visible
+
+    counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in objects)
     shown = counts.most_common(None if every_class else 15)
     # A count stays with its class.
     listed = ", ".join(f"{count}\0{visible(name)}" for name, count in shown)
-    text = textwrap.fill(f"Classes: {listed}", console.width, subsequent_indent="  ", break_long_words=False)
+    text = textwrap.fill(f"Classes: {listed}", plain_console().width, subsequent_indent="  ", break_long_words=False)
     show("\n" + text.replace("\0", " ") + "\n")
     if len(counts) > len(shown):
         say(f"and {len(counts) - len(shown)} classes more (--all lists them)")

@@ -1,4 +1,4 @@
-"""``osimlite upgrade``: an old model file in the current format."""
+"""``osimlite upgrade``: an old file in the current format."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ if TYPE_CHECKING:
 
 
 def upgrade(
-    file: Annotated[Path, typer.Argument(help="A model file of any version.", show_default=False)],
+    file: Annotated[Path, typer.Argument(help="A model, setup or other document of any version.", show_default=False)],
     output: Annotated[
         Path | None,
         typer.Option(
             "-o",
             "--output",
             metavar="FILE",
-            help="File to write, which may be the model file itself.",
-            show_default="<name>_<version>.osim beside it",
+            help="File to write, which may be the file itself.",
+            show_default="<name>_<version> beside it",
         ),
     ] = None,
     numbers: options.Numbers = "shortest",
 ) -> None:
-    """Write a model file of an older version in the current format, and list what changed and what was lost.
+    """Write a file of an older version in the current format, and list what changed and what was lost.
 
-    Components get the names and paths that OpenSim gives them. Comments and numbers stay as they are.
+    Components get the names and paths that OpenSim gives them. Comments and numbers stay as they are. Other files that
+    it names are left alone.
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
@@ -39,18 +40,19 @@ def upgrade(
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
+    from osimlite.schema.base import Object
     from osimlite.schema.model import CURRENT_VERSION
 
     style = options.checked_numbers(numbers)
-    document = read_document(Source.of_file(file))
+    document = read_document(Source.of_file(file), of=Object)
     mended = document.fault is not None
     if document.version >= CURRENT_VERSION and output is None and not mended:
         say(f"{file}: already version {document.version}, nothing to do")
         return
-    target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}.osim")
+    target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}{file.suffix or '.osim'}")
     if output is None and target.exists():
         raise OsimliteError(f"'{target}' is there already; name the file to write with -o", file=str(file))
-    write(document.model, target, numbers=style)
+    write(document.top, target, numbers=style)
     _report(document)
     say(f"{target}: version {document.version} to {CURRENT_VERSION}, {_count(len(document.changes), 'change')}")
 

@@ -1,8 +1,12 @@
-"""What differs between two models in meaning: components by path, properties by value, whatever the layout."""
+"""What differs between two models in meaning: components by path, properties by value, whatever the layout.
+
+Documents that are no models are compared property by property.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from osimlite.schema.base import Component, Object, Unknown
@@ -24,17 +28,22 @@ class Difference(NamedTuple):
     new: Any
 
 
-def differences(old: Model, new: Model) -> list[Difference]:
+def differences(old: Object, new: Object) -> list[Difference]:
     """Every change of meaning from `old` to `new`, in tree order; what only takes or loses its default is none."""
-    return list(_Comparison(old, new).run())
+    if isinstance(old, Model) and isinstance(new, Model):
+        return list(_Comparison(old.tree(), new.tree()).run())
+    return list(_Comparison(None, None)._object(new.name or new.tag, "", old, new))
 
 
 class _Comparison:
-    def __init__(self, old: Model, new: Model) -> None:
-        self.old = old.tree()
-        self.new = new.tree()
+    """Compares two models by their trees, or two other objects, which have none."""
+
+    def __init__(self, old: Tree | None, new: Tree | None) -> None:
+        self.old = old
+        self.new = new
 
     def run(self) -> Iterator[Difference]:
+        assert self.old is not None and self.new is not None
         for path in _only_in(self.old, self.new):
             yield Difference(path, "", _kind(self.old.by_path[path]), None)
         for path, component in self.new.by_path.items():
@@ -69,27 +78,36 @@ class _Comparison:
 
     def _held(self, path: str, way: str, named: bool, old: list[Object], new: list[Object]) -> Iterator[Difference]:
         """Compare objects without a path; components are compared at their own path. `named`: their names count."""
-        before = [item for item in old if not isinstance(item, Component)]
-        after = [item for item in new if not isinstance(item, Component)]
+        before = [item for item in old if self.old is None or not isinstance(item, Component)]
+        after = [item for item in new if self.new is None or not isinstance(item, Component)]
+        if self.old is None and named and (old_names := _unique(before)) and (new_names := _unique(after)):
+            # Outside of models members have no paths: they go by their names.
+            for name in dict.fromkeys([*old_names, *new_names]):
+                yield from self._pair(path, f"{way}[{name}]", old_names.get(name), new_names.get(name))
+            return
         many = max(len(before), len(after)) > 1
-        for number in range(max(len(before), len(after))):
+        for number, (one, other) in enumerate(zip_longest(before, after)):
             place = f"{way}[{number}]" if many else way
-            if number >= len(after):
-                yield Difference(path, place, _kind(before[number]), None)
-            elif number >= len(before):
-                yield Difference(path, place, None, _kind(after[number]))
-            else:
-                if named and before[number].name != after[number].name:
-                    yield Difference(path, f"{place}.name", before[number].name, after[number].name)
-                yield from self._object(path, place, before[number], after[number])
+            if named and one is not None and other is not None and one.name != other.name:
+                yield Difference(path, f"{place}.name", one.name, other.name)
+            yield from self._pair(path, place, one, other)
 
-    def _names(self, tree: Tree, holder: Object, spec: FieldSpec, value: Any) -> Any:
+    def _pair(self, path: str, place: str, old: Object | None, new: Object | None) -> Iterator[Difference]:
+        """Compare two objects of which one may not be there."""
+        if old is not None and new is not None:
+            yield from self._object(path, place, old, new)
+        elif old is not None or new is not None:
+            yield Difference(path, place, old and _kind(old), new and _kind(new))
+
+    def _names(self, tree: Tree | None, holder: Object, spec: FieldSpec, value: Any) -> Any:
         """What a reference says, in one spelling: the path of the component where it leads to one."""
         if isinstance(value, tuple):
             return tuple(self._names(tree, holder, spec, word) for word in value)
         if value is None:
             return None
         assert isinstance(spec.kind, Reference)
+        if tree is None:
+            return value if isinstance(value, str) else value.path
         owner = tree.owner_of(holder)
         if spec.kind.rule not in ("input", "file", "column", "positional", "point-index"):
             target = tree.resolve(Use(holder, owner, spec, value)).target
@@ -100,6 +118,12 @@ class _Comparison:
 
 def _listed(value: Any) -> list[Object]:
     return value if isinstance(value, list) else [] if value is None else [value]
+
+
+def _unique(items: list[Object]) -> dict[str, Object]:
+    """The objects by name; none if a name is missing, or there twice."""
+    found = {item.name: item for item in items}
+    return found if len(found) == len(items) and "" not in found else {}
 
 
 def _kind(item: Object) -> str:
