@@ -169,7 +169,7 @@ class _Printer:
     def _named(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
             if self.tree is None:
-                return value.name if reference.rule.endswith("-name") else value.path
+                return value.path if reference.rule == "socket" or "path" in reference.rule else value.name
             return self.tree.text_for(self.tree.owner_of(item), reference, value)
         if isinstance(value, tuple):
             return tuple(self._named(item, reference, word) for word in value)

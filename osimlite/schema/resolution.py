@@ -139,6 +139,7 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "model-path": _model_path,
     "coordinate-name": _bare(lambda tree, owner, target: tree.of_class("Coordinate")),
     "body-name": _bare(lambda tree, owner, target: tree.members("/bodyset", "Body")),
+    "body-name-or-com": _bare(lambda tree, owner, target: tree.members("/bodyset", "Body")),
     "joint-name": _bare(lambda tree, owner, target: tree.members("/jointset", "Joint")),
     "actuator-name": _bare(lambda tree, owner, target: tree.members("/forceset", "Actuator")),
     "muscle-name": _bare(lambda tree, owner, target: tree.members("/forceset", "Muscle")),
@@ -154,6 +155,8 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "input-folder": _nothing_to_resolve,
     "output-folder": _nothing_to_resolve,
     "column": _nothing_to_resolve,
+    "state-path": _nothing_to_resolve,
+    "external-force-name": _nothing_to_resolve,
     "positional": _nothing_to_resolve,
     "point-index": _nothing_to_resolve,
 }

@@ -12,6 +12,8 @@ from osimlite.document.printer import to_text
 from osimlite.document.reader import read_document
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError
+from osimlite.schema.base import Object
+from osimlite.schema.model import Model
 from tests.conftest import ROOT, corpus_models
 from tests.document.damage import damaged
 
@@ -21,7 +23,7 @@ LARGEST = 120_000
 
 def files() -> list[Path]:
     """Small and old documents of ours, and real files where they are at hand."""
-    ours = [*(ROOT / "fixtures" / "versions").glob("*.osim"), *(ROOT / "fixtures" / "walker").glob("*.osim")]
+    ours = [path for name in ("versions", "walker", "documents") for path in (ROOT / "fixtures" / name).glob("*.*")]
     real = [model.path for model in corpus_models()]
     return sorted(path for path in [*ours, *real] if 0 < path.stat().st_size < LARGEST)
 
@@ -29,22 +31,23 @@ def files() -> list[Path]:
 def fate(data: bytes) -> str:
     """What becomes of a file: ``read``, or ``refused``. Anything but that raises."""
     try:
-        document = read_document(Source(data, "damaged.osim"))
+        document = read_document(Source(data, "damaged.osim"), of=Object)
     except DocumentError as refused:
         assert refused.line is not None and refused.line >= 1, refused.message
         assert refused.message and "\n" not in refused.message, refused.message
         return "refused"
-    model = document.model
+    top = document.top
     # What has been read can be walked, asked and written, and what is written is read again without a change.
-    tree = model.tree()
-    for use in tree.uses():
-        tree.resolve(use)
+    if isinstance(top, Model):
+        tree = top.tree()
+        for use in tree.uses():
+            tree.resolve(use)
     for note in document.notes:
         document.source.of_tag(note.number)
-    text = to_text(model)
-    again = read_document(Source(text.encode("utf-8", "surrogatepass")))
+    text = to_text(top)
+    again = read_document(Source(text.encode("utf-8", "surrogatepass")), of=Object)
     assert (again.fault, again.changes) == (None, [])
-    assert to_text(again.model) == text
+    assert to_text(again.top) == text
     return "read"
 
 

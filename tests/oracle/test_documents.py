@@ -1,0 +1,54 @@
+"""OpenSim 4.6 prints setup files and other documents as osimlite does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.document.reader import read_document
+from osimlite.document.source import Source
+from osimlite.schema.base import Object
+from tests.conftest import ROOT
+from tests.oracle.test_schema import COMMENT_LINE
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+DOCUMENTS = sorted((ROOT / "fixtures" / "documents").iterdir())
+OLD = {"one_trial": "InverseKinematicsTool", "inverse_dynamics": "InverseDynamicsTool"}
+OLD |= {"force_files": "CMCTool", "replaced_forces": "AnalyzeTool"}
+"""Documents of old versions, and the class that OpenSim reads them with."""
+
+
+def without_comments(text: str) -> str:
+    return COMMENT_LINE.sub("", text)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_opensim_prints_the_same(path: Path, tmp_path: Path) -> None:
+    opensim.Logger.setLevelString("off")
+    target = tmp_path / path.name
+    opensim.OpenSimObject.makeObjectFromFile(str(path)).printToXML(str(target))
+    found = read_document(Source.of_file(path), of=Object)
+    lines = osimlite.to_text(found.top, numbers="opensim", comments=False).splitlines(keepends=True)
+    # OpenSim drops what it does not know; here it is kept.
+    unknown = [note.word for note in found.notes if note.kind == "unknown-tag"]
+    ours = "".join(line for line in lines if not any(line.strip().startswith(f"<{tag}>") for tag in unknown))
+    theirs = target.read_text()
+    assert ours == without_comments(theirs)
+    assert osimlite.to_text(osimlite.read_document(target), numbers="opensim") == without_comments(theirs)
+
+
+@pytest.mark.parametrize("name", OLD)
+def test_opensim_upgrades_alike(name: str, tmp_path: Path) -> None:
+    opensim.Logger.setLevelString("off")
+    # OpenSim writes a file beside the old one.
+    copy = tmp_path / f"{name}.xml"
+    copy.write_bytes((ROOT / "fixtures" / "versions" / copy.name).read_bytes())
+    cls = getattr(opensim, OLD[name])
+    tool = cls(str(copy), False) if name in ("force_files", "replaced_forces") else cls(str(copy))
+    tool.printToXML(str(tmp_path / "theirs.xml"))
+    ours = osimlite.to_text(osimlite.read_document(copy), numbers="opensim", comments=False)
+    assert ours == without_comments((tmp_path / "theirs.xml").read_text())
