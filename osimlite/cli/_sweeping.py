@@ -19,7 +19,7 @@ Vary = Annotated[
         "--vary",
         metavar="NAME=RANGE",
         help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
-        "coordinate, COORDINATE/speed, path of a property, or parameter of the model function.",
+        "coordinate, COORDINATE/speed, MUSCLE/control, path of a property, or parameter of the model function.",
         show_default=False,
     ),
 ]

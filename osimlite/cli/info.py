@@ -65,6 +65,8 @@ def info(
         ("forces besides", str(len(model.force_set.objects) - len(muscles))),
         ("wrap surfaces", f"{surfaces}, for {times(len(wraps), 'wrap')}"),
         ("markers", str(len(model.marker_set.objects))),
+        ("controllers", str(len(model.controller_set.objects))),
+        ("probes", str(len(model.probe_set.objects))),
         ("contact surfaces", str(len(model.contact_geometry_set.objects))),
         ("constraints", str(len(model.constraint_set.objects))),
         ("components in all", str(len(components))),

@@ -43,7 +43,7 @@ def simulate(
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
     output: options.Folder = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, forces and energy as PNG.")] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, muscles, forces and energy as PNG.")] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[
         bool,
@@ -132,7 +132,10 @@ def simulate(
         simulation.hold()
 
 
-SOME = {"probes.sto", "coordinates.png", "contact_forces.png", "other_forces.png", "energy.png", "animation.gif"}
+SOME = {
+    *("probes.sto", "animation.gif"),
+    *("coordinates.png", "states.png", "contact_forces.png", "other_forces.png", "energy.png"),
+}
 """What not every simulation writes: --plot and --animate draw pictures."""
 
 
@@ -182,6 +185,9 @@ def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
     tried = summary["attempted_steps"]
     facts.add("steps", f"{summary['steps']} of {tried} tried, {summary['evaluations']} evaluations of the forces")
     facts.add("time taken", f"{summary['wall_time_s']:.3g} s")
+    lengths = {path for path in trajectory.auxiliary if path.endswith("/fiber_length")}
+    if lengths - set(summary["settings"]["initial"]) and "equilibrate" not in summary["settings"]:
+        facts.add("muscles", "start where the model says; in equilibrium by --equilibrate")
     first, last = (summary["energy_J"][when]["total"] for when in ("start", "end"))
     facts.add("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")
     for name, largest in summary["largest_contact_forces"].items():

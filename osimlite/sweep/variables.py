@@ -217,6 +217,8 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         return Property(found), unit
     if name == "slope":
         return Slope(), "rad"
+    if name in actuators:
+        raise SettingError(f"'{name}' is an actuator: vary its control, as '{name}/control', or a property by its path")
     known = [*(info.name for info in mechanism.coordinates), *parameters, "slope"]
     known += [f"{info.name}/speed" for info in mechanism.coordinates]
     known += [f"{item.name}/control" for item in model.components(Actuator)]

@@ -1,4 +1,4 @@
-"""Pictures of a simulation: coordinates, contact forces, other forces, and energy over time."""
+"""Pictures of a simulation: coordinates, states of muscles, contact forces, other forces, and energy over time."""
 
 from __future__ import annotations
 
@@ -29,14 +29,17 @@ LINES_IN_PANEL = 7
 MOST_ENERGIES = 400
 """Moments at which energy is worked out; more would not show."""
 
-STORED = "stored in contacts and springs"
+STORED = "stored in contacts, springs, muscles"
+
+_UNITS = {"fiber_length": " (m)", "fiber_velocity": " (m/s)", "stretch": " (m)", "dissipatedEnergy": " (J)"}
+"""Of the states of forces that have one."""
 
 _NEVER_MIND = 1e-9
 """A force below this part of the largest counts as none."""
 
 
 def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechanism | None = None) -> list[Path]:
-    """Draw the coordinates, the contact forces, the other forces and the energy of a motion over time.
+    """Draw the coordinates, states of muscles, contact forces, other forces and energy of a motion over time.
 
     Args:
         trajectory: the motion.
@@ -45,8 +48,8 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
             and lengths, and there is no picture of the energy.
 
     Returns:
-        The PNG files: ``coordinates.png``, and as far as there is something to show ``contact_forces.png``,
-        ``other_forces.png`` and ``energy.png``.
+        The PNG files: ``coordinates.png``, and as far as there is something to show ``states.png``,
+        ``contact_forces.png``, ``other_forces.png`` and ``energy.png``.
 
     Raises:
         MissingDependency: matplotlib is not installed.
@@ -89,6 +92,9 @@ def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Arr
 def _figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
     times = np.asarray(motion.times, dtype=float)
     yield "coordinates.png", _coordinates(times, motion, mechanism)
+    states = getattr(motion, "auxiliary", {})
+    if states:
+        yield "states.png", _states(times, states)
     contacts = list(_one_of_each_pair(contact_forces(motion)))
     if contacts:
         yield "contact_forces.png", _contacts(times, contacts)
@@ -133,6 +139,21 @@ def _coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> A
     return figure
 
 
+def _states(times: Array, states: Mapping[str, Array]) -> Any:
+    kinds: dict[str, dict[str, Array]] = {}
+    for path, column in states.items():
+        owner, _, kind = path.rpartition("/")
+        label = kind.replace("_", " ") + _UNITS.get(kind, "")
+        kinds.setdefault(label, {})[owner.rpartition("/")[2]] = column
+    panels = [(label, part) for label, lines in kinds.items() for part in _shared_out(lines)]
+    figure, axes = _sheet("States of muscles and other forces", [3.0] * len(panels))
+    for panel, (label, lines) in zip(axes, panels, strict=True):
+        _lines(panel, times, lines)
+        panel.set_ylabel(label)
+    _finish(axes, times, "")
+    return figure
+
+
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
     """Of an element that pushes two frames with opposite forces, the first; of any other, all."""
     by_element: dict[str, list[ContactForce]] = {}
@@ -164,7 +185,7 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
 
 def _others(times: Array, acting: Mapping[str, Array], idle: Sequence[str]) -> Any:
     parts = _shared_out(acting)
-    figure, axes = _sheet("Forces on coordinates and others", [3.0] * len(parts))
+    figure, axes = _sheet("Forces of muscles, springs and others", [3.0] * len(parts))
     for panel, part in zip(axes, parts, strict=True):
         _lines(panel, times, part)
         panel.set_ylabel("force (N) or torque (N·m)")

@@ -11,7 +11,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
-from osimlite.view.plots import _figures, energies
+from osimlite.view.plots import STORED, _figures, energies
 from tests.view.motions import Recorded, stroll
 
 pytest.importorskip("matplotlib")
@@ -111,6 +111,17 @@ def test_other_forces_leave_out_what_never_acts():
     assert [text.get_text() for text in panel.texts] == ["never acting: LKneeLimitTorque"]
 
 
+def test_states_of_a_kind_share_panels():
+    muscles = {f"/forceset/m{place}": np.full(12, place) for place in range(9)}
+    states = {f"{path}/{kind}": column for path, column in muscles.items() for kind in ("activation", "fiber_length")}
+    motion = stroll(12)
+    motion.auxiliary = states
+    panels = drawn("states.png", motion).axes
+    assert [panel.get_ylabel() for panel in panels] == ["activation"] * 2 + ["fiber length (m)"] * 2
+    assert [name for panel in panels[:2] for name in lines(panel)] == [path[-2:] for path in muscles]
+    assert lines(panels[3])["m8"].get_ydata().tolist() == [8.0] * 12
+
+
 def test_energy_is_that_of_the_mechanism():
     motion, mechanism = stroll(1001), walker()
     times, parts = energies(motion, mechanism)
@@ -131,9 +142,9 @@ def test_energy_of_a_simulation_has_what_contacts_store():
     trajectory = simulate(dynamic_walker(), 0.1)
     (panel,) = dict(_figures(trajectory, trajectory.mechanism))["energy.png"].axes
     found = lines(panel)
-    assert set(found) == {"kinetic", "potential of gravity", "stored in contacts and springs", "sum"}
+    assert set(found) == {"kinetic", "potential of gravity", STORED, "sum"}
     stored, total = (trajectory.energy[part] for part in ("stored", "total"))
-    assert found["stored in contacts and springs"].get_ydata() == pytest.approx(stored) and stored[0] > 1.0
+    assert found[STORED].get_ydata() == pytest.approx(stored) and stored[0] > 1.0
     assert found["sum"].get_ydata() == pytest.approx(total)
     # The table of the command says the same.
     said = trajectory.summary["energy_J"]
