@@ -15,7 +15,7 @@ from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
-from osimlite.lint.suffixes import TABLES
+from osimlite.lint.suffixes import PROJECT, begins_as_ours
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -83,8 +83,10 @@ def run(
 def _files(paths: list[str]) -> Iterator[str]:
     """Every file to check, folders opened up."""
     for text in paths:
-        is_folder = text != "-" and os.path.isdir(text)
-        yield from map(str, model_files([Path(text)], (".osim", *TABLES))) if is_folder else [text]
+        if text != "-" and os.path.isdir(text):
+            yield from filter(begins_as_ours, map(str, model_files([Path(text)], PROJECT)))
+        else:
+            yield text
 
 
 def _source(path: str) -> Source:

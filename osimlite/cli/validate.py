@@ -14,7 +14,7 @@ def validate(
         list[str],
         typer.Argument(
             metavar="PATH...",
-            help="Files (.osim, .sto, .mot, .trc), folders with them, or - for standard input.",
+            help="Files (.osim, .xml, .omoco, .sto, .mot, .trc), folders, or - for standard input.",
             show_default=False,
         ),
     ],
@@ -57,7 +57,7 @@ def validate(
         bool, typer.Option("--no-cache", help="Check every file, also those that have not changed since.")
     ] = False,
 ) -> None:
-    """Say what is wrong with models and tables: all in one run, with line, column and the nearest right spelling.
+    """Say what is wrong with models, setups and tables: all in one run, with line, column and nearest spelling.
 
     Exits with 0 if all is well, 1 if there are findings as bad as --fail-on, 2 if a file cannot be read.
 

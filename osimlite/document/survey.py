@@ -11,7 +11,8 @@ from osimlite.document.names import as_written
 from osimlite.document.reader import Document, document_of, parse, read_document, version_of
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, SpecialFileError, VersionError
-from osimlite.schema.model import CURRENT_VERSION
+from osimlite.schema.base import Object
+from osimlite.schema.model import CURRENT_VERSION, Model
 
 
 @dataclass(slots=True)
@@ -28,31 +29,37 @@ class Survey:
     sure_until: int | None = None
 
 
-def survey_file(file: str) -> Survey:
+def survey_file(file: str, *, of: type[Object] = Model) -> Survey:
     """Read as much of a file as can be read; MissingFileError if there is none."""
     try:
         source = Source.of_file(file)
     except SpecialFileError as fault:
         return Survey(Source(b"", file), None, [fault])
-    return survey(source)
+    return survey(source, of=of)
 
 
-def survey(source: Source) -> Survey:
-    """Read as much of `source` as can be read; raises nothing for what is wrong with the text."""
+def survey(source: Source, *, of: type[Object] = Model) -> Survey:
+    """Read as much of `source` as can be read; raises nothing for what is wrong with the text.
+
+    The object at the top is of a class or derived from it.
+    """
     try:
-        return Survey(source, read_document(source, to_check=True))
+        return Survey(source, read_document(source, of=of, to_check=True))
     except NotWellFormedError as fault:
-        return _recovered(source, fault)
+        return _recovered(source, fault, of)
     except VersionError as fault:
         # Without a version the document is taken for a current one; an older format would give false findings.
         if fault.version is not None:
             return Survey(source, None, [fault])
-        return _assembled(Survey(source, None, [fault]), parse(source))
+        try:
+            return _assembled(Survey(source, None, [fault]), parse(source), of)
+        except NotWellFormedError:
+            return Survey(source, None, [fault])
     except DocumentError as fault:
         return Survey(source, None, [fault])
 
 
-def _recovered(source: Source, fault: NotWellFormedError) -> Survey:
+def _recovered(source: Source, fault: NotWellFormedError, of: type[Object]) -> Survey:
     found = Survey(source, None, [fault], fault.line)
     unclosed = re.search(r"of line (\d+) is not closed", fault.message)
     if unclosed:
@@ -67,16 +74,16 @@ def _recovered(source: Source, fault: NotWellFormedError) -> Survey:
         return found
     if root.tag != "OpenSimDocument" or not _same_elements(source, root, found.sure_until):
         return found
-    return _assembled(found, root)
+    return _assembled(found, root, of)
 
 
-def _assembled(found: Survey, root: etree._Element) -> Survey:
+def _assembled(found: Survey, root: etree._Element, of: type[Object]) -> Survey:
     try:
         version = version_of(found.source, root)
     except DocumentError:
         version = CURRENT_VERSION
     try:
-        found.document = document_of(found.source, root, version)
+        found.document = document_of(found.source, root, version, of)
     except DocumentError as fault:
         found.faults.append(fault)
     return found

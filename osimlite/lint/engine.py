@@ -15,14 +15,14 @@ from typing import Any, Literal, Protocol
 
 from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
-from osimlite.document.survey import survey, survey_file
+from osimlite.document.survey import Survey, survey, survey_file
 from osimlite.errors import SpecialFileError
 from osimlite.files import read_file
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
 from osimlite.lint.subject import Subject
-from osimlite.lint.suffixes import is_table
+from osimlite.lint.suffixes import is_document, is_table
 from osimlite.lint.suppressions import suppressions
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
@@ -70,6 +70,10 @@ _MODULES = (
     "files",
     "tables",
     "marker_tables",
+    "setup_files",
+    "setup_names",
+    "setup_data",
+    "setup_tools",
 )
 
 
@@ -104,7 +108,7 @@ class Rule:
 
     `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
     version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
-    at: ``model`` or ``table``.
+    at: ``model``, ``table`` or ``document`` (a setup, or a part of one).
     """
 
     code: str
@@ -179,7 +183,7 @@ def check_source(source: Source, config: Config | None = None) -> Report:
     if source.file is not None and is_table(source.file):
         return run(Table(source.data, source.file, config))
     with collector_paused():
-        return run(Subject(survey(source), config))
+        return run(_subject_of(survey(source, of=_class_in(source.file)), config))
 
 
 def subject_of(file: str, config: Config | None = None) -> Checked:
@@ -187,7 +191,20 @@ def subject_of(file: str, config: Config | None = None) -> Checked:
     if is_table(file):
         with suppress(SpecialFileError):
             return Table(read_file(file), file, config)
-    return Subject(survey_file(file), config)
+    return _subject_of(survey_file(file, of=_class_in(file)), config)
+
+
+def _class_in(file: str | None) -> type[Object]:
+    """What a document is expected to hold."""
+    return Object if is_document(file) else Model
+
+
+def _subject_of(found: Survey, config: Config | None) -> Subject:
+    if not is_document(found.source.file) or (found.document and isinstance(found.document.top, Model)):
+        return Subject(found, config)
+    from osimlite.lint.setup import Setup
+
+    return Setup(found, config)
 
 
 def check_model(model: Model, config: Config | None = None) -> Report:

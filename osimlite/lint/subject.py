@@ -46,7 +46,8 @@ class Subject(Checked):
             self.source = found.source
             self.faults = found.faults
             self.sure_until = found.sure_until
-            self.model = found.document.model if found.document else None
+            top = found.document.top if found.document else None
+            self.model = top if isinstance(top, Model) else None
             self.notes = found.document.notes if found.document else []
             self.version = found.document.version if found.document else None
             self.changes = found.document.changes if found.document else []

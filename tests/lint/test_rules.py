@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 from pathlib import Path
+from shutil import copy
 
 import pytest
 
@@ -30,7 +31,7 @@ def example(rule: Rule, heading: str) -> bytes:
     section = rule.page.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
     block = re.search(r"```(\S+)\n(.*?)```", section, re.DOTALL)
     assert block is not None, f"{rule.code} shows nothing under '{heading}'"
-    if block[1] in ("document", "sto", "trc"):
+    if block[1] in ("document", "setup", "sto", "trc"):
         return block[2].replace("→", "\t").encode()
     return str(skeleton.document(block[2])).encode("latin-1" if block[1] == "latin-1" else "utf-8")
 
@@ -49,8 +50,12 @@ def test_a_page_has_its_headings_and_prose(rule):
 
 def example_file(rule: Rule, heading: str, folder: Path) -> Path:
     """The same as a file."""
-    suffix = re.search(r"```(sto|trc)\n", rule.page)
-    path = folder / f"example.{suffix[1] if suffix else 'osim'}"
+    block = re.search(r"```(sto|trc|setup)\n", rule.page)
+    path = folder / f"example.{'osim' if block is None else block[1].replace('setup', 'xml')}"
+    if path.suffix == ".xml":
+        # What setups name.
+        for file in FIXTURES.glob("leg*"):
+            copy(file, folder)
     path.write_bytes(example(rule, heading))
     return path
 

@@ -110,7 +110,7 @@ def stray_text(subject: Subject, found: Found) -> None:
     ```
     """
     source = subject.source
-    if source is None or source.mixed is False:
+    if source is None or source.mixed is False or not source.spans:
         return
     plain = REMARKS.sub(lambda match: " " * len(match[0]), source.text)
     plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), plain)

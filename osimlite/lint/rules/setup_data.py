@@ -1,0 +1,531 @@
+"""OSIM84x: what a setup asks of the tables that it names."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from typing import Any
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.table import Table
+from osimlite.lint.words import called, nearest_name
+from osimlite.schema.base import Object
+from osimlite.text import listed
+
+
+def _marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
+    """Every part of a tool that fits markers, with its data."""
+    for item in setup.items:
+        if hasattr(item, "ik_task_set") and hasattr(item, "marker_file"):
+            table = setup.table(item.marker_file)
+            if table is not None and table.labels:
+                yield item, table
+
+
+@rule("OSIM841", "marker-not-measured", severity=WARNING, about="document")
+def marker_not_measured(setup: Setup, found: Found) -> None:
+    """A marker that is to be fitted is not in the data.
+
+    ## What it does
+    Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the data. If none is in
+    both model and data, it is an error.
+
+    ## Why is this bad
+    OpenSim leaves the marker out without a word; with no marker at all in common it crashes. A measurement one of whose
+    markers is missing does not count: its bodies keep their size.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>leg.osim</model_file>
+            <marker_file>leg.trc</marker_file>
+            <output_motion_file>ik.mot</output_motion_file>
+            <IKTaskSet>
+                <objects>
+                    <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                    <IKMarkerTask name="hip_marker"> <weight>1</weight> </IKMarkerTask>
+                </objects>
+            </IKTaskSet>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>leg.osim</model_file>
+            <marker_file>leg.trc</marker_file>
+            <output_motion_file>ik.mot</output_motion_file>
+            <IKTaskSet>
+                <objects> <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask> </objects>
+            </IKTaskSet>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for user, table in _marker_users(setup):
+        labels = table.columns
+        tasks = [task for task in user.ik_task_set.objects if is_of(task, "IKMarkerTask") and task.apply and task.name]
+        model = setup.names_of("Marker")
+        both = [task for task in tasks if task.name in labels and task.name in model]
+        if tasks and model and not both:
+            found(
+                f"no marker of the tasks is in both the model and '{user.marker_file}': OpenSim crashes",
+                user, tag="marker_file", severity=ERROR,
+            )  # fmt: skip
+        for task in tasks:
+            if task.name not in labels:
+                found(
+                    f"'{user.marker_file}' has no marker '{task.name}': OpenSim leaves the task out",
+                    task, attribute="name", suggestion=nearest_name(task.name, labels),
+                )  # fmt: skip
+    for scaler in setup.named("ModelScaler"):
+        static = setup.table(scaler.marker_file)
+        if static is None or not static.labels:
+            continue
+        for measurement in scaler.measurement_set.objects if scaler.apply else ():
+            for pair in measurement.marker_pair_set.objects if measurement.apply else ():
+                for name in pair.markers:
+                    if name not in static.columns:
+                        found(
+                            f"'{scaler.marker_file}' has no marker '{name}': OpenSim leaves the whole measurement "
+                            f"'{measurement.name}' out",
+                            pair, tag="markers", word=str(name), suggestion=nearest_name(str(name), static.columns),
+                        )  # fmt: skip
+
+
+@rule("OSIM842", "missing-column", severity=WARNING, about="document")
+def missing_column(setup: Setup, found: Found) -> None:
+    """A table of coordinates lacks coordinates of the model, or has none of them.
+
+    ## What it does
+    Compares the columns of a table of coordinates with the coordinates of the model: inverse dynamics takes plain names
+    alone, analyses take paths too. A task whose value is to come from a file needs its column there.
+
+    ## Why is this bad
+    OpenSim gives a coordinate without a column its default value, without a word or with a line in the log: the motion
+    is another one.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg_no_knee.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for item, tag, table in _motions(setup):
+        names = setup.names_of("Coordinate")
+        if not names:
+            continue
+        plain = is_of(item, "InverseDynamicsTool")
+        columns = {
+            column if plain or "/" not in column else (parts[-2] if (parts := column.split("/"))[-1] == "value" else "")
+            for column in table.columns
+        }
+        lacking = sorted(name for name in names - columns if not _is_bound(setup, name))
+        if not names & columns:
+            paths = any(column.startswith("/") for column in table.columns)
+            why = "; its columns are called by paths, which inverse dynamics does not understand" if paths else ""
+            found(
+                f"'{getattr(item, tag)}' has no column of a coordinate of the model{why}", item, tag=tag, severity=ERROR
+            )
+        elif lacking:
+            near = [
+                f"'{near}' for '{name}'" for name in lacking if (near := nearest_name(name, sorted(columns - names)))
+            ]
+            hint = f"; is it {listed(near)}?" if near else ""
+            found(
+                f"'{getattr(item, tag)}' has no column {listed([repr(name) for name in lacking])}: OpenSim takes the "
+                f"default value{hint}",
+                item, tag=tag,
+            )  # fmt: skip
+    for user in setup.items:
+        if not hasattr(user, "ik_task_set"):
+            continue
+        for task in user.ik_task_set.objects:
+            if is_of(task, "IKCoordinateTask") and task.apply and task.value_type == "from_file":
+                values = setup.table(user.coordinate_file)
+                if not user.coordinate_file.strip() or user.coordinate_file == "Unassigned":
+                    found(
+                        f"no coordinate_file is there for '{task.name}': OpenSim refuses it",
+                        task,
+                        tag="value_type",
+                        severity=ERROR,
+                    )
+                elif values is not None and values.labels and task.name not in values.columns:
+                    found(
+                        f"'{user.coordinate_file}' has no column '{task.name}': OpenSim refuses it",
+                        task, attribute="name", severity=ERROR, suggestion=nearest_name(task.name, values.columns),
+                    )  # fmt: skip
+
+
+def _is_bound(setup: Setup, name: str) -> bool:
+    """Whether a coordinate is locked or follows from others."""
+    assert setup.tree is not None
+    bound = {
+        str(item.dependent_coordinate_name) for item in setup.tree.of_class("CoordinateCouplerConstraint").values()
+    }
+    item = setup.tree.of_class("Coordinate").get(name)
+    return name in bound or (item is not None and bool(getattr(item, "locked", False)))
+
+
+def _motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
+    """Every tool that is given a motion as coordinates, with the property and the table."""
+    for item in setup.items:
+        for tag in ("coordinates_file", "desired_kinematics_file"):
+            table = setup.table(getattr(item, tag, ""))
+            if table is not None and table.labels and not table.is_markers:
+                yield item, tag, table
+
+
+@rule("OSIM843", "load-columns", severity=ERROR, about="document")
+def load_columns(setup: Setup, found: Found) -> None:
+    """The columns of a measured force are not in the data.
+
+    ## What it does
+    Looks for the columns whose labels begin with the identifiers of an external force: there must be three of each.
+    Points out a force without a point (it acts at the origin of the body), columns that are not in the order x, y, z
+    (OpenSim takes them in the order of the file), and forces without an identifier.
+
+    ## Why is this bad
+    OpenSim refuses loads of which it does not find three columns, and swaps the axes of those in another order without
+    a word.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <ExternalLoads name="loads">
+            <objects>
+                <ExternalForce name="right">
+                    <applied_to_body>shank</applied_to_body>
+                    <force_identifier>ground_force_v</force_identifier>
+                    <point_identifier>ground_force_q</point_identifier>
+                </ExternalForce>
+            </objects>
+            <datafile>leg_grf.mot</datafile>
+        </ExternalLoads>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <ExternalLoads name="loads">
+            <objects>
+                <ExternalForce name="right">
+                    <applied_to_body>shank</applied_to_body>
+                    <force_identifier>ground_force_v</force_identifier>
+                    <point_identifier>ground_force_p</point_identifier>
+                </ExternalForce>
+            </objects>
+            <datafile>leg_grf.mot</datafile>
+        </ExternalLoads>
+    </OpenSimDocument>
+    ```
+    """
+    for loads in setup.named("ExternalLoads"):
+        table = setup.table(loads.datafile)
+        if table is None or not table.labels:
+            continue
+        columns = table.columns
+        prefixes = sorted({column[:-1] for column in columns if column[-1:] in "xyzXYZ"})
+        for force in loads.objects:
+            if not force.appliesForce:
+                found(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
+                continue
+            if not force.force_identifier and not force.torque_identifier:
+                found(f"{called(force)} names no columns of a force: OpenSim refuses it", force, tag="force_identifier")
+            elif force.force_identifier and not force.point_identifier:
+                found(
+                    f"{called(force)} has no point: OpenSim lets it act at the origin of {force.applied_to_body}",
+                    force, tag="point_identifier", severity=WARNING,
+                )  # fmt: skip
+            for tag in ("force_identifier", "point_identifier", "torque_identifier"):
+                prefix = getattr(force, tag)
+                if not prefix:
+                    continue
+                own = [column for column in columns if column.startswith(prefix)]
+                if len(own) != 3 or len(set(own)) != 3:
+                    what = listed(own) if own else "none"
+                    found(
+                        f"'{loads.datafile}' must have three columns that begin with '{prefix}' ({tag} of "
+                        f"{called(force)}), it has {what}: OpenSim refuses the loads",
+                        force, tag=tag, suggestion=None if len(own) > 3 else nearest_name(prefix, prefixes),
+                    )  # fmt: skip
+                elif [column[-1:].lower() for column in own] != ["x", "y", "z"] and {
+                    column[-1:].lower() for column in own
+                } == {"x", "y", "z"}:
+                    found(
+                        f"'{loads.datafile}' has {listed(own)} in this order: OpenSim takes the first for x",
+                        force, tag=tag, severity=WARNING,
+                    )  # fmt: skip
+
+
+@rule("OSIM844", "time-outside-data", severity=WARNING, about="document")
+def time_outside_data(setup: Setup, found: Found) -> None:
+    """A tool runs over times that its data do not have, or that make no sense.
+
+    ## What it does
+    Compares the times of a tool with those of the tables that it reads: markers, coordinates, loads.
+
+    ## Why is this bad
+    Inverse kinematics cuts the times to the data without a word. Loads that end before the motion go on as their spline
+    leaves them. Times in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <time_range>0 9</time_range>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <time_range>0 0.5</time_range>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for item, tags, first, last in _ranges(setup):
+        if any(number != number for number in (first, last)):
+            found(f"a time of {called(item)} is no number: OpenSim refuses it", item, tag=tags[0], severity=ERROR)
+            continue
+        if first > last:
+            found(
+                f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim fails",
+                item, tag=tags[-1], severity=ERROR,
+            )  # fmt: skip
+            continue
+        for name, kind in _data_of(item):
+            table = setup.table(name)
+            span = table.span if table is not None and not table.rows.of("order", "time") else None
+            if table is None or span is None:
+                continue
+            slack = max(table.step, 1e-9) * 1.01
+            if first > span[1] + slack or last < span[0] - slack:
+                found(
+                    f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
+                    item, tag=tags[0], severity=ERROR,
+                )  # fmt: skip
+                continue
+            said = [setup.element_of(item, tag) is not None for tag in tags]
+            if said[-1] and math.isfinite(last) and last > span[1] + slack:
+                found(f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}", item, tag=tags[-1])
+            if said[0] and math.isfinite(first) and first < span[0] - slack:
+                found(f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}", item, tag=tags[0])
+
+
+def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
+    for item in setup.items:
+        if getattr(item, "apply", True) is False:
+            continue
+        if hasattr(item, "time_range"):
+            if len(item.time_range) == 2:
+                yield item, ("time_range",), *item.time_range
+        elif hasattr(item, "final_time"):
+            yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
+        elif is_of(item, "Analysis") and item.start_time > item.end_time:
+            yield item, ("start_time", "end_time"), item.start_time, item.end_time
+
+
+def _data_of(item: Any) -> Iterator[tuple[str, str]]:
+    """The tables that a tool reads over its times, with what happens where they end."""
+    for tag in ("marker_file", "coordinates_file", "desired_kinematics_file", "coordinate_file"):
+        if is_of(item, "ForwardTool") or (tag == "coordinate_file" and is_of(item, "MarkerPlacer")):
+            continue
+        yield getattr(item, tag, ""), ": OpenSim takes what there is" if tag == "marker_file" else ""
+
+
+@rule("OSIM845", "loads-end-early", severity=WARNING, about="document")
+def loads_end_early(setup: Setup, found: Found) -> None:
+    """Measured loads do not last as long as the run of the tool.
+
+    ## What it does
+    Compares the times of the data of external loads with those of the tool, or of the motion that the tool is given.
+
+    ## Why is this bad
+    Before the first and after the last row OpenSim goes straight on, without a word: forces grow to thousands of
+    newtons.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <time_range>0 0.9</time_range>
+            <external_loads_file>leg_grf.xml</external_loads_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <time_range>0 0.4</time_range>
+            <external_loads_file>leg_grf.xml</external_loads_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for item, _, first, last in _ranges(setup):
+        loads: Any = setup.document(getattr(item, "external_loads_file", ""))
+        if loads is None or not hasattr(loads, "datafile"):
+            continue
+        beside = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
+        table = setup.table(loads.datafile) or setup.table(beside)
+        span = table.span if table is not None and not table.rows.of("order", "time") else None
+        if table is None or span is None:
+            continue
+        for tag in ("coordinates_file", "states_file", "desired_kinematics_file"):
+            motion = setup.table(getattr(item, tag, ""))
+            if motion is not None and motion.span is not None:
+                first, last = max(first, motion.span[0]), min(last, motion.span[1])
+        slack = max(table.step, 1e-9) * 1.01
+        if (math.isfinite(last) and last > span[1] + slack) or (math.isfinite(first) and first < span[0] - slack):
+            found(
+                f"the loads are measured from {span[0]:g} to {span[1]:g} s, the tool runs from {first:g} to {last:g} s",
+                item, tag="external_loads_file",
+            )  # fmt: skip
+
+
+@rule("OSIM846", "filter-frequency", severity=WARNING, about="document")
+def filter_frequency(setup: Setup, found: Found) -> None:
+    """A filter does not fit how often the data were measured.
+
+    ## What it does
+    Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of 0.
+
+    ## Why is this bad
+    A filter above half the sampling frequency cannot be made: OpenSim takes another one. With 0, nothing is left of
+    the motion.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+            <lowpass_cutoff_frequency_for_coordinates>60</lowpass_cutoff_frequency_for_coordinates>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+            <lowpass_cutoff_frequency_for_coordinates>6</lowpass_cutoff_frequency_for_coordinates>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for item, tag, table in _motions(setup):
+        for filter_tag in ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency"):
+            cutoff = getattr(item, filter_tag, -1.0)
+            if cutoff == 0.0:
+                found(f"{called(item)} filters the motion at 0 Hz", item, tag=filter_tag)
+            elif table.step > 0.0 and cutoff > 0.5 / table.step:
+                found(
+                    f"{called(item)} filters at {cutoff:g} Hz, and '{getattr(item, tag)}' has {1.0 / table.step:.4g} "
+                    f"rows a second, of which {0.5 / table.step:.4g} Hz is the highest that can be filtered",
+                    item, tag=filter_tag,
+                )  # fmt: skip
+
+
+@rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
+def motion_in_degrees(setup: Setup, found: Found) -> None:
+    """Angles of a motion are in degrees, and OpenSim takes them for radians.
+
+    ## What it does
+    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of more than 10 is no
+    angle in radians that a joint takes.
+
+    ## Why is this bad
+    Joint moments of hundreds of thousands, without a word.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg_degrees.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for item, tag, table in _motions(setup):
+        said = table.entries.get("inDegrees")
+        if (said is not None and said.value.text.lower() in ("yes", "y")) or setup.tree is None:
+            continue
+        if table.form < 1 and (table.file.lower().endswith(".mot") or "Angles" in table.entries):
+            continue
+        angles = _angles(setup)
+        largest, label = max(
+            (
+                (abs(sample[place]), column)
+                for place, column in enumerate(table.columns, 1)
+                if (column.removesuffix("/value").rpartition("/")[2]) in angles
+                for sample in table.rows.samples
+                if place < len(sample) and sample[place] == sample[place]
+            ),
+            default=(0.0, ""),
+        )
+        if largest > 10.0:
+            found(
+                f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is {largest:.4g} in it: OpenSim "
+                "takes it for radians",
+                item, tag=tag, severity=ERROR,
+            )  # fmt: skip
+
+
+def _angles(setup: Setup) -> set[str]:
+    """The coordinates that are angles."""
+    assert setup.tree is not None
+    joints: Any = setup.tree.of_class("Joint").values()
+    return {
+        coordinate.name
+        for joint in joints
+        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False)
+        if motion == "rotational"
+    }

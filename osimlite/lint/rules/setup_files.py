@@ -1,0 +1,207 @@
+"""OSIM82x: the files that a setup names."""
+
+from __future__ import annotations
+
+import os
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.setup import NOTHING, Naming, Setup, is_of
+from osimlite.lint.words import called
+from osimlite.schema.fields import Reference
+
+_NEEDED = {
+    "InverseKinematicsTool": ("model_file", "marker_file"),
+    "InverseDynamicsTool": ("model_file", "coordinates_file"),
+    "AnalyzeTool": ("model_file",),
+    "CMCTool": ("model_file", "desired_kinematics_file", "task_set_file"),
+    "RRATool": ("model_file", "desired_kinematics_file", "task_set_file"),
+    "GenericModelMaker": ("model_file",),
+    "ExternalLoads": ("datafile",),
+}
+"""Without which files OpenSim refuses a tool, or crashes."""
+
+
+@rule("OSIM821", "missing-input", severity=ERROR, about="document")
+def missing_input(setup: Setup, found: Found) -> None:
+    """A file that a setup reads is not there, or is not named.
+
+    ## What it does
+    Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is started there. What
+    another setup of the project writes need not be there yet. Points out names in other letter case and names with
+    backslashes, which only Windows understands.
+
+    ## Why is this bad
+    OpenSim refuses the setup; where the model is missing, inverse kinematics crashes. A missing file of controls is
+    told in the log only, and the tool runs without controls.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>no_such_model.osim</model_file>
+            <coordinates_file></coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for naming in setup.named_files("file"):
+        if os.path.isfile(naming.path) or setup.is_written(naming.path):
+            continue
+        slashed = naming.name.replace("\\", "/")
+        is_meant = slashed != naming.name and os.path.isfile(setup.place(slashed))
+        twin = slashed if is_meant else _in_other_case(naming)
+        why = "; a backslash separates no folders but on Windows" if "\\" in naming.name else ""
+        goes_on = is_of(naming.item, "ControlSetController")
+        fate = "OpenSim goes on without" if goes_on else "OpenSim refuses the setup"
+        found(
+            f"the file '{naming.name}' of {called(naming.item)} is not there{why}: {fate}",
+            naming.item, tag=naming.spec.tag, word=naming.name if naming.spec.tag == "force_set_files" else None,
+            suggestion=twin,
+        )  # fmt: skip
+    for item in setup.items:
+        for tag in _NEEDED.get(type(item).__name__, ()):
+            if str(getattr(item, tag)).strip().lower() in NOTHING:
+                found(f"{called(item)} names no {tag}: OpenSim refuses it", item, tag=tag)
+        if is_of(item, "AnalyzeTool"):
+            given = [tag for tag in ("states_file", "coordinates_file") if getattr(item, tag).lower() not in NOTHING]
+            if len(given) != 1:
+                what = "both a states_file and a coordinates_file" if given else "neither states nor coordinates"
+                found(f"{called(item)} names {what}: OpenSim refuses it", item, tag="coordinates_file")
+
+
+def _in_other_case(naming: Naming) -> str | None:
+    folder, last = os.path.split(naming.path)
+    try:
+        twin = next((name for name in os.listdir(folder or ".") if name.lower() == last.lower()), None)
+    except OSError:
+        return None
+    return None if twin is None else naming.name[: len(naming.name) - len(last)] + twin
+
+
+@rule("OSIM822", "input-of-another-kind", severity=ERROR, about="document")
+def input_of_another_kind(setup: Setup, found: Found) -> None:
+    """A file that a setup reads holds something else than is needed.
+
+    ## What it does
+    Compares the ending of a table, and the class at the top of a document, with what the property needs: a set of
+    forces is no set of external loads.
+
+    ## Why is this bad
+    OpenSim refuses the file.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.osim</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for naming in setup.named_files("file"):
+        assert isinstance(naming.spec.kind, Reference)
+        if not os.path.isfile(naming.path):
+            continue
+        wanted = naming.spec.kind.target.removesuffix(" file")
+        endings = {"table": (".sto", ".mot", ".trc", ".csv"), "marker data": (".trc", ".sto", ".c3d")}.get(wanted)
+        if endings is not None:
+            if not naming.name.lower().endswith(endings):
+                found(
+                    f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(endings)})",
+                    naming.item, tag=naming.spec.tag,
+                )  # fmt: skip
+        elif wanted[:1].isupper() and naming.name.lower().endswith((".xml", ".osim")):
+            top = setup.document(naming.name)
+            if top is not None and not is_of(top, wanted):
+                found(
+                    f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds a "
+                    f"{type(top).__name__}",
+                    naming.item, tag=naming.spec.tag,
+                )  # fmt: skip
+
+
+@rule("OSIM823", "lost-output", severity=WARNING, about="document")
+def lost_output(setup: Setup, found: Found) -> None:
+    """Results would be lost, or land in another place.
+
+    ## What it does
+    Looks at the folder for results, of which OpenSim makes the last part only, at folders of output files that are not
+    there, and at output files without a name.
+
+    ## Why is this bad
+    The tool runs to its end and its results are lost, with a line in the log at most.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <results_directory>no_such/folder</results_directory>
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <results_directory>results</results_directory>
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    if setup.folder is None:
+        return
+    for naming in setup.named_files("output-folder"):
+        above = os.path.dirname(os.path.abspath(os.path.join(setup.folder, naming.name)))
+        if not os.path.isdir(above):
+            found(
+                f"of '{naming.name}' OpenSim makes the last folder only: its results are lost",
+                naming.item, tag=naming.spec.tag,
+            )  # fmt: skip
+    # A tool makes its own folder before it writes.
+    made = {os.path.normpath(naming.name) for naming in setup.named_files("output-folder")}
+    for naming in setup.named_files("output-file"):
+        folder = os.path.dirname(naming.name)
+        if is_of(naming.item, "InverseDynamicsTool"):
+            if folder:
+                found(
+                    f"OpenSim leaves the folder of '{naming.name}' out and writes into results_directory",
+                    naming.item, tag=naming.spec.tag, suggestion=os.path.basename(naming.name),
+                )  # fmt: skip
+        elif folder and not os.path.isdir(os.path.join(setup.folder, folder)) and os.path.normpath(folder) not in made:
+            found(
+                f"the folder of '{naming.name}' is not there: OpenSim does not make it",
+                naming.item,
+                tag=naming.spec.tag,
+            )
+    for item in setup.items:
+        tag = {"InverseKinematicsTool": "output_motion_file", "InverseDynamicsTool": "output_gen_force_file"}.get(
+            type(item).__name__
+        )
+        if tag is not None and not getattr(item, tag).strip():
+            found(f"{called(item)} names no {tag}: its results get no proper file", item, tag=tag)

@@ -1,0 +1,208 @@
+"""OSIM83x: what a setup names in the model of its tool."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.words import called, nearest_name
+from osimlite.schema.base import Object, Unknown
+from osimlite.schema.fields import Reference
+from osimlite.schema.specs import FieldSpec, name_spec, reference_specs
+
+_IN_MODEL = {
+    "coordinate-name": "coordinate",
+    "body-name": "body",
+    "body-name-or-com": "body",
+    "joint-name": "joint",
+    "actuator-name": "actuator",
+    "muscle-name": "muscle",
+    "marker-name": "marker",
+    "frame-path-or-body-name": "frame",
+}
+"""The rules of references that lead into the model, with what they lead to."""
+_WORDS = {
+    "bodies": {"all", "center_of_mass"},
+    "body_names": {"all", "center_of_mass"},
+    "coordinates": {"all"},
+    "coordinate_names": {"all"},
+    "muscle_list": {"all"},
+    "moment_arm_coordinate_list": {"all"},
+    "joints_to_report_body_forces": {"ALL"},
+    "joint_names": {"ALL"},
+    "express_in_frame": {"child", "parent", "ground"},
+    "relative_to_body_name": {"none", "ground"},
+    "body_name": {"ground"},
+    "wrt_body": {"center_of_mass", "-1"},
+    "express_body": {"center_of_mass", "-1"},
+}
+"""What a property takes besides names."""
+_SILENT = {
+    "muscle_list",
+    "moment_arm_coordinate_list",
+    "joint_names",
+    "joints_to_report_body_forces",
+    "relative_to_body_name",
+    "force_expressed_in_body",
+    "point_expressed_in_body",
+    "markers",
+    "actuator_list",
+    "actuators_to_exclude",
+    "segment",
+}
+"""Properties of which OpenSim leaves out what it does not find."""
+
+
+class Word(NamedTuple):
+    """One name in a property."""
+
+    item: Object
+    spec: FieldSpec
+    text: str
+    nth: int = 0
+
+
+def _words(setup: Setup) -> Iterator[Word]:
+    for item in setup.items:
+        cls = type(item)
+        if cls.name_reference is not None and item.name:
+            yield Word(item, name_spec(cls), item.name)
+        for spec in reference_specs(cls):
+            value = getattr(item, spec.name)
+            for text in value if isinstance(value, tuple) else (value,):
+                if isinstance(text, str) and text.strip():
+                    yield Word(item, spec, text.strip())
+
+
+@rule("OSIM831", "unknown-name", severity=ERROR, about="document")
+def unknown_name(setup: Setup, found: Found) -> None:
+    """A setup names what the model of its tool does not have.
+
+    ## What it does
+    Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that a setup reads, names
+    in the model of the tool, with the sets of forces and markers that the tool adds to it.
+
+    ## Why is this bad
+    Most tools refuse the setup, some crash. Tasks of markers, scale factors of bodies, muscles of an analysis that are
+    not there are left out without a word (a warning).
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <AnalyzeTool name="analyze">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+            <AnalysisSet name="Analyses">
+                <objects> <BodyKinematics name="bk"> <bodies>thigh shnak</bodies> </BodyKinematics> </objects>
+            </AnalysisSet>
+        </AnalyzeTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <AnalyzeTool name="analyze">
+            <model_file>leg.osim</model_file>
+            <coordinates_file>leg.mot</coordinates_file>
+            <AnalysisSet name="Analyses">
+                <objects> <BodyKinematics name="bk"> <bodies>thigh shank</bodies> </BodyKinematics> </objects>
+            </AnalysisSet>
+        </AnalyzeTool>
+    </OpenSimDocument>
+    ```
+    """
+    tree = setup.tree
+    if tree is None:
+        return
+    unknown = {item.name for item in tree.by_class.get(Unknown, ())}
+    model = tree.model
+    known: dict[tuple[str, str], set[str]] = {}
+    for word in _words(setup):
+        kind = word.spec.kind
+        assert isinstance(kind, Reference)
+        what = _IN_MODEL.get(kind.rule)
+        if what is None or word.text in _WORDS.get(word.spec.tag, ()) or word.text.lower() == "unassigned":
+            continue
+        if is_of(word.item, "ObjectGroup") or (is_of(word.item, "Controller") and word.text in ("ALL",)):
+            continue
+        if not getattr(word.item, "on", True) or not getattr(word.item, "apply", True):
+            continue
+        reference = kind if kind.rule != "body-name-or-com" else Reference("body-name", "Body")
+        if tree.lookup(reference, word.text, model).target is not None:
+            continue
+        if what == "frame" and tree.lookup(Reference("model-path", "Frame"), word.text, model).target is not None:
+            continue
+        key = (what, kind.target)
+        if key not in known:
+            known[key] = setup.names_of({"body": "Body", "frame": "Body", "joint": "Joint"}.get(what, kind.target))
+        names = known[key]
+        if word.text in names or word.text in unknown:
+            continue
+        silent = word.spec.tag in _SILENT or is_of(word.item, "IKMarkerTask") or is_of(word.item, "BodyScale")
+        fate = "OpenSim leaves it out" if silent else "OpenSim refuses it"
+        more = "; it is written in small letters" if word.text == "ALL" else ""
+        of_name = word.spec.tag == "@name"
+        found(
+            f"the model has no {what} '{word.text}', which {called(word.item)} names: {fate}{more}",
+            word.item, tag=None if of_name else word.spec.tag, word=None if of_name else word.text,
+            attribute="name" if of_name else None, severity=WARNING if silent else None,
+            suggestion="all" if more else nearest_name(word.text, sorted(names)),
+        )  # fmt: skip
+
+
+@rule("OSIM832", "excluded-force", severity=WARNING, about="document")
+def excluded_force(setup: Setup, found: Found) -> None:
+    """Inverse dynamics is told to leave out a force that there is not.
+
+    ## What it does
+    Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups of the model's
+    forces, and, where there is no group, with the names of the forces: of a model with groups OpenSim looks at groups
+    alone. An empty list is pointed out where the model has muscles.
+
+    ## Why is this bad
+    The force takes part: moments of the joints are without what the passive muscles give.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <forces_to_exclude>Musles</forces_to_exclude>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <forces_to_exclude>Muscles</forces_to_exclude>
+            <coordinates_file>leg.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    tree = setup.tree
+    if tree is None:
+        return
+    forces = tree.model.force_set
+    groups = [group.name for group in forces.groups]
+    names = [force.name for force in forces.objects]
+    for tool in setup.named("InverseDynamicsTool"):
+        if not tool.forces_to_exclude and any(is_of(force, "Muscle") for force in forces.objects):
+            found(f"{called(tool)} leaves out no force: muscles take part", tool, tag="forces_to_exclude")
+        for word in tool.forces_to_exclude:
+            if word.upper() in ("ALL", "ACTUATORS", "MUSCLES") or word in (groups or names):
+                continue
+            why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
+            found(
+                f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
+                "nothing out for it",
+                tool, tag="forces_to_exclude", word=word,
+                suggestion=nearest_name(word, ["MUSCLES", "ACTUATORS", "ALL", *groups, *([] if groups else names)]),
+            )  # fmt: skip

@@ -1,0 +1,272 @@
+"""OSIM85x: settings of tools that cannot work, or do not what they seem to."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.setup import NOTHING, Setup, is_of
+from osimlite.lint.words import called, nearest_name
+
+
+@rule("OSIM851", "task-weight", severity=ERROR, about="document")
+def task_weight(setup: Setup, found: Found) -> None:
+    """The weights of tasks make no sense.
+
+    ## What it does
+    Looks for weights that are negative or no number, for tasks without weight (their default is 0), for markers and
+    coordinates that have two tasks, and for sets of which no task applies.
+
+    ## Why is this bad
+    OpenSim refuses negative weights. A task without weight is not tracked, but counted in the error. If no task
+    applies, all markers count the same.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <IKTaskSet name="tasks">
+            <objects> <IKMarkerTask name="asis"> <weight>-5</weight> </IKMarkerTask> </objects>
+        </IKTaskSet>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <IKTaskSet name="tasks">
+            <objects> <IKMarkerTask name="asis"> <weight>5</weight> </IKMarkerTask> </objects>
+        </IKTaskSet>
+    </OpenSimDocument>
+    ```
+    """
+    for tasks in setup.named("IKTaskSet"):
+        applied = [task for task in tasks.objects if getattr(task, "apply", False)]
+        if tasks.objects and not applied:
+            found(
+                "no task of this set applies: OpenSim takes all markers, each with the weight 1", tasks,
+                severity=WARNING,
+            )  # fmt: skip
+        seen: Counter[tuple[str, str]] = Counter()
+        for task in applied:
+            seen[type(task).__name__, task.name] += 1
+            if seen[type(task).__name__, task.name] == 2:
+                found(f"'{task.name}' has a task already: one of them counts", task, attribute="name", severity=WARNING)
+            if task.weight < 0:
+                found(f"the weight of {called(task)} is {task.weight:g}: OpenSim refuses it", task, tag="weight")
+            elif task.weight == 0:
+                found(f"{called(task)} has no weight: nothing is fitted to it", task, tag="weight", severity=WARNING)
+            if is_of(task, "IKCoordinateTask") and task.value_type == "manual_value" and abs(task.value) > 6.3:
+                found(
+                    f"the value of {called(task)} is {task.value:g}, and is in radians or metres", task, tag="value",
+                    severity=WARNING,
+                )  # fmt: skip
+
+
+@rule("OSIM852", "tool-setting", severity=ERROR, about="document")
+def tool_setting(setup: Setup, found: Found) -> None:
+    """A tool has a setting with which it cannot work.
+
+    ## What it does
+    Looks for accuracies and error tolerances that are not positive or far too large, tools without an analysis,
+    analyses with one name, that are off, or whose step is not positive, static optimization without the model's forces
+    or with an exponent of 1 or less, forces that replace those of the model, and controllers that are off.
+
+    ## Why is this bad
+    Some make OpenSim crash or run for ever, some give other results without a word.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>leg.osim</model_file>
+            <accuracy>0.5</accuracy>
+            <marker_file>leg.trc</marker_file>
+            <output_motion_file>ik.mot</output_motion_file>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>leg.osim</model_file>
+            <accuracy>1e-5</accuracy>
+            <marker_file>leg.trc</marker_file>
+            <output_motion_file>ik.mot</output_motion_file>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for tool in setup.named("InverseKinematicsToolBase"):
+        if 0.0 < tool.accuracy < math.inf and tool.accuracy > 0.01:
+            found(
+                f"the accuracy is {tool.accuracy:g}: poses are hardly fitted at all",
+                tool,
+                tag="accuracy",
+                severity=WARNING,
+            )
+        elif tool.accuracy == 0.0:
+            found("an accuracy of 0 is never reached", tool, tag="accuracy", severity=WARNING)
+    for tool in setup.named("AbstractTool"):
+        if not tool.integrator_error_tolerance > 0.0:
+            found(
+                f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
+                tool, tag="integrator_error_tolerance",
+            )  # fmt: skip
+        if tool.maximum_number_of_integrator_steps < 10:
+            found(
+                f"the run ends after {tool.maximum_number_of_integrator_steps} steps",
+                tool, tag="maximum_number_of_integrator_steps", severity=WARNING,
+            )  # fmt: skip
+        if tool.replace_force_set and not is_of(tool, "RRATool"):
+            found(
+                "the forces of force_set_files replace those of the model: its muscles are gone",
+                tool, tag="replace_force_set", severity=WARNING,
+            )  # fmt: skip
+        if is_of(tool, "AnalyzeTool") and not tool.analysis_set.objects:
+            found(f"{called(tool)} has no analysis: OpenSim refuses it", tool)
+    names = Counter(item.name for item in setup.named("Analysis"))
+    for analysis in setup.named("Analysis"):
+        if not analysis.on:
+            found(f"{called(analysis)} is off", analysis, tag="on", severity=INFO)
+        if analysis.step_interval < 1:
+            found(f"a step interval of {analysis.step_interval}", analysis, tag="step_interval", severity=WARNING)
+        if names[analysis.name] > 1:
+            names[analysis.name] = 0
+            found(
+                f"two analyses are called '{analysis.name}', and write to the same files", analysis, attribute="name",
+                severity=WARNING,
+            )  # fmt: skip
+        if is_of(analysis, "StaticOptimization"):
+            if not analysis.use_model_force_set:
+                found("without the forces of the model OpenSim crashes", analysis, tag="use_model_force_set")
+            if not analysis.activation_exponent > 1.0:
+                found(
+                    f"an exponent of {analysis.activation_exponent:g} leaves nothing to be made small", analysis,
+                    tag="activation_exponent", severity=WARNING,
+                )  # fmt: skip
+            if analysis.optimizer_max_iterations < 10:
+                found(
+                    f"the optimizer stops after {analysis.optimizer_max_iterations} iterations", analysis,
+                    tag="optimizer_max_iterations", severity=WARNING,
+                )  # fmt: skip
+            if analysis.optimizer_convergence_criterion > 0.05:
+                found(
+                    f"the optimizer stops at {analysis.optimizer_convergence_criterion:g}, far from its goal", analysis,
+                    tag="optimizer_convergence_criterion", severity=WARNING,
+                )  # fmt: skip
+        for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
+            if getattr(analysis, tag, None) == ():
+                found(f"{called(analysis)} names no {what}: nothing is written", analysis, tag=tag, severity=WARNING)
+        if is_of(analysis, "JointReaction"):
+            for word in analysis.apply_on_bodies:
+                if word not in ("child", "parent"):
+                    found(
+                        f"'{word}' is neither child nor parent: OpenSim refuses it", analysis, tag="apply_on_bodies",
+                        word=word, suggestion=nearest_name(word, ["child", "parent"]),
+                    )  # fmt: skip
+            if len(analysis.apply_on_bodies) not in (1, len(analysis.joint_names)):
+                found(
+                    f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
+                    analysis, tag="apply_on_bodies",
+                )  # fmt: skip
+    for controller in setup.named("Controller") if setup.tool is not None else ():
+        if not controller.enabled:
+            found(f"{called(controller)} is off", controller, tag="enabled", severity=INFO)
+
+
+@rule("OSIM853", "scale-setting", severity=ERROR, about="document")
+def scale_setting(setup: Setup, found: Found) -> None:
+    """A setting of the scale tool has no effect, or makes it fail.
+
+    ## What it does
+    Looks at the order of scaling, at measurements without a pair of two different markers, at axes other than X, Y and
+    Z, at the mass, at steps that are left out, and at the times that are averaged.
+
+    ## Why is this bad
+    A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
+    the body keeps its size.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MeasurementSet name="measurements">
+            <objects>
+                <Measurement name="thigh">
+                    <MarkerPairSet name="pairs">
+                        <objects> <MarkerPair name="first"> <markers>asis</markers> </MarkerPair> </objects>
+                    </MarkerPairSet>
+                </Measurement>
+            </objects>
+        </MeasurementSet>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MeasurementSet name="measurements">
+            <objects>
+                <Measurement name="thigh">
+                    <MarkerPairSet name="pairs">
+                        <objects> <MarkerPair name="first"> <markers>asis knee</markers> </MarkerPair> </objects>
+                    </MarkerPairSet>
+                </Measurement>
+            </objects>
+        </MeasurementSet>
+    </OpenSimDocument>
+    ```
+    """
+    for tool in setup.named("ScaleTool"):
+        if tool.mass == 0.0:
+            found(f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is", tool, tag="mass", severity=WARNING)
+    for scaler in setup.named("ModelScaler"):
+        if not scaler.apply:
+            found("the model is not scaled", scaler, tag="apply", severity=WARNING)
+            continue
+        for word in scaler.scaling_order:
+            if word not in ("measurements", "manualScale"):
+                found(
+                    f"'{word}' is no way of scaling: OpenSim refuses it", scaler, tag="scaling_order", word=word,
+                    suggestion=nearest_name(word, ["measurements", "manualScale"]),
+                )  # fmt: skip
+        measures = "measurements" in scaler.scaling_order
+        if scaler.scaling_order[:1] == ("manualScale",) and measures:
+            found(
+                "measurements come last and overwrite what is scaled by hand", scaler, tag="scaling_order",
+                severity=WARNING,
+            )  # fmt: skip
+        if measures and scaler.measurement_set.objects and scaler.marker_file.strip().lower() in NOTHING:
+            found(f"{called(scaler)} measures, and names no marker_file: OpenSim refuses it", scaler, tag="marker_file")
+    for measurement in setup.named("Measurement"):
+        if not measurement.apply:
+            continue
+        if not measurement.marker_pair_set.objects:
+            found(f"{called(measurement)} has no pair of markers: it measures nothing", measurement, severity=WARNING)
+        for pair in measurement.marker_pair_set.objects:
+            if len(pair.markers) != 2:
+                found(f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes", pair, tag="markers")
+            elif pair.markers[0] == pair.markers[1]:
+                found(
+                    f"both markers of a pair are '{pair.markers[0]}': OpenSim leaves {called(measurement)} out", pair,
+                    tag="markers", severity=WARNING,
+                )  # fmt: skip
+    for scale in setup.named("BodyScale"):
+        for axis in scale.axes:
+            if axis not in ("X", "Y", "Z"):
+                found(
+                    f"'{axis}' is none of the axes X, Y and Z: OpenSim leaves it out", scale, tag="axes", word=axis,
+                    suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None,
+                )  # fmt: skip
+    for placer in setup.named("MarkerPlacer"):
+        if not placer.apply:
+            found("the markers are not placed, and the tool says that it failed", placer, tag="apply", severity=WARNING)
+        elif placer.output_model_file.strip().lower() in NOTHING:
+            found("the model with its markers placed is not written", placer, tag="output_model_file", severity=WARNING)
+        if placer.apply and not placer.time_range[0] < placer.time_range[-1]:
+            found(
+                f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
+                placer, tag="time_range",
+            )  # fmt: skip

@@ -1,0 +1,305 @@
+"""A setup under check: what a tool is told to do, or a set of tasks, loads, markers that a tool reads.
+
+What a setup names is looked for where OpenSim looks for it; a set that a tool reads is checked with the model of the
+tool that names it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+from osimlite.document.reader import read_document
+from osimlite.document.source import Source
+from osimlite.document.survey import Survey
+from osimlite.errors import OsimliteError
+from osimlite.files import read_file
+from osimlite.lint.config import Config
+from osimlite.lint.engine import Rule
+from osimlite.lint.subject import Subject
+from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours, is_table
+from osimlite.lint.table import Table
+from osimlite.schema.base import Object
+from osimlite.schema.fields import Reference
+from osimlite.schema.model import Model
+from osimlite.schema.specs import FieldSpec, reference_specs
+from osimlite.schema.tree import Tree
+
+NOTHING = ("", "unassigned")
+"""What stands for no file, in small letters."""
+_MOST_NEIGHBOURS = 200
+_LARGEST_NEIGHBOUR = 2_000_000
+_OF_MODELS = frozenset(("OSIM004", "OSIM110", "OSIM111", "OSIM209"))
+"""Rules of text, tags and values that hold of models only."""
+
+
+class Naming(NamedTuple):
+    """A file that an object names, and where it would be."""
+
+    item: Object
+    spec: FieldSpec
+    name: str
+    path: str
+
+
+class Setup(Subject):
+    """A document whose top is no model. `top` is None if it cannot be read."""
+
+    about: ClassVar[str] = "document"
+
+    def __init__(self, found: Survey, config: Config | None = None) -> None:
+        super().__init__(found, config)
+        self.top: Object | None = found.document.top if found.document else None
+        self._looked_at: dict[str, None] = {}
+
+    def is_for(self, rule: Rule) -> bool:
+        """Whether a rule has anything to look at: what is said of text, tags and values holds of every document."""
+        if rule.about == "model":
+            return rule.code not in _OF_MODELS and (
+                rule.code[4] == "0" or (rule.code[4] in "12" and self.top is not None)
+            )
+        return rule.about == self.about and self.top is not None and self.sure_until is None
+
+    @cached_property
+    def items(self) -> list[Object]:
+        """Every object, in the order of the document."""
+        return [] if self.top is None else list(self.top.walk())
+
+    @cached_property
+    def by_class(self) -> dict[type[Object], list[Object]]:
+        """Every object by its exact class."""
+        found: dict[type[Object], list[Object]] = {}
+        for item in self.items:
+            found.setdefault(type(item), []).append(item)
+        return found
+
+    def owner(self, item: Object) -> Any:
+        """The object itself: there is no tree of components."""
+        return item
+
+    def outside(self) -> list[str] | None:
+        """Every path that was looked at."""
+        known = super().outside()
+        return None if known is None else [*known, *self._looked_at]
+
+    # ------------------------------------------------------------------------------------------------- files
+
+    def named_files(self, *rules: str) -> Iterator[Naming]:
+        """Every file that an object of the document names, by the rules of its properties."""
+        for item in self.items:
+            for spec in reference_specs(type(item)):
+                if isinstance(spec.kind, Reference) and spec.kind.rule in rules:
+                    value = getattr(item, spec.name)
+                    for name in value if isinstance(value, tuple) else (value,):
+                        if isinstance(name, str) and name.strip().lower() not in NOTHING:
+                            yield Naming(item, spec, name, self.place(name.strip()))
+
+    def place(self, name: str) -> str:
+        """Where OpenSim finds a file that is named here, if it was started in the folder of the setup."""
+        folder = str(self.folder or Path())
+        path = os.path.normpath(os.path.join(folder, name))
+        self._looked_at[path] = None
+        if not os.path.isfile(path):
+            self._looked_at[os.path.dirname(path)] = None
+            if os.path.isfile(name) and not os.path.isabs(name):
+                return name
+        return path
+
+    def table(self, name: str) -> Table | None:
+        """The table in a file that is named here; None if there is none, or it cannot be read."""
+        if name.strip().lower() in NOTHING or not is_table(name):
+            return None
+        path = self.place(name.strip())
+        try:
+            return _table(path, os.stat(path).st_mtime_ns)
+        except (OSError, OsimliteError, ValueError):
+            return None
+
+    def document(self, name: str) -> Object | None:
+        """The top of a document that is named here; None if there is none, or it cannot be read."""
+        if name.strip().lower() in NOTHING:
+            return None
+        return _top(self.place(name.strip()))
+
+    # ------------------------------------------------------------------------------------------------- context
+
+    @cached_property
+    def neighbours(self) -> list[tuple[str, Object]]:
+        """Every tool that is set up in this folder or in one beside it, above or below, with the path of its setup."""
+        if self.folder is None:
+            return []
+        here = self.folder.resolve()
+        return self._tools_in([here, here.parent, *_folders_in(here), *_folders_in(here.parent)])
+
+    def _tools_in(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
+        found = []
+        for folder in dict.fromkeys(folders):
+            self._looked_at[str(folder)] = None
+            for file in _documents_in(folder)[:_MOST_NEIGHBOURS]:
+                top = _top(file) if b"Tool" in _beginning(file) else None
+                if top is not None and (hasattr(top, "model_file") or hasattr(top, "generic_model_maker")):
+                    found.append((file, top))
+                    self._looked_at[file] = None
+        return found
+
+    @cached_property
+    def tool(self) -> tuple[str, Object] | None:
+        """The tool that this is, or that reads this; with the path of its setup."""
+        if self.top is None or self.file is None:
+            return None
+        if hasattr(self.top, "model_file") or hasattr(self.top, "generic_model_maker"):
+            return self.file, self.top
+        here = os.path.realpath(self.file)
+        for file, top in self.neighbours:
+            for item in top.walk():
+                for spec in reference_specs(type(item)):
+                    if isinstance(spec.kind, Reference) and spec.kind.rule == "file":
+                        value = getattr(item, spec.name)
+                        for name in value if isinstance(value, tuple) else (value,):
+                            if name and os.path.realpath(os.path.join(os.path.dirname(file), name)) == here:
+                                return file, top
+        return None
+
+    @cached_property
+    def tree(self) -> Tree | None:  # type: ignore[override]
+        """The component tree of the model that the tool works on; None if there is none to be read."""
+        if self.tool is None:
+            return None
+        file, top = self.tool
+        name = getattr(getattr(top, "generic_model_maker", top), "model_file", "")
+        if name.strip().lower() in NOTHING:
+            return None
+        path = os.path.normpath(os.path.join(os.path.dirname(file), name.strip()))
+        self._looked_at[path] = None
+        return _tree(path)
+
+    @property
+    def tool_folder(self) -> str:
+        """The folder of the setup of the tool."""
+        return os.path.dirname(self.tool[0]) if self.tool is not None else ""
+
+    def beside_tool(self, name: str) -> Object | None:
+        """The top of a document that the tool names."""
+        if not name or name.strip().lower() in NOTHING:
+            return None
+        path = os.path.join(self.tool_folder, name.strip())
+        self._looked_at[path] = None
+        return _top(path)
+
+    def names_of(self, target: str) -> set[str]:
+        """The names of all components of a class that the tool works with: those of the model and of added sets."""
+        if self.tree is None or self.tool is None:
+            return set()
+        names = {item.name for item in self.tree.of_class(target).values()}
+        top = self.tool[1]
+        files = [*getattr(top, "force_set_files", ()), getattr(top, "marker_set_file", "")]
+        files.append(getattr(getattr(top, "generic_model_maker", None), "marker_set_file", ""))
+        for file in files:
+            added = self.beside_tool(file)
+            names |= {item.name for item in added.walk() if is_of(item, target)} if added is not None else set()
+        return names
+
+    def is_written(self, path: str) -> bool:
+        """Whether another setup of the project writes a file: it need not be there yet."""
+        wanted = os.path.realpath(path)
+        around = self._tools_in(list(Path(wanted).parents)[:3])
+        for file, top in dict(self.neighbours + around).items():
+            if self.file is not None and os.path.samefile(file, self.file):
+                continue
+            folder = os.path.dirname(file)
+            results = getattr(top, "results_directory", "") or "."
+            within = os.path.realpath(os.path.join(folder, results))
+            # Tools that run through time call their results by their own name.
+            if os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(f"{top.name}_"):
+                return True
+            for item in top.walk():
+                for spec in reference_specs(type(item)):
+                    if isinstance(spec.kind, Reference) and spec.kind.rule == "output-file":
+                        name = getattr(item, spec.name)
+                        if name and wanted in (
+                            os.path.realpath(os.path.join(folder, name)),
+                            os.path.realpath(os.path.join(within, name)),
+                        ):
+                            return True
+        return False
+
+
+def is_of(item: Object, target: str) -> bool:
+    """Whether an object is of the class with this name, or of one derived from it."""
+    return any(base.__name__ == target for base in type(item).__mro__)
+
+
+def stamped(path: str) -> tuple[str, int] | None:
+    """A path with the time at which its file was written."""
+    try:
+        return path, os.stat(path).st_mtime_ns
+    except (OSError, ValueError):
+        return None
+
+
+def _top(path: str) -> Object | None:
+    stamp = stamped(path)
+    return None if stamp is None else _top_at(*stamp)
+
+
+@lru_cache(maxsize=256)
+def _top_at(path: str, changed: int) -> Object | None:
+    try:
+        return read_document(Source.of_file(path), of=Object).top
+    except (OsimliteError, ValueError, RecursionError):
+        return None
+
+
+def _tree(path: str) -> Tree | None:
+    stamp = stamped(path)
+    return None if stamp is None else _tree_at(*stamp)
+
+
+@lru_cache(maxsize=4)
+def _tree_at(path: str, changed: int) -> Tree | None:
+    top = _top_at(path, changed)
+    return Tree(top) if isinstance(top, Model) else None
+
+
+@lru_cache(maxsize=8)
+def _table(path: str, changed: int) -> Table:
+    return Table(read_file(path), path)
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(Path(entry.path) for entry in entries if entry.is_dir() and not entry.name.startswith("."))[
+                :100
+            ]
+    except OSError:
+        return []
+
+
+@lru_cache(maxsize=256)
+def _documents_at(folder: str, changed: int) -> list[str]:
+    with os.scandir(folder) as entries:
+        return sorted(
+            entry.path
+            for entry in entries
+            if entry.name.lower().endswith(DOCUMENTS)
+            and entry.is_file()
+            and entry.stat().st_size < _LARGEST_NEIGHBOUR
+            and begins_as_ours(entry.path)
+        )
+
+
+def _documents_in(folder: Path) -> list[str]:
+    stamp = stamped(str(folder))
+    return [] if stamp is None else _documents_at(*stamp)
+
+
+def _beginning(file: str) -> bytes:
+    try:
+        with open(file, "rb") as stream:
+            return stream.read(2000)
+    except OSError:
+        return b""

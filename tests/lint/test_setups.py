@@ -1,0 +1,86 @@
+"""Setups: what they name in the model, in the data and among each other."""
+
+from __future__ import annotations
+
+import random
+from shutil import copy
+
+import pytest
+
+from osimlite.cli._validating import run as validate_paths
+from osimlite.lint import Config, validate
+from osimlite.lint.engine import run, subject_of
+from osimlite.lint.many import check_files
+
+
+@pytest.fixture
+def project(fixtures, tmp_path, monkeypatch):
+    """A folder with a model, data and two setups, in which the program runs."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder = tmp_path / "project"
+    folder.mkdir()
+    for file in (fixtures / "lint").glob("leg*"):
+        copy(file, folder)
+    for code, name in (("OSIM821", "pass-ik.xml"), ("OSIM853", "pass-scale.xml"), ("OSIM852", "pass-analyze.xml")):
+        text = (fixtures / "lint" / code / name).read_text().replace("../", "")
+        (folder / name.removeprefix("pass-")).write_text(text)
+    (folder / "pom.xml").write_text("<project/>")
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_a_folder_is_checked_as_a_whole(project, capsys):
+    (project / "leg_no_knee.mot").unlink()
+    (project / "leg_degrees.mot").unlink()
+    assert validate_paths(["."], cached=False) == 0
+    assert capsys.readouterr().out.startswith("Nothing found in 8")
+    # The name of a marker is changed in the model alone.
+    model = project / "leg.osim"
+    model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
+    report = check_files(sorted(str(file) for file in project.glob("*.xml") if file.name != "pom.xml"), Config())
+    assert {(finding.file.rpartition("/")[2], finding.code) for finding in report} == {
+        ("ik.xml", "OSIM831"),
+        ("scale.xml", "OSIM831"),
+    }
+
+
+def test_what_was_found_in_a_setup_is_found_again_when_its_model_changes(project):
+    assert not check_files(["ik.xml"], Config()).findings
+    assert not check_files(["ik.xml"], Config()).findings
+    model = project / "leg.osim"
+    model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
+    assert dict(check_files(["ik.xml"], Config()).codes) == {"OSIM831": 1}
+
+
+def test_what_another_setup_writes_need_not_be_there(project):
+    later = (project / "ik.xml").read_text().replace("leg.osim", "placed.osim").replace('name="ik"', 'name="again"')
+    (project / "later.xml").write_text(later)
+    assert str(validate(project / "later.xml")) == "nothing found"
+    (project / "scale.xml").unlink()
+    assert dict(validate(project / "later.xml").codes) == {"OSIM821": 1}
+
+
+def test_loads_are_checked_with_the_model_of_the_tool_that_names_them(project, fixtures):
+    tool = (fixtures / "lint" / "OSIM822" / "pass-loads.xml").read_text().replace("../", "")
+    assert str(validate(project / "leg_grf.xml")) == "nothing found"
+    loads = project / "leg_grf.xml"
+    loads.write_text(loads.read_text().replace(">shank<", ">shin<"))
+    assert str(validate(loads)) == "nothing found"
+    (project / "id.xml").write_text(tool)
+    (finding,) = validate(loads).findings
+    assert (finding.code, finding.line) == ("OSIM831", 6)
+
+
+@pytest.mark.parametrize("name", ["ik.xml", "scale.xml", "analyze.xml", "leg_grf.xml"])
+def test_no_damage_makes_the_check_fail(project, name):
+    good = (project / name).read_bytes()
+    draw = random.Random(2)
+    for size in range(0, len(good), 41):
+        (project / name).write_bytes(good[:size])
+        run(subject_of(name))
+    for _ in range(80):
+        damaged = bytearray(good)
+        for _ in range(draw.randint(1, 3)):
+            damaged[draw.randrange(len(damaged))] = draw.choice(b' <>/"=.x9\xff-')
+        (project / name).write_bytes(bytes(damaged))
+        run(subject_of(name))
