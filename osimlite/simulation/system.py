@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
@@ -198,7 +197,7 @@ class System:
                 self.mechanism.rate_matrix(self.state.values(y))
             except SimulationError as error:
                 return error
-        if status == layout.SINGULAR_MASS and not all(isinstance(item, Lock) for item in self.mechanism.constraints):
+        if status == layout.SINGULAR_MASS and self.structure[layout.CONSTRAINED]:
             try:
                 self.mechanism.acceleration(self.state.values(y), self.state.speeds(y), time=t)
             except SimulationError as error:

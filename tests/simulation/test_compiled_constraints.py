@@ -268,6 +268,18 @@ def test_a_motion_without_mass_that_no_constraint_decides_is_named():
         simulate(model, 0.1, "compiled")
 
 
+def test_a_motion_without_mass_is_named_where_a_coordinate_that_moves_with_others_is_locked():
+    from osimlite import BallJoint, Body, Model
+
+    model = Model(name="ball")
+    body = model.add(Body(name="body", mass=0.0, inertia=(0.0,) * 6))
+    joint = model.add(BallJoint(name="joint").between(model.ground, body))
+    joint.coordinates[0].locked = True
+    mechanism = build_mechanism(model)
+    with pytest.raises(SimulationError, match="moves no mass"):
+        CompiledEngine(mechanism, Forces(())).derivative(0.0, [0.0, 0.0, 0.0, 99.0, 99.0, 99.0])
+
+
 def test_an_unknown_constraint_is_refused_by_name():
     mechanism = build_mechanism(four_bars())
 
