@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import hypot
 
 Point = tuple[float, float, float]
 """x, y, and the slope there."""
@@ -52,8 +53,7 @@ def _section(first: Point, last: Point, curviness: float) -> tuple[float, ...]:
     # Where the lines meet.
     x = (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1) if abs(slope0 - slope1) > 2.0**-26 else (x1 + x0) / 2
     y = (x - x1) * slope1 + y1
-    longest = (x1 - x0) ** 2 + (y1 - y0) ** 2
-    if not max((x - x0) ** 2 + (y - y0) ** 2, (x - x1) ** 2 + (y - y1) ** 2) < longest:
+    if not max(hypot(x - x0, y - y0), hypot(x - x1, y - y1)) < hypot(x1 - x0, y1 - y0):
         raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
     c = 0.1 + 0.8 * curviness
     _, *of_x = _polynomial(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)

@@ -68,6 +68,7 @@ def force_velocity(
     )
     _require(isometric > 1.0, "its isometric_slope is not above 1")
     _require(0.0 <= eccentric_end <= eccentric_near, "its eccentric_slope_at_vmax is not from 0 to the slope near vmax")
+    _require(eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}")
     _below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
     points = [
         (-1.0, 0.0, concentric_end),
@@ -102,7 +103,7 @@ def tendon_force_length(
     one: float, stiffness: float | None = None, toe: float | None = None, curviness: float | None = None
 ) -> list[float]:
     """Force over tendon length."""
-    _require(one > 0.0, "its strain_at_one_norm_force is not positive")
+    _require(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
     stiffness, toe, curviness = _given_or(
         (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness_at_one_norm_force"
     )

@@ -128,14 +128,14 @@ class Kind:
             ModelError: it names what does not exist, or a parameter has no meaning.
         """
         path = builder.path(force)
+        if self.check is not None:
+            self.check(builder, force)
         states = tuple(
             StateVariable(f"{path}/{state.name}", state.start(force), state.is_simbody) if state.exists(force) else None
             for state in self.states
         )
         if not (force.appliesForce or self.goes_on):
             return ForceOff(self.component, path, force.name, None, (), states)
-        if self.check is not None:
-            self.check(builder, force)
         values = tuple(term.read(builder, force) for term in self.terms)
         made = DeclaredForce if force.appliesForce else ForceOff
         return made(self.component, path, force.name, self.geometry.read(builder, force), values, states)

@@ -33,7 +33,7 @@ PENNATION = Number(
 
 def height(builder: ElementBuilder, force: Any) -> tuple[float]:
     """Of the fibers across the tendon, m."""
-    return (force.optimal_fiber_length * sin(force.pennation_angle_at_optimal),)
+    return (force.optimal_fiber_length * sin(Number("pennation_angle_at_optimal").read(builder, force)),)
 
 
 def curve(

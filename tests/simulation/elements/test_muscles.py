@@ -9,7 +9,7 @@ import pytest
 
 from osimlite.errors import ModelError, SimulationError
 from osimlite.multibody import build_mechanism
-from osimlite.schema.muscle_curves import ForceVelocityCurve, TendonForceLengthCurve
+from osimlite.schema.muscle_curves import ActiveForceLengthCurve, ForceVelocityCurve, TendonForceLengthCurve
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
@@ -129,7 +129,12 @@ def test_numbers_of_another_model_of_the_structure():
         ("thelen_default", "optimal_fiber_length", 0.0, "is not positive"),
         ("thelen_default", "tendon_slack_length", -1.0, "is not positive"),
         ("thelen_default", "Flen", 1.0, "is not above 1"),
+        ("thelen_default", "Flen", 0.0, "is not above 1 / Flen"),
+        ("thelen_default", "KshapePassive", 1e308, "is not between"),
+        ("thelen_default", "KshapePassive", 1e-320, "is not between"),
         ("thelen_default", "max_isometric_force", math.nan, "is not a finite number"),
+        ("millard_damped", "maximum_pennation_angle", math.inf, "is not a finite number"),
+        ("rigidtendon", "pennation_angle_at_optimal", math.inf, "is not a finite number"),
         ("thelen_default", "ignore_tendon_compliance", True, "is true, which a Thelen2003Muscle cannot do"),
         ("thelen_default", "fv_linear_extrap_threshold", 0.7, "is not above 1 / Flen"),
         ("thelen_default", "min_control", 0.0, "is below its minimum_activation, 0.01"),
@@ -147,6 +152,24 @@ def test_numbers_of_another_model_of_the_structure():
             "force_velocity_curve",
             ForceVelocityCurve(isometric_slope=0.5),
             "makes no curve: its isometric_slope is not above 1",
+        ),
+        (
+            "millard_damped",
+            "force_velocity_curve",
+            ForceVelocityCurve(eccentric_slope_near_vmax=0.0),
+            "makes no curve: its eccentric_slope_near_vmax is less than 1.49e-08",
+        ),
+        (
+            "millard_damped",
+            "active_force_length_curve",
+            ActiveForceLengthCurve(max_norm_active_fiber_length=1e308),
+            "has a parameter that is not a finite number",
+        ),
+        (
+            "millard_damped",
+            "tendon_force_length_curve",
+            TendonForceLengthCurve(strain_at_one_norm_force=1e-160),
+            "makes no curve: its strain_at_one_norm_force is not above",
         ),
     ],
 )

@@ -19,8 +19,9 @@ def _check(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
         force,
         *(Number(flag, lambda x: x == 0.0, "is true, which a Thelen2003Muscle cannot do") for flag in flags),
         Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),
-        *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain", "KshapePassive")),
-        Number("fv_linear_extrap_threshold", lambda x: x > 1.0 / force.Flen, "is not above 1 / Flen"),
+        *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain")),
+        Number("KshapePassive", lambda x: 1e-9 < x < 700.0, "is not between 1e-9 and 700"),
+        Number("fv_linear_extrap_threshold", lambda x: x * force.Flen > 1.0, "is not above 1 / Flen"),
     )
 
 
