@@ -1,13 +1,15 @@
-"""The JSON Schema of models written as YAML or JSON, generated from the declarations.
+"""The JSON Schema of models and other documents as plain data, generated from the declarations.
 
 ``python -m osimlite.schema.json_schema > schemas/osim-4.6.schema.json`` writes the file that editors use; a test
-keeps it current. :mod:`osimlite.document.data` reads what the schema describes.
+keeps it current. :mod:`osimlite.document.data` reads what the schema describes. With the tag of another class, such
+as ``ScaleTool``, the schema is that of its documents.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -28,8 +30,8 @@ _SCALARS: dict[str, dict[str, Any]] = {
 }
 
 
-def json_schema() -> dict[str, Any]:
-    """The schema of a model: one definition per class that a file can hold, and one per kind of component."""
+def json_schema(tag: str = "Model") -> dict[str, Any]:
+    """The schema of a document that holds a `tag`: one definition per class of files, and one per kind of object."""
     classes = _classes()
     definitions: dict[str, Any] = {"Unknown": _unknown()}
     for cls in classes:
@@ -39,8 +41,8 @@ def json_schema() -> dict[str, Any]:
             definitions[cls.tag] = {"description": _summary(cls), **_any_of(cls, classes)}
     return {
         "$schema": DIALECT,
-        "title": "An OpenSim 4.6 model, as osimlite reads it from YAML and JSON",
-        "$ref": "#/$defs/Model",
+        "title": f"A {tag} of OpenSim 4.6 as plain data",
+        "$ref": f"#/$defs/{tag}",
         "$defs": dict(sorted(definitions.items())),
     }
 
@@ -157,4 +159,4 @@ def _is_plain(value: Any) -> bool:
 
 
 if __name__ == "__main__":
-    print(json.dumps(json_schema(), indent=1))  # noqa: T201
+    print(json.dumps(json_schema(*sys.argv[1:2]), indent=1))  # noqa: T201

@@ -25,6 +25,22 @@ def test_info_breaks_no_name_and_says_units():
     assert any("8 Coordinate," in line for line in lines) and max(map(len, lines)) <= 80
 
 
+def test_info_of_a_setup_file_names_its_files(fixtures):
+    rows = [line.split(None, 1) for line in run("info", fixtures / "documents" / "analyze.xml").out.splitlines()]
+    assert ["AnalyzeTool", "walk"] in [[word.strip() for word in row] for row in rows]
+    assert ["force_set_files", "residuals.xml reserves.xml"] in [[word.strip() for word in row] for row in rows]
+    assert any("1 StaticOptimization" in row[-1] for row in rows if row)
+
+
+def test_format_and_diff_of_setup_files(fixtures, tmp_path):
+    old = shutil.copy(fixtures / "documents" / "ik.xml", tmp_path / "old.xml")
+    assert run("format", "--check", old).code == 0
+    new = tmp_path / "new.xml"
+    new.write_text(Path(old).read_text().replace("<weight>10<", "<weight>20<"))
+    result = run("diff", old, new)
+    assert (result.code, result.out.splitlines()) == (1, ["  trial3", "    IKTaskSet.objects[r.knee].weight: 10 -> 20"])
+
+
 def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     model = osimlite.Model(name="m")
     body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))

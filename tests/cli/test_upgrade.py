@@ -96,3 +96,11 @@ def test_numbers_as_opensim_prints_them(old: Path) -> None:
     assert "<location>0.10000000000000001 0 0</location>" in old.read_text()
     with pytest.raises(OsimliteError, match="--numbers"):
         run(old, "--numbers", "many")
+
+
+def test_a_setup_file_keeps_its_kind(fixtures: Path, tmp_path: Path) -> None:
+    setup = Path(shutil.copy(fixtures / "versions" / "one_trial.xml", tmp_path / "ik.xml"))
+    output = run(setup).output
+    target = setup.with_name(f"ik_{CURRENT_VERSION}.xml")
+    assert target.read_text() == (fixtures / "versions" / "upgraded" / "one_trial.xml").read_text()
+    assert output.splitlines()[-1] == f"{target}: version 20201 to {CURRENT_VERSION}, 2 changes"

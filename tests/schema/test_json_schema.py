@@ -32,6 +32,16 @@ def test_every_class_has_its_definition() -> None:
     assert set(tags()) <= json_schema()["$defs"].keys()
 
 
+def test_a_document_of_another_class() -> None:
+    validator = jsonschema.Draft202012Validator(json_schema("MocoStudy"))
+    goal = {"class": "MocoFinalTimeGoal", "weight": 2.0}
+    study = {"problem": {"phases": {"goals": [goal], "time_final_bounds": {"bounds": [1.0, 2.0]}}}}
+    validator.validate(study)
+    for wrong in ({"class": "IKMarkerTask"}, {**goal, "weight": "much"}):
+        study["problem"]["phases"]["goals"] = [wrong]
+        assert not validator.is_valid(study)
+
+
 def test_a_model_is_valid(validator: Any) -> None:
     validator.validate(to_data(dynamic_walker()))
 

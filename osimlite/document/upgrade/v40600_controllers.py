@@ -30,10 +30,13 @@ def controller_actuators(draft: Draft) -> None:
         names = controller.find("actuator_list")
         assert names is not None
         words = split(plain(names))
+        lost = None
         if any(word.lower() == "all" for word in words):
             paths = [path for path, _ in actuators]
+            if draft.model is None:
+                lost = "that it drives all actuators, which a document without the model cannot name"
         else:
             paths = [by_name.get(word, f"/forceset/{word}") for word in words]
         names.text = " ".join(dict.fromkeys(paths))
         draft.rename(names, "socket_actuators")
-        draft.changed(controller)
+        draft.changed(controller, lost=lost)

@@ -311,3 +311,11 @@ def test_a_connector_whose_name_makes_no_tag_stays_as_it_is() -> None:
 
 def test_an_empty_old_model() -> None:
     assert read_text('<OpenSimDocument Version="20000"><Model name="a b"/></OpenSimDocument>').name == "ab"
+
+
+def test_a_tool_cannot_name_all_actuators_of_its_model() -> None:
+    controller = "<PrescribedController name='c'><actuator_list>ALL</actuator_list></PrescribedController>"
+    tool = f"<ForwardTool><ControllerSet><objects>{controller}</objects></ControllerSet></ForwardTool>"
+    text = f'<OpenSimDocument Version="40500">{tool}</OpenSimDocument>'
+    (change,) = read_document(Source(text.encode()), of=Object).changes
+    assert change.lost is not None and "all actuators" in change.lost
