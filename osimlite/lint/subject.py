@@ -156,10 +156,10 @@ class Subject(Checked):
         return called(item) if item.name else f"the {called(item)} of {called(self.owner(item))}"
 
     def target_of(self, owner: Component, tag: str) -> Component | None:
-        """The component that a single reference of `owner` leads to."""
-        spec = type(owner).field_specs()[tag]
-        value = getattr(owner, spec.name)
-        return self.tree.resolve(Use(owner, owner, spec, value)).target if value else None
+        """The component that a single reference of `owner` leads to; what is of another class has none."""
+        spec = type(owner).field_specs().get(tag)
+        value = None if spec is None else getattr(owner, spec.name)
+        return self.tree.resolve(Use(owner, owner, spec, value)).target if spec and value else None
 
     def word_at(self, item: Object, tag: str, index: int) -> tuple[str | None, int]:
         """The word at `index` in the text of a list, and how many equal ones stand before it."""

@@ -30,7 +30,7 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     coupled = 1e-8 if any(not isinstance(item, Lock) for item in paths.mechanism.constraints) else 0.0
     rng = np.random.default_rng(seed)
     for _ in range(poses):
-        low, high = np.clip([info.range for info in infos], -2.0, 2.0).T
+        low, high = np.clip([info.range for info in infos], -2.0, 2.0).reshape(-1, 2).T
         locked, rest = [info.locked for info in infos], paths.mechanism.values({})
         q = np.where(locked, rest, rng.uniform(low, high))
         if tied:

@@ -116,7 +116,7 @@ def test_data_that_cannot_be_used(model, tmp_path):
     with pytest.raises(ModelError, match="names no data file"):
         read_external_loads(mechanism, document(tmp_path, force(), datafile=""))
     (tmp_path / "model.xml").write_text('<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>')
-    with pytest.raises(DocumentError, match="this holds <Model>, not <ExternalLoads>"):
+    with pytest.raises(DocumentError, match="holds a <Model>, not a <ExternalLoads>"):
         read_external_loads(mechanism, tmp_path / "model.xml")
 
 

@@ -315,9 +315,8 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
 
 def _below(subject: Subject, item: Component) -> Iterator[Component]:
     """What a frame or a station rests on."""
-    specs = type(item).field_specs()
     for tag in (*POINTS, "socket_parent_frame", "socket_parent"):
-        target = subject.target_of(item, tag) if tag in specs else None
+        target = subject.target_of(item, tag)
         if target is not None:
             yield target
 

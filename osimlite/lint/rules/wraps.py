@@ -9,8 +9,13 @@ from osimlite.lint.placement import Pose, Vector, fixed, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
 from osimlite.schema.base import Component
-from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
+
+
+def _wraps(path: GeometryPath) -> list[PathWrap]:
+    # What has no business there has a finding of its own.
+    return [wrap for wrap in path.path_wrap_set.objects if isinstance(wrap, PathWrap)]
 
 
 @rule("OSIM616", "swallowed-point", severity=WARNING)
@@ -75,7 +80,7 @@ def swallowed_point(subject: Subject, found: Found) -> None:
     """
     for path in subject.each(GeometryPath):
         points = path.path_point_set.objects
-        for wrap in path.path_wrap_set.objects:
+        for wrap in _wraps(path):
             surface = subject.target_of(wrap, "wrap_object")
             base = _base(subject, surface) if isinstance(surface, WrapObject) and surface.active else None
             if base is None:
@@ -165,7 +170,7 @@ def wrap_range(subject: Subject, found: Found) -> None:
     """
     for path in subject.each(GeometryPath):
         count = len(path.path_point_set.objects)
-        for wrap in path.path_wrap_set.objects:
+        for wrap in _wraps(path):
             first, last = wrap.range
             tells = f"the range of {called(wrap)} of {called(subject.tree.parent_of(path) or path)}, {first} {last},"
             start, end = max(first, 1), last if last > 0 else count
