@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
@@ -245,9 +246,9 @@ def _finish(panels: Sequence[Any], times: Array, note: str) -> None:
         panels[-1].set_xlim(times[0], times[-1])
     panels[-1].set_xlabel("time (s)")
     if note:
-        panels[-1].annotate(
-            note, (0.0, 0.0), (0, -38), xycoords="axes fraction", textcoords="offset points", fontsize=8, color="0.35"
-        )
+        style = {"fontsize": 8, "color": "0.35", "va": "top"}
+        note = textwrap.fill(note, 110, break_on_hyphens=False)
+        panels[-1].annotate(note, (0.0, 0.0), (0, -32), xycoords="axes fraction", textcoords="offset points", **style)
 
 
 def _spans(mask: Array) -> list[tuple[int, int]]:

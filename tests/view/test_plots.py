@@ -111,6 +111,18 @@ def test_other_forces_leave_out_what_never_acts():
     assert [text.get_text() for text in panel.texts] == ["never acting: LKneeLimitTorque"]
 
 
+def test_long_notes_leave_the_panels_their_width():
+    motion = stroll()
+    motion.forces |= {f"a_muscle_that_rests_{place}": np.zeros(len(motion.times)) for place in range(60)}
+    figure = drawn("other_forces.png", motion)
+    (panel,), sheet = figure.axes, figure.bbox
+    (note,) = panel.texts
+    assert note.get_text().count("a_muscle_that_rests_") == 60
+    assert panel.get_window_extent().width > 0.6 * sheet.width
+    box = note.get_window_extent()
+    assert box.x1 <= sheet.x1 and box.y0 >= 0 and box.y1 < panel.xaxis.label.get_window_extent().y0
+
+
 def test_states_of_a_kind_share_panels():
     muscles = {f"/forceset/m{place}": np.full(12, place) for place in range(9)}
     states = {f"{path}/{kind}": column for path, column in muscles.items() for kind in ("activation", "fiber_length")}
