@@ -1,0 +1,154 @@
+"""Every real model beside a live OpenSim 4.6: equilibrium, derivatives at random states, and motions step by step.
+
+Large models are taken only if OSIMLITE_ALL_MODELS is set.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation import Simulation
+from tests.oracle.conftest import PRISTINE
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+SMALL = 15_000
+"""Bytes of OpenSim's print, compressed: about so large is a leg, or an arm."""
+SECONDS, ACCURACY = 0.05, 1e-5
+NEAR = 1e-9
+"""Of the largest number."""
+
+SINGULAR = {"m0109"}
+"""A motion moves no mass."""
+STUCK = {"m0115", "m0123", "m0129", "m0239"} | SINGULAR
+"""OpenSim comes to an end that is none, to NaN, or takes a million steps."""
+SENSITIVE = {"m0014", "m0037", "m0116", "m0161", "m0163", "m0172", "m0225"}
+"""OpenSim's own motion is about as far off if it starts 1e-14 or 1e-11 away."""
+CHOICES: Any = {"opensim_derivatives": True, "simbody_early_return": True}
+
+
+class Both(NamedTuple):
+    """A model in OpenSim, ready to be computed, and the same as osimlite reads it."""
+
+    theirs: Any
+    start: Any
+    ours: osimlite.Model
+    folder: Path
+
+
+@pytest.fixture
+def both(corpus_model: Any, tmp_path: Path) -> Both:
+    """Of a real model, as OpenSim prints it: what it reads of old files has six digits."""
+    if corpus_model.converted is None:
+        pytest.skip("OpenSim cannot load this file")
+    if corpus_model.converted.stat().st_size > SMALL and "OSIMLITE_ALL_MODELS" not in os.environ:
+        pytest.skip("large; OSIMLITE_ALL_MODELS=1 takes it too")
+    opensim.Logger.setLevelString("off")
+    for item in PRISTINE:
+        # What `<defaults>` of the models before have changed.
+        opensim.OpenSimObject.registerType(item)
+    for beside in corpus_model.path.parent.iterdir():
+        shutil.copy(beside, tmp_path)
+    path = tmp_path / "model.osim"
+    path.write_bytes(gzip.decompress(corpus_model.converted.read_bytes()))
+    theirs = opensim.Model(str(path))
+    return Both(theirs, theirs.initSystem(), osimlite.read(path), tmp_path)
+
+
+def _numbers(both: Both, state: Any, paths: Sequence[str]) -> Any:
+    return np.array([both.theirs.getStateVariableValue(state, path) for path in paths])
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
+    if not any(both.ours.components(Muscle)):
+        pytest.skip("there are no muscles")
+    if corpus_model.id in SINGULAR:
+        pytest.skip("a motion moves no mass")
+    start, is_settled = opensim.State(both.start), True
+    try:
+        both.theirs.equilibrateMuscles(start)
+    except RuntimeError:
+        # Some muscle has no equilibrium where the model starts.
+        start, is_settled = both.start, False
+    rng = np.random.default_rng(3)
+    with Simulation(both.ours, engine, folder=both.folder, **CHOICES) as simulation:
+        layout, mechanism = simulation.state, simulation.mechanism
+        free = [mechanism.coordinates[place] for place in layout.order]
+        paths = [f"{info.path}/{what}" for what in ("value", "speed") for info in free] + layout.paths
+        rest = simulation.initial_state({}, {}, equilibrate=is_settled)
+        assert rest == pytest.approx(_numbers(both, start, paths), abs=1e-12)
+        n = len(free)
+        q = np.array(layout.values(rest))
+        q[list(layout.order)] += rng.uniform(-0.1, 0.1, n)
+        q = mechanism.assemble(q)
+        u = mechanism.project_speeds(q, rng.uniform(-1.0, 1.0, len(q)))
+        y = layout.pack(q.tolist(), u.tolist(), [x * rng.uniform(0.9, 1.1) for x in rest[2 * n :]])
+        state = opensim.State(both.start)
+        for path, value in zip(paths, y, strict=True):
+            both.theirs.setStateVariableValue(state, path, value)
+        both.theirs.realizeAcceleration(state)
+        expected = np.array([both.theirs.getStateVariableDerivativeValue(state, path) for path in paths])
+        # Of the value of a coordinate, OpenSim gives the speed.
+        owners = [opensim.Coordinate.safeDownCast(both.theirs.getComponent(info.path)) for info in free]
+        expected[:n] = [owner.getQDotValue(state) for owner in owners]
+        found = np.array(simulation.engine.derivative(0.0, y))
+        for part in (slice(n), slice(n, 2 * n), slice(2 * n, None)):
+            scale = max(1.0, np.abs(expected[part]).max(initial=0.0))
+            assert np.abs(found[part] - expected[part]).max(initial=0.0) < NEAR * scale
+
+
+def _moved(both: Both, paths: Sequence[str], apart: float = 0.0) -> tuple[Any, int]:
+    """Where OpenSim ends (n,), from a start that may be some way apart, and after how many steps."""
+    start = opensim.State(both.start)
+    for path in paths if apart else ():
+        coordinate = opensim.Coordinate.safeDownCast(both.theirs.getComponent(path.rpartition("/")[0]))
+        if path.endswith("/value") and coordinate is not None and not coordinate.getLocked(start):
+            coordinate.setValue(start, coordinate.getValue(start) * (1.0 + apart) + apart, False)
+    manager = opensim.Manager(both.theirs)
+    manager.setIntegratorAccuracy(ACCURACY)
+    manager.initialize(start)
+    end = manager.integrate(SECONDS)
+    return _numbers(both, end, paths), manager.getStatesTable().getNumRows() - 1
+
+
+def test_motions(both: Both, corpus_model: Any) -> None:
+    """Of 41 models none is refused, 28 end near and take as many steps, 7 end as near as OpenSim's own."""
+    names = both.theirs.getStateVariableNames()
+    paths = [names.get(place) for place in range(names.getSize())]
+    if not paths:
+        pytest.skip("nothing moves")
+    with Simulation(both.ours, "compiled", folder=both.folder, **CHOICES) as simulation:
+        if corpus_model.id in STUCK:
+            pytest.skip("OpenSim cannot follow the motion")
+        # OpenSim's optimizer may start 1e-10 apart.
+        moving = {info.path for info in simulation.mechanism.coordinates if not (info.locked or info.prescribed)}
+        own = set(simulation.state.paths)
+        start = zip(paths, _numbers(both, both.start, paths).tolist(), strict=True)
+        initial = {path: value for path, value in start if path in own or path.rpartition("/")[0] in moving}
+        trajectory = simulation.run(SECONDS, accuracy=ACCURACY, report_interval=SECONDS, initial=initial)
+    expected, steps = _moved(both, paths)
+    found = {path: values[-1] for path, values in trajectory.auxiliary.items()}
+    coordinates = simulation.mechanism.coordinates
+    for info, value, speed in zip(coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True):
+        found |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
+    scale = max(1.0, np.abs(expected).max())
+    off = max(abs(found[path] - value) for path, value in zip(paths, expected, strict=True))
+    if corpus_model.id in SENSITIVE:
+        assert off <= 10.0 * max(np.abs(_moved(both, paths, apart)[0] - expected).max() for apart in (1e-14, 1e-11))
+    else:
+        assert off < NEAR * scale
+        # What reports at times of its own cuts OpenSim's rows, not its steps.
+        if not any("Reporter" in type(component).__name__ for component in both.ours.components()):
+            assert trajectory.summary["steps"] == steps
