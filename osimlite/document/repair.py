@@ -122,7 +122,7 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
     place = depth = 0
     for kind, start, end, _ in markup(text):
         gap, piece = text[place:start], text[start:end]
-        pieces.append(_outside(gap, place, repairs) if depth <= 0 else _ampersands(gap, place, repairs))
+        pieces.append(_outside(gap, place, repairs) if not depth else _ampersands(gap, place, repairs))
         if kind == "comment":
             piece = _comment(piece, start, repairs)
         elif kind == "instruction":
@@ -136,10 +136,13 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
             depth += kind == "open"
             piece = _quoted(_ampersands(_attributes(piece, start, repairs), start, repairs), start, repairs)
         elif kind == "close":
-            depth -= 1
+            if not depth:
+                repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
+                piece = _blanked(piece)
+            depth = max(0, depth - 1)
         pieces.append(piece)
         place = end
-    pieces.append(_outside(text[place:], place, repairs) if depth <= 0 else text[place:])
+    pieces.append(_outside(text[place:], place, repairs) if not depth else text[place:])
     return "".join(pieces), repairs
 
 

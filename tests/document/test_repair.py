@@ -52,6 +52,8 @@ def document(text: str | bytes) -> Document:
         (HEAD, "<?XML version='1.0'?>\n", "overlooked", 1),
         (HEAD, "<?xml version='2.0'?>\n", "overlooked", 1),
         ("</OpenSimDocument>\n", "</OpenSimDocument>\n\0\0\0", "overlooked", 14),
+        ("</OpenSimDocument>\n", "</OpenSimDocument>\n</Body>\n", "overlooked", 14),
+        (HEAD, "</Body>\n" + HEAD.replace("<?xml ", "<?xml-note "), "overlooked", 1),
     ],
 )
 def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
