@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from copy import copy
 from pathlib import Path
 from typing import Any, Literal
 
@@ -115,6 +116,10 @@ class _Printer:
         defaults, self.defaults = self.defaults, {}
         self.lines.append("\t" * depth + "<defaults>")
         for item in block:
+            if self.numbers == "opensim":
+                # Here OpenSim writes out all that a class has in its first property system.
+                item = copy(item)
+                item.model_fields_set.update(spec.name for spec in field_specs(type(item)).values() if spec.legacy)
             self.object(item, item.name, depth + 1)
         self.lines.append("\t" * depth + "</defaults>")
         self.defaults = defaults
