@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -112,8 +112,16 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
     return found
 
 
-def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -> dict[str, float]:
+def quantities(
+    words: Iterable[str] | None, mechanism: Mechanism, option: str, states: Collection[str] = ()
+) -> dict[str, float]:
     """Numbers (rad, m, per second) by coordinate from the ``COORDINATE=VALUE`` words of an option.
+
+    Args:
+        words: as they were typed.
+        mechanism: whose coordinates they name.
+        option: for messages.
+        states: paths of other states, which may be named too.
 
     Raises:
         OsimliteError: a word is not of that form, there is no such coordinate, the unit does not fit it, or a value
@@ -121,11 +129,15 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
     """
     from osimlite.errors import ModelError, OsimliteError, SettingError
     from osimlite.simulation.start import in_units_of, suspect_value
+    from osimlite.text import did_you_mean
 
     found = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
     for name, text in named_words(words, option, form).items():
         try:
+            if name in states:
+                found[name] = float(text)
+                continue
             found[name] = in_units_of(mechanism, name, text)
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
@@ -133,7 +145,9 @@ def quantities(words: Iterable[str] | None, mechanism: Mechanism, option: str) -
                 raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.
-            raise OsimliteError(f"{option}: {error.message}") from None
+            raise OsimliteError(f"{option}: {error.message}{did_you_mean(name, states)}") from None
+        except ValueError:
+            raise SettingError(f"{option}: the state '{name}' takes a number, not '{text}'") from None
     return found
 
 

@@ -65,9 +65,10 @@ def simulate(
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
-    What the model's probes report goes into probes.sto. Where the motion cannot be
-    computed any further, or Ctrl-C ends it, what was recorded is kept, without
-    pictures.
+    Names of --set are coordinates, or paths of states such as
+    /forceset/BRA/activation. What the model's probes report goes into probes.sto.
+    Where the motion cannot be computed any further, or Ctrl-C ends it, what was
+    recorded is kept, without pictures.
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """
@@ -99,7 +100,7 @@ def simulate(
         show=gui,
     ) as simulation:
         initial = {} if states is None else simulation.state_in(states)
-        initial |= options.quantities(start, simulation.mechanism, "--set")
+        initial |= options.quantities(start, simulation.mechanism, "--set", simulation.state.paths)
         speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
         results = options.results_folder(file, output)
         try:

@@ -133,6 +133,8 @@ def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, A
     if isinstance(given, str | Path) and Path(given).suffix == ".xml":
         curves = ControlCurves.read(Path(given))
         return {name: curves.of(name) for name in curves.actuators}
+    if not isinstance(given, str | Path | StoTable):
+        raise SettingError(f"controls are a mapping of names, a table or a file, not {given!r}")
     table = given if isinstance(given, StoTable) else read_controls(given)
     return {label: (table.times, table.rows[:, place]) for place, label in enumerate(table.columns)}
 

@@ -63,8 +63,6 @@ def read_recording(
     if not len(recorded.times):
         raise DocumentError("the motion has no rows", file=str(path))
     rows = recorded.values
-    if not np.isfinite(rows).all():
-        raise DocumentError("a coordinate value is no number", file=str(path))
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value
     _follow(mechanism, rows, set(recorded.missing))

@@ -170,6 +170,15 @@ def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
     """All states are those at its end; what is set besides counts more."""
     osimlite.write(damped(), tmp_path / "damped.osim")
     words = ["simulate", str(tmp_path / "damped.osim"), "--to", "0.05"]
+    spent = "/forceset/stop/dissipatedEnergy"
+    run(*words, "--set", f"{spent}=0.5", "-o", str(tmp_path / "spent"))
+    assert read_sto(tmp_path / "spent" / "states.sto")[spent][0] == 0.5
+    for name, value, told in (
+        (spent, "much", f"the state '{spent}' takes a number, not 'much'"),
+        (spent[:-1], "1", f"has no coordinate '{spent[:-1]}'; did you mean '{spent}'?"),
+    ):
+        done = run(*words, "--set", f"{name}={value}", folder=tmp_path)
+        assert done.code == 2 and told in done.err
     run(*words, "-o", str(tmp_path / "one"))
     run(*words, "--states", str(tmp_path / "one" / "states.sto"), "--set", "q1=0.25", "-o", str(tmp_path / "two"))
     one, two = (read_sto(tmp_path / folder / "states.sto") for folder in ("one", "two"))

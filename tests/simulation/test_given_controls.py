@@ -141,6 +141,7 @@ def test_the_kernel_alone(model, code):
         ),
         ({"second": lambda t: float("nan")}, "the control of 'second' is nan at 0 s; give a number"),
         ("gone.sto", "cannot read the file: no such file"),
+        (0.5, "controls are a mapping of names, a table or a file, not 0.5"),
     ],
 )
 def test_faults(ready, given, message):

@@ -86,7 +86,7 @@ class RecordedMotion:
         the file is in degrees, rotational coordinates are converted, coupled ones are not, as in OpenSim.
 
         Raises:
-            DocumentError: it is not a storage file, or its times do not increase.
+            DocumentError: it is not a storage file, its times do not increase, or a coordinate is no number.
             ModelError: no column names a coordinate of the mechanism.
         """
         table = read_sto(path)
@@ -120,6 +120,12 @@ class RecordedMotion:
                 f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
                 file=str(path),
             )
+        gaps = np.argwhere(~np.isfinite(values))
+        if len(gaps):
+            row, place = gaps[0]
+            name = mechanism.coordinates[place].name
+            told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; fill the gaps"
+            raise DocumentError(told, file=str(path))
         missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in found)
         return cls(mechanism, table.times, values, missing, tuple(ignored))
 
