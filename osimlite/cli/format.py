@@ -9,11 +9,13 @@ import typer
 
 
 def format(
-    paths: Annotated[list[Path], typer.Argument(help="Model files, or folders to search.", show_default=False)],
+    paths: Annotated[
+        list[Path], typer.Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False)
+    ],
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
     show_diff: Annotated[bool, typer.Option("--diff", help="Change nothing; print what would change.")] = False,
 ) -> None:
-    """Write model files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
+    """Write model and setup files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
 
     Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format
     stays one, and its numbers stay as they are: upgrade brings it up.
@@ -25,9 +27,11 @@ def format(
     from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
     from osimlite.files import model_files, write_atomically
+    from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours
 
     changed, same, worst = 0, 0, 0
-    for path in model_files(paths):
+    found = model_files(paths, (".osim", *DOCUMENTS))
+    for path in (path for path in found if path in paths or begins_as_ours(str(path))):
         try:
             source = Source.of_file(path)
             after = formatted(source)
