@@ -15,7 +15,7 @@ def format(
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
     show_diff: Annotated[bool, typer.Option("--diff", help="Change nothing; print what would change.")] = False,
 ) -> None:
-    """Write model and setup files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
+    """Write files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
 
     Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format
     stays one, and its numbers stay as they are: upgrade brings it up.
