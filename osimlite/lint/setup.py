@@ -32,8 +32,8 @@ NOTHING = ("", "unassigned")
 """What stands for no file, in small letters."""
 _MOST_NEIGHBOURS = 200
 _LARGEST_NEIGHBOUR = 2_000_000
-_OF_MODELS = frozenset(("OSIM004", "OSIM110", "OSIM111", "OSIM209"))
-"""Rules of text, tags and values that hold of models only."""
+_OF_MODELS = frozenset(("OSIM110", "OSIM111", "OSIM209"))
+"""Rules of tags and values that hold of models only."""
 
 
 class Naming(NamedTuple):
@@ -57,6 +57,11 @@ class Setup(Subject):
 
     def is_for(self, rule: Rule) -> bool:
         """Whether a rule has anything to look at: what is said of text, tags and values holds of every document."""
+        if rule.code == "OSIM004":
+            # Setups of every version are read, but not those without one.
+            return bool(self.faults)
+        if rule.name == "included-file":
+            return self.top is not None
         if rule.about == "model":
             return rule.code not in _OF_MODELS and (
                 rule.code[4] == "0" or (rule.code[4] in "12" and self.top is not None)

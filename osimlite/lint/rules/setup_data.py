@@ -246,11 +246,16 @@ def load_columns(setup: Setup, found: Found) -> None:
             continue
         columns = table.columns
         prefixes = sorted({column[:-1] for column in columns if column[-1:] in "xyzXYZ"})
-        for force in loads.objects:
+        names = [force.name for force in loads.objects]
+        for place, force in enumerate(loads.objects):
+            if force.name in names[:place]:
+                found(f"a force is called '{force.name}' already", force, attribute="name", severity=WARNING)
+            if not str(force.applied_to_body):
+                found(f"{called(force)} acts on no body: OpenSim refuses it", force, tag="applied_to_body")
             if not force.appliesForce:
                 found(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
                 continue
-            if not force.force_identifier and not force.torque_identifier:
+            if not force.force_identifier and (force.point_identifier or not force.torque_identifier):
                 found(f"{called(force)} names no columns of a force: OpenSim refuses it", force, tag="force_identifier")
             elif force.force_identifier and not force.point_identifier:
                 found(
@@ -311,6 +316,10 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
+    for item in setup.items:
+        count = len(getattr(item, "time_range", (0, 0)))
+        if count != 2 and getattr(item, "apply", True):
+            found(f"a range has two times, this one {count}: OpenSim fails", item, tag="time_range", severity=ERROR)
     for item, tags, first, last in _ranges(setup):
         if any(number != number for number in (first, last)):
             found(f"a time of {called(item)} is no number: OpenSim refuses it", item, tag=tags[0], severity=ERROR)

@@ -124,6 +124,8 @@ def unknown_name(setup: Setup, found: Found) -> None:
         kind = word.spec.kind
         assert isinstance(kind, Reference)
         what = _IN_MODEL.get(kind.rule)
+        if kind.rule == "socket" and word.text.startswith(("/bodyset/", "/jointset/")):
+            what = "component"
         if what is None or word.text in _WORDS.get(word.spec.tag, ()) or word.text.lower() == "unassigned":
             continue
         if is_of(word.item, "ObjectGroup") or (is_of(word.item, "Controller") and word.text in ("ALL",)):
@@ -137,7 +139,11 @@ def unknown_name(setup: Setup, found: Found) -> None:
             continue
         key = (what, kind.target)
         if key not in known:
-            known[key] = setup.names_of({"body": "Body", "frame": "Body", "joint": "Joint"}.get(what, kind.target))
+            known[key] = (
+                set()
+                if what == "component"
+                else setup.names_of({"body": "Body", "frame": "Body", "joint": "Joint"}.get(what, kind.target))
+            )
         names = known[key]
         if word.text in names or word.text in unknown:
             continue
@@ -151,6 +157,15 @@ def unknown_name(setup: Setup, found: Found) -> None:
             attribute="name" if of_name else None, severity=WARNING if silent else None,
             suggestion="all" if more else nearest_name(word.text, sorted(names)),
         )  # fmt: skip
+    if setup.tool is not None and type(setup.tool[1]).__name__ in ("AnalyzeTool", "ForwardTool"):
+        actuators = setup.names_of("Actuator")
+        for control in setup.named("Control"):
+            name = control.name.removesuffix(".excitation").rpartition("/")[2]
+            if actuators and name not in actuators and name not in unknown:
+                found(
+                    f"the model has no actuator '{name}' for {called(control)}: OpenSim refuses it",
+                    control, attribute="name", suggestion=nearest_name(name, sorted(actuators)),
+                )  # fmt: skip
 
 
 @rule("OSIM832", "excluded-force", severity=WARNING, about="document")
