@@ -53,15 +53,20 @@ def without(name: str, *beginnings: str) -> tuple[str, str, str]:
     return name, line(name, beginnings[0]) + "\n", ""
 
 
+def part(name: str, pattern: str) -> str:
+    """The first part of a file that is so."""
+    return next(re.finditer(pattern, TEXTS[name], re.DOTALL))[0]
+
+
 TRC = rows("walk.trc")
 COORDS = rows("coords.mot")
 HEAD = TEXTS["walk.trc"].splitlines()
 LABELS = line("coords.mot", "time")
 MANY = "\n".join(COORDS)
 TASK = '<IKMarkerTask name="R.ASIS">\n\t\t\t\t\t<apply>true</apply>\n\t\t\t\t\t<weight>3</weight>'
-COORDINATE_TASK = re.search(r"<IKCoordinateTask.*?</IKCoordinateTask>", TEXTS["ik.xml"], re.DOTALL)[0]
-ANALYSES = re.search(r"<objects>\n.*</objects>(?=\n\t\t</AnalysisSet>)", TEXTS["so.xml"], re.DOTALL)[0]
-PAIR = re.search(r"<MarkerPair name.*?</MarkerPair>", TEXTS["scale.xml"], re.DOTALL)[0]
+COORDINATE_TASK = part("ik.xml", r"<IKCoordinateTask.*?</IKCoordinateTask>")
+ANALYSES = part("so.xml", r"<objects>\n.*</objects>(?=\n\t\t</AnalysisSet>)")
+PAIR = part("scale.xml", r"<MarkerPair name.*?</MarkerPair>")
 
 FAULTS = [
     # Any setup
@@ -267,7 +272,8 @@ FAULTS = [
     Fault(207, "so.xml", "model.osim", "nomodel.osim"),
     Fault(208, "so.xml", "model.osim", ""),
     Fault(210, "so.xml", "<objects />",
-          "<objects><ControlSetController name='c'><controls_file>no.xml</controls_file></ControlSetController></objects>"),
+          "<objects><ControlSetController name='c'><controls_file>no.xml</controls_file></ControlSetController>"
+          "</objects>"),
     Fault(212, "so.xml", "<bodies>all", "<bodies>tibia_r nosuch"),
     Fault(213, "so.xml", "<bodies>all", "<bodies>nosuch"),
     Fault(214, "so.xml", "<bodies>all", "<bodies>"),
