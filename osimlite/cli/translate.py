@@ -89,6 +89,6 @@ def _table(fidelity: Fidelity) -> Any:
     table.add_column("done about it", overflow="fold", ratio=3)
     table.add_column("where", overflow="fold", ratio=3)
     for group in fidelity.groups():
-        names = [path.rsplit("/", 1)[1] or "the model" for path in group.components]
-        add_row(table, group.cannot_say, group.done, listed(names, most=3))
+        names = dict.fromkeys(path.rsplit("/", 1)[1] or "the model" for path in group.components)
+        add_row(table, group.cannot_say, group.done, listed(list(names), most=3))
     return table

@@ -158,7 +158,7 @@ def defaults_block(subject: Subject, found: Found) -> None:
         return
     number = subject.element_of(model, "defaults")
     if number is not None and source.children(number):
-        found("<defaults> changes the defaults of every model loaded from now on", model, number=number)
+        found("<defaults> changes the defaults of every model that OpenSim loads later", model, number=number)
         for item in source.children(number):
             tag = source.spans[item].tag
             for name, kind in _OF_TOOLS.get(tag, {}).items():
