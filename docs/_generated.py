@@ -74,7 +74,7 @@ def components() -> str:
     for tag in tags():
         cls = class_for(tag)
         assert cls is not None
-        areas[cls.__module__.rsplit(".", 1)[1]].append(cls)
+        areas[cls.__module__.removeprefix("osimlite.schema.").replace(".", ": ")].append(cls)
     parts = [
         "# Components",
         "Classes and properties as OpenSim names them; `osimlite.PinJoint` is the class of `<PinJoint>`. Properties "

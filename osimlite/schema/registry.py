@@ -115,14 +115,6 @@ _AREAS = {
     "prescribed": "ExternalForce ExternalLoads PrescribedForce",
     "probe_types": "ActuatorForceProbe ActuatorPowerProbe JointInternalPowerProbe SystemEnergyProbe",
     "probes": "Probe ProbeSet",
-    "processors": (
-        "FunctionBasedPathSet ModOpAddExternalLoads ModOpAddReserves ModOpIgnoreActivationDynamics "
-        "ModOpIgnorePassiveFiberForcesDGF ModOpIgnoreTendonCompliance ModOpRemoveMuscles ModOpReplaceJointsWithWelds "
-        "ModOpReplaceMusclesWithDeGrooteFregly2016 ModOpReplaceMusclesWithPathActuators "
-        "ModOpReplacePathsWithFunctionBasedPaths ModOpScaleActiveFiberForceCurveWidthDGF ModOpScaleMaxIsometricForce "
-        "ModOpTendonComplianceDynamicsModeDGF ModelOperator ModelProcessor TabOpAppendCoupledCoordinateValues "
-        "TabOpLowPassFilter TabOpUseAbsoluteStateNames TableOperator TableProcessor"
-    ),
     "reporters": (
         "AbstractReporter ConsoleReporter__Vec3_ ConsoleReporter__double_ NumberReporter SignalGenerator "
         "StatesTrajectoryReporter TableReporter__Vec3_ TableReporter__Vector_ TableReporter__double_ TableSource "
@@ -149,6 +141,14 @@ _AREAS = {
         "OrientationWeightSet Tool"
     ),
     "tools.path_fitting": "PolynomialPathFitter PolynomialPathFitterBounds",
+    "tools.processors": (
+        "FunctionBasedPathSet ModOpAddExternalLoads ModOpAddReserves ModOpIgnoreActivationDynamics "
+        "ModOpIgnorePassiveFiberForcesDGF ModOpIgnoreTendonCompliance ModOpRemoveMuscles ModOpReplaceJointsWithWelds "
+        "ModOpReplaceMusclesWithDeGrooteFregly2016 ModOpReplaceMusclesWithPathActuators "
+        "ModOpReplacePathsWithFunctionBasedPaths ModOpScaleActiveFiberForceCurveWidthDGF ModOpScaleMaxIsometricForce "
+        "ModOpTendonComplianceDynamicsModeDGF ModelOperator ModelProcessor TabOpAppendCoupledCoordinateValues "
+        "TabOpLowPassFilter TabOpUseAbsoluteStateNames TableOperator TableProcessor"
+    ),
     "tools.scale": (
         "BodyScale BodyScaleSet GenericModelMaker MarkerPair MarkerPairSet MarkerPlacer Measurement MeasurementSet "
         "ModelScaler Scale ScaleSet ScaleTool"

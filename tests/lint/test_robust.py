@@ -148,3 +148,12 @@ def test_whatever_stands_in_the_place_of_an_object(inside):
     assert render(validate(Source(text.encode())))
     if inside == "<PlugIn/>":
         assert lines >= {first + number for number in range(len(SLOTS))}
+
+
+def test_a_property_of_tools_is_none_of_parts_of_a_model() -> None:
+    body = "<Body name='b'> <weight>1</weight> <coordinates>x</coordinates> </Body>"
+    model = f"<Model><BodySet><objects>{body}</objects></BodySet></Model>"
+    source = Source(f'<OpenSimDocument Version="40600">{model}</OpenSimDocument>'.encode())
+    weight, coordinates = (finding.message for finding in validate(source, select="OSIM101").findings)
+    assert "it is a property of" not in weight
+    assert "TransformAxis" in coordinates

@@ -59,7 +59,7 @@ def unknown_tag(subject: Subject, found: Found) -> None:
             home = _set_for(note.value)
             message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
         else:
-            homes = _homes(note.word)
+            homes = _homes(note.word, type(owner))
             message += f": it is a property of {listed(homes, most=3)}" if homes else ""
         same = suggestion is not None and suggestion.lower() == note.word.lower()
         free = suggestion is not None and suggestion not in _present(owner)
@@ -368,13 +368,16 @@ def _default_of(spec: FieldSpec) -> str:
     return f" ({shown(spec.default)})"
 
 
-def _homes(tag: str) -> list[str]:
-    """Classes that have a property `tag`; a class is left out where one it derives from has it."""
-    homes = set()
+def _homes(tag: str, owner: type[Object]) -> list[str]:
+    """Classes that have a property `tag`; a class is left out where one it derives from has it.
+
+    In a model those of tools are left out, and the other way round.
+    """
+    homes, package = set(), owner.__module__.rpartition(".")[0]
     for name in tags():
         cls = class_for(name)
         spec = field_specs(cls).get(tag) if cls is not None else None
-        if spec is not None:
+        if spec is not None and spec.declared_in.__module__.rpartition(".")[0] == package:
             homes.add(spec.declared_in.__name__)
     return sorted(homes)
 

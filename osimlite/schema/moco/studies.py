@@ -29,8 +29,8 @@ from osimlite.schema.moco.parts import (
 )
 from osimlite.schema.moco.path_constraints import MocoPathConstraint
 from osimlite.schema.model import Model
-from osimlite.schema.processors import ModelProcessor, TableProcessor
 from osimlite.schema.references import InputTable, OutputFolder
+from osimlite.schema.tools.processors import ModelProcessor, TableProcessor
 
 
 class MocoPhase(Object):

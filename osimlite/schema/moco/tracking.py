@@ -19,9 +19,9 @@ from osimlite.schema.fields import (
 from osimlite.schema.moco.goals import ContactForcePaths, FramePaths, MocoGoal
 from osimlite.schema.moco.parts import MocoWeightSet
 from osimlite.schema.prescribed import ExternalLoads
-from osimlite.schema.processors import TableProcessor
 from osimlite.schema.references import InputTable, Names, reads
 from osimlite.schema.tools.inverse_kinematics import MarkersReference
+from osimlite.schema.tools.processors import TableProcessor
 
 LoadsFile = Annotated[str, reads("ExternalLoads")]
 Projection = Annotated[str, word("none", "vector", "plane")]
