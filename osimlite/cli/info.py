@@ -180,7 +180,10 @@ def _simulation(model: Model, folder: Path) -> str:
         from osimlite.multibody import build_mechanism
         from osimlite.simulation.elements import by_class, force_elements
 
-        forces = force_elements(model, build_mechanism(model), skip_unsupported=True, folder=folder)
+        mechanism = build_mechanism(model)
+        forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
+        # What moves no mass has no acceleration.
+        mechanism.acceleration(*mechanism.default_state())
     except OsimliteError as error:
         return f"not possible: {error}"
     if forces.skipped:

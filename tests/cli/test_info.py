@@ -67,6 +67,11 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     assert "not possible: the ignore_tendon_compliance of '/forceset/m1'" in " ".join(
         run("info", tmp_path / "m.osim").out.split()
     )
+    model.find("/forceset/m1").ignore_tendon_compliance = False
+    body.mass, body.inertia = 0.0, (0.0,) * 6
+    osimlite.write(model, tmp_path / "m.osim")
+    done = run("info", tmp_path / "m.osim")
+    assert done.err == "" and "moves no mass" in " ".join(done.out.split())
 
 
 def test_format_says_when_there_is_nothing_to_do(tmp_path):
