@@ -7,7 +7,7 @@ The stages are those of Simbody: where the links are (position), how they move (
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -164,10 +164,12 @@ class System:
             self.program.link_equilibria()
             self._equilibrate = code.bound("equilibrate", ints, self.numbers, *room)
         self._set(t, y)
-        if numbers is None:
-            status = self._run(self._equilibrate, layout.VELOCITY_STAGE)
-        else:
-            status = self._run(code.entry("equilibrate"), ints, numbers, *room, layout.VELOCITY_STAGE)
+        run = self._equilibrate if numbers is None else partial(code.entry("equilibrate"), ints, numbers, *room)
+        try:
+            status = self._run(run, layout.VELOCITY_STAGE)
+        except (ArithmeticError, ValueError) as failure:
+            # Kernels as Python raise what machine code computes as no number.
+            raise SimulationError(f"the equilibrium of the muscles cannot be computed: {failure}") from failure
         if status == layout.UNSOLVED:
             place = self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * int(self._f[0])
             muscle = self._told(self.structure[place + 1])

@@ -11,7 +11,10 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError
 from osimlite.multibody.spatial import inverse
-from osimlite.schema.paths import PathPoint
+from osimlite.schema.functions import Constant, Sine
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.paths import MovingPathPoint, PathPoint
+from tests.simulation.elements.muscle_rows import hung, line
 from tests.simulation.test_compiled_forces import FORCES, with_force
 
 FILES = {"gait10dof18musc": "m0005", "gait2392": "m0014"}
@@ -84,3 +87,14 @@ def test_points_in_one_place_pull_nothing():
     arms = osimlite.paths(model).moment_arms({})["/forceset/a"]
     assert list(arms) == ["/jointset/j1/q1_0", "/jointset/j1/q1_1", "/jointset/j1/q1_2", "/jointset/j2/q2_0"]
     assert all(map(isfinite, arms.values()))
+
+
+def test_a_point_whose_place_is_no_number_is_refused():
+    model = hung(PathActuator(name="mu", geometry_path=line()))
+    axes = {f"{axis}_location": Constant(value=0.0) for axis in "xyz"}
+    sockets = {f"socket_{axis}_coordinate": "/jointset/slide/x" for axis in "xyz"}
+    point = MovingPathPoint(name="a", socket_parent_frame="/ground", **sockets, **axes)
+    point.x_location = Sine(amplitude=0.1, omega=1.0, phase=float("inf"), offset=0.0)
+    model.find("/forceset/mu").geometry_path.path_point_set.objects[0] = point
+    with pytest.raises(ModelError, match="the place of a point of '/forceset/mu.*' has a number that is not finite"):
+        osimlite.simulate(model, 0.1)

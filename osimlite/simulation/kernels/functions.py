@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, isfinite, sin
 
 import numpy as np
 
-from osimlite.errors import UnsupportedError
+from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody import functions as f
 from osimlite.multibody.arc import COSINE_TERMS, SINE_TERMS, ArcPoint
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
@@ -65,9 +65,21 @@ def function_table(function: f.Function, where: str) -> list[float]:
 
 
 def table_of_one(function: f.Function, where: str) -> list[float]:
-    """The table of a function of one number, for `value_at`."""
+    """The table of a function of one number, for `value_at`.
+
+    Raises:
+        ModelError: one of its numbers is not finite.
+        UnsupportedError: there is no kind for it.
+    """
+    table = _table_of_one(function, where)
+    if not all(map(isfinite, table)):
+        raise ModelError(f"{where} has a number that is not finite; give one that is")
+    return table
+
+
+def _table_of_one(function: f.Function, where: str) -> list[float]:
     if isinstance(function, f.Scaled):
-        kind, factor, *rest = table_of_one(function.function, where)
+        kind, factor, *rest = _table_of_one(function.function, where)
         return [kind, function.scale * factor, *rest]
     if isinstance(function, f.WeightedSum):
         function = f.Linear(function.weights[0], function.start)

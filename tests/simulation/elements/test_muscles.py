@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from osimlite.errors import ModelError, SimulationError
@@ -181,6 +182,15 @@ def test_what_makes_a_muscle_impossible(case, name, value, words):
 def test_no_muscle_is_in_equilibrium_where_there_is_none():
     ready = system(hung(PathActuator(name="mu", geometry_path=muscle("thelen_default").geometry_path)))
     assert ready.equilibrated(0.0, [0.3, 0.0]) == [0.3, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("code", "words"), [(None, "no equilibrium was found of"), (Checked("Python"), "cannot be computed: math range error")]
+)
+def test_an_equilibrium_beyond_all_numbers_is_none(code, words):
+    ready = system(hung(muscle("thelen_default", optimal_fiber_length=1e-160)), code)
+    with np.errstate(all="ignore"), pytest.raises(SimulationError, match=words):
+        ready.equilibrated(0.0, [0.3, 0.0, 0.1, 0.1])
 
 
 def test_activation_times_of_the_first_muscle_count_for_all():
