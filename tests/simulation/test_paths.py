@@ -96,5 +96,5 @@ def test_a_point_whose_place_is_no_number_is_refused():
     point = MovingPathPoint(name="a", socket_parent_frame="/ground", **sockets, **axes)
     point.x_location = Sine(amplitude=0.1, omega=1.0, phase=float("inf"), offset=0.0)
     model.find("/forceset/mu").geometry_path.path_point_set.objects[0] = point
-    with pytest.raises(ModelError, match="the place of a point of '/forceset/mu.*' has a number that is not finite"):
+    with pytest.raises(ModelError, match=r"the place of a point of '/forceset/mu.*' has a number that is not finite"):
         osimlite.simulate(model, 0.1)

@@ -185,7 +185,8 @@ def test_no_muscle_is_in_equilibrium_where_there_is_none():
 
 
 @pytest.mark.parametrize(
-    ("code", "words"), [(None, "no equilibrium was found of"), (Checked("Python"), "cannot be computed: math range error")]
+    ("code", "words"),
+    [(None, "no equilibrium was found of"), (Checked("Python"), "cannot be computed: math range error")],
 )
 def test_an_equilibrium_beyond_all_numbers_is_none(code, words):
     ready = system(hung(muscle("thelen_default", optimal_fiber_length=1e-160)), code)
