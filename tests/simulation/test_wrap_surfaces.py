@@ -13,6 +13,7 @@ from osimlite.multibody.spatial import inverse, offset, transform
 from osimlite.simulation.engines.linking import COMPILED
 from osimlite.simulation.kernels import wrapping
 from osimlite.simulation.kernels.layout import OWN
+from osimlite.simulation.kernels.wrap_cylinder import settled
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
 
@@ -58,3 +59,9 @@ def test_surface(name, code):
         assert points @ frame[:3, :3].T + frame[:3, 3] == pytest.approx(np.array(expected), abs=1e-14)
         whole = length + sum(np.linalg.norm(end - point) for end, point in zip(ends, points, strict=True))
         assert isnan(whole) if isnan(case["length"]) else whole == pytest.approx(case["length"], abs=2e-15)
+
+
+@pytest.mark.parametrize("height", [1e200, np.nan])
+def test_a_helix_beyond_all_numbers_stays(height):
+    found = settled((1.0, 1.0, 0.0), (-1.0, 1.0, height), (1.0, 0.0, 0.0), (-1.0, 0.0, height), 3.0, 3.0)
+    assert found == pytest.approx((0.0, height), nan_ok=True)

@@ -11,7 +11,7 @@ Engineering 3, 2000.
 
 from __future__ import annotations
 
-from math import atan2, cos, pi, radians, sin, sqrt, tan
+from math import atan2, cos, inf, pi, radians, sin, sqrt, tan
 
 from osimlite.simulation.kernels.layout import NUMBERS, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
@@ -185,9 +185,10 @@ def settled(first: Vector, second: Vector, one: Vector, two: Vector, arc: float,
     leg1 = leg2 = (0.0, 0.0, 0.0, 0.0)
     for _ in range(ROUNDS):
         rise = z2 - z1
-        count = int(helix(arc, rise) / PIECE)
-        if count < 2:
+        length = helix(arc, rise) / PIECE
+        if not 2.0 <= length < inf:
             break
+        count = int(length)
         if count != pieces:
             pieces, part = count, 1.0 / count
             c, s = cos(part * turn), sin(part * turn)

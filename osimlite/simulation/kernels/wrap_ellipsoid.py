@@ -94,7 +94,7 @@ def wrap_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: in
     if isnan(length):
         return nowhere(e, MANDATORY)
     if length >= PIECE:
-        pieces = min(int(length / PIECE), PIECES)
+        pieces = int(min(length / PIECE, 1.0 * PIECES))
         length, next_one, next_two = curve(radii, one, two, normal, offset, pieces, False)
         if side != 0.0 and pieces > 1 and (bends_back(first, one, next_one) or bends_back(second, two, next_two)):
             length, _, _ = curve(radii, one, two, normal, offset, pieces, True)
