@@ -66,6 +66,11 @@ MANY = "\n".join(COORDS)
 TASK = '<IKMarkerTask name="R.ASIS">\n\t\t\t\t\t<apply>true</apply>\n\t\t\t\t\t<weight>3</weight>'
 COORDINATE_TASK = part("ik.xml", r"<IKCoordinateTask.*?</IKCoordinateTask>")
 ANALYSES = part("so.xml", r"<objects>\n.*</objects>(?=\n\t\t</AnalysisSet>)")
+PLACER = part("scale.xml", r"<marker_file>walk.trc</marker_file>\s*<time_range>0.5 0.6</time_range>\s*<output_m\w*>pl")
+KINEMATICS = part("so.xml", r"<Kinematics .*?</Kinematics>")
+CONTROLLER = (
+    '<PrescribedController name="c"><socket_actuators>/forceset/nosuch</socket_actuators></PrescribedController>'
+)
 PAIR = part("scale.xml", r"<MarkerPair name.*?</MarkerPair>")
 
 FAULTS = [
@@ -336,6 +341,14 @@ FAULTS = [
     Fault(278, "ik.xml", "model.osim", "Unassigned"),
     Fault(279, "ik.xml", "model.osim", ".\\model.osim"),
     Fault(280, "ik.xml", "model.osim", "MODEL.osim"),
+    Fault(132, "coords.mot", "\n".join(COORDS[2:]) + "\n", "", "id.xml", "<coordinates_file>"),
+    Fault(183, "reserves.xml", 'name="hip_flexion_r_reserve"', 'name="hamstrings_r"'),
+    Fault(211, "so.xml", "<objects />", f"<objects>{CONTROLLER}</objects>"),
+    Fault(246, "scale.xml", PLACER, PLACER.replace("walk.trc", "nostatic.trc")),
+    Fault(268, "forward.xml", "<states_file />", "<states_file>grf.mot</states_file>"),
+    Fault(271, "forward.xml", "<enabled>true", "<socket_actuators>/forceset/nosuch</socket_actuators>\n<enabled>true"),
+    Fault(286, "ik.xml", "<results_directory>./", "<results_directory>out", "", "<output_motion_file>"),
+    Fault(330, "so.xml", KINEMATICS, KINEMATICS.replace("Kinematics", "InverseDynamics")),
     Fault(285, "coords.mot", "inDegrees=yes", "inDegrees=no", "id.xml", "<coordinates_file>"),
 ]  # fmt: skip
 """Faults that are found, by their numbers in the table."""

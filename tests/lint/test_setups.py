@@ -11,6 +11,7 @@ from osimlite.cli._validating import run as validate_paths
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import run, subject_of
 from osimlite.lint.many import check_files
+from osimlite.schema.registry import MODULES
 
 
 @pytest.fixture
@@ -69,6 +70,21 @@ def test_loads_are_checked_with_the_model_of_the_tool_that_names_them(project, f
     (project / "id.xml").write_text(tool)
     (finding,) = validate(loads).findings
     assert (finding.code, finding.line) == ("OSIM831", 6)
+
+
+TOOLS = sorted(tag for tag, module in MODULES.items() if module.startswith("osimlite.schema.tools"))
+
+
+@pytest.mark.parametrize("tag", TOOLS)
+def test_every_class_of_setups_is_checked_by_every_rule(project, tag):
+    files = "<states_file>leg.mot</states_file><desired_kinematics_file>leg.mot</desired_kinematics_file>"
+    for given in (
+        "",
+        f"<model_file>leg.osim</model_file>{files}<external_loads_file>leg_grf.xml</external_loads_file>",
+    ):
+        text = f'<OpenSimDocument Version="40600"><{tag} name="x">{given}</{tag}></OpenSimDocument>'
+        (project / "setup.xml").write_text(text)
+        run(subject_of("setup.xml"))
 
 
 @pytest.mark.parametrize("name", ["ik.xml", "scale.xml", "analyze.xml", "leg_grf.xml"])

@@ -156,6 +156,15 @@ def missing_column(setup: Setup, found: Found) -> None:
                 f"default value{hint}",
                 item, tag=tag,
             )  # fmt: skip
+    for item in setup.named("AbstractTool"):
+        states = setup.table(getattr(item, "states_file", ""))
+        unknown = [column for column in states.columns if not _is_state(setup, column)] if states is not None else []
+        if unknown and setup.tree is not None:
+            found(
+                f"the model has no state {listed([repr(column) for column in unknown])} of '{item.states_file}': "
+                "OpenSim leaves the column out",
+                item, tag="states_file",
+            )  # fmt: skip
     for user in setup.items:
         if not hasattr(user, "ik_task_set"):
             continue
@@ -174,6 +183,18 @@ def missing_column(setup: Setup, found: Found) -> None:
                         f"'{user.coordinate_file}' has no column '{task.name}': OpenSim refuses it",
                         task, attribute="name", severity=ERROR, suggestion=nearest_name(task.name, values.columns),
                     )  # fmt: skip
+
+
+def _is_state(setup: Setup, column: str) -> bool:
+    """Whether a label may be that of a state: of a component by its path, or in the old way by its name."""
+    if setup.tree is None:
+        return True
+    if column.startswith("/"):
+        path = column.rpartition("/")[0]
+        return (
+            setup.tree.walk(path, "", "Component").target is not None or path.rpartition("/")[2] in setup.tree.by_name
+        )
+    return column.partition(".")[0].removesuffix("_u") in setup.tree.by_name
 
 
 def _is_bound(setup: Setup, name: str) -> bool:
@@ -320,6 +341,12 @@ def time_outside_data(setup: Setup, found: Found) -> None:
         count = len(getattr(item, "time_range", (0, 0)))
         if count != 2 and getattr(item, "apply", True):
             found(f"a range has two times, this one {count}: OpenSim fails", item, tag="time_range", severity=ERROR)
+    for item, tag, motion in _motions(setup):
+        if 0 < motion.rows.count < 6:
+            found(
+                f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim lays a spline through six at least",
+                item, tag=tag, severity=ERROR,
+            )  # fmt: skip
     for item, tags, first, last in _ranges(setup):
         if any(number != number for number in (first, last)):
             found(f"a time of {called(item)} is no number: OpenSim refuses it", item, tag=tags[0], severity=ERROR)

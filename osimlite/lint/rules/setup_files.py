@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import NOTHING, Naming, Setup, is_of
 from osimlite.lint.words import called
 from osimlite.schema.fields import Reference
@@ -199,6 +199,13 @@ def lost_output(setup: Setup, found: Found) -> None:
                 naming.item,
                 tag=naming.spec.tag,
             )
+    for tool in setup.named("InverseKinematicsTool"):
+        folder, name = os.path.normpath(tool.results_directory or "."), tool.output_motion_file
+        if folder != "." and name and not os.path.dirname(name):
+            found(
+                f"'{name}' is written beside the setup: results_directory does not count for it", tool,
+                tag="output_motion_file", severity=INFO, suggestion=f"{folder}/{name}",
+            )  # fmt: skip
     for item in setup.items:
         tag = {"InverseKinematicsTool": "output_motion_file", "InverseDynamicsTool": "output_gen_force_file"}.get(
             type(item).__name__

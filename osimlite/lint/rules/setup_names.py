@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
@@ -53,6 +54,8 @@ _SILENT = {
     "segment",
 }
 """Properties of which OpenSim leaves out what it does not find."""
+_SILENT_CLASSES = ("IKMarkerTask", "BodyScale", "ControlSetController")
+"""Classes of which it does so."""
 
 
 class Word(NamedTuple):
@@ -126,9 +129,12 @@ def unknown_name(setup: Setup, found: Found) -> None:
         what = _IN_MODEL.get(kind.rule)
         if kind.rule == "socket" and word.text.startswith(("/bodyset/", "/jointset/")):
             what = "component"
+        elif kind.rule == "socket" and is_of(word.item, "Controller"):
+            what = "actuator"
+            word = word._replace(text=word.text.rpartition("/")[2])
         if what is None or word.text in _WORDS.get(word.spec.tag, ()) or word.text.lower() == "unassigned":
             continue
-        if is_of(word.item, "ObjectGroup") or (is_of(word.item, "Controller") and word.text in ("ALL",)):
+        if is_of(word.item, "ObjectGroup") or (is_of(word.item, "Controller") and word.text == "ALL"):
             continue
         if not getattr(word.item, "on", True) or not getattr(word.item, "apply", True):
             continue
@@ -147,7 +153,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
         names = known[key]
         if word.text in names or word.text in unknown:
             continue
-        silent = word.spec.tag in _SILENT or is_of(word.item, "IKMarkerTask") or is_of(word.item, "BodyScale")
+        silent = word.spec.tag in _SILENT or any(map(partial(is_of, word.item), _SILENT_CLASSES))
         fate = "OpenSim leaves it out" if silent else "OpenSim refuses it"
         more = "; it is written in small letters" if word.text == "ALL" else ""
         of_name = word.spec.tag == "@name"

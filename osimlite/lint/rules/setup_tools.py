@@ -172,6 +172,15 @@ def tool_setting(setup: Setup, found: Found) -> None:
                     f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
                     analysis, tag="apply_on_bodies",
                 )  # fmt: skip
+    user = setup.tool[1] if setup.tool is not None else None
+    if setup.tree is not None and getattr(user, "replace_force_set", True) is False:
+        present = {force.name for force in setup.tree.model.force_set.objects}
+        for force in (force for forces in setup.named("ForceSet") for force in forces.objects):
+            if force.name in present:
+                found(
+                    f"the model has a force '{force.name}' already, whose place this one takes", force,
+                    attribute="name", severity=WARNING,
+                )  # fmt: skip
     for controller in setup.named("Controller") if setup.tool is not None else ():
         if not controller.enabled:
             found(f"{called(controller)} is off", controller, tag="enabled", severity=INFO)
