@@ -43,7 +43,9 @@ def simulate(
         float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
     output: options.Folder = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, muscles, forces and energy as PNG.")] = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
+    ] = False,
     animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[
         bool,
@@ -135,7 +137,7 @@ def simulate(
 
 SOME = {
     *("probes.sto", "animation.gif"),
-    *("coordinates.png", "states.png", "contact_forces.png", "other_forces.png", "energy.png"),
+    *("coordinates.png", "states.png", "contact_forces.png", "other_forces.png", "probes.png", "energy.png"),
 }
 """What not every simulation writes: --plot and --animate draw pictures."""
 

@@ -123,7 +123,7 @@ class Trajectory:
     def to_frame(self) -> Any:
         """All values, speeds and forces as a pandas DataFrame over time (s); units are SI and radians.
 
-        Columns are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary` and `forces`.
+        Columns are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces` and `probes`.
 
         Raises:
             MissingDependency: pandas is not installed.
@@ -134,7 +134,7 @@ class Trajectory:
             columns[name] = self.values[:, place]
             columns[f"{name}/speed"] = self.speeds[:, place]
         return pandas.DataFrame(
-            {**columns, **self.auxiliary, **self.forces}, index=pandas.Index(self.times, name="time")
+            {**columns, **self.auxiliary, **self.forces, **self.probes}, index=pandas.Index(self.times, name="time")
         )
 
     def states_text(self) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of a simulation: coordinates, states of muscles, contact forces, other forces, and energy over time."""
+"""Pictures of a simulation: coordinates, states of muscles, forces, probes and energy over time."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _NEVER_MIND = 1e-9
 
 
 def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechanism | None = None) -> list[Path]:
-    """Draw the coordinates, states of muscles, contact forces, other forces and energy of a motion over time.
+    """Draw the coordinates, states of muscles, forces, probes and energy of a motion over time.
 
     Args:
         trajectory: the motion.
@@ -50,7 +50,7 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
 
     Returns:
         The PNG files: ``coordinates.png``, and as far as there is something to show ``states.png``,
-        ``contact_forces.png``, ``other_forces.png`` and ``energy.png``.
+        ``contact_forces.png``, ``other_forces.png``, ``probes.png`` and ``energy.png``.
 
     Raises:
         MissingDependency: matplotlib is not installed.
@@ -107,7 +107,14 @@ def _figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str,
     acting = {label: column for label, column in others.items() if np.any(column)}
     if acting:
         idle = [label for label in others if label not in acting]
-        yield "other_forces.png", _others(times, acting, idle)
+        note = f"never acting: {', '.join(idle)}" if idle else ""
+        yield (
+            "other_forces.png",
+            _alike(times, "Forces of muscles, springs and others", "force (N) or torque (N·m)", acting, note),
+        )
+    probes = getattr(motion, "probes", {})
+    if probes:
+        yield "probes.png", _alike(times, "Probes", "what a probe reports", probes)
     if mechanism is not None:
         yield "energy.png", _energy(*energies(motion, mechanism))
 
@@ -184,13 +191,13 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     return figure
 
 
-def _others(times: Array, acting: Mapping[str, Array], idle: Sequence[str]) -> Any:
-    parts = _shared_out(acting)
-    figure, axes = _sheet("Forces of muscles, springs and others", [3.0] * len(parts))
+def _alike(times: Array, title: str, unit: str, lines: Mapping[str, Array], note: str = "") -> Any:
+    parts = _shared_out(lines)
+    figure, axes = _sheet(title, [3.0] * len(parts))
     for panel, part in zip(axes, parts, strict=True):
         _lines(panel, times, part)
-        panel.set_ylabel("force (N) or torque (N·m)")
-    _finish(axes, times, f"never acting: {', '.join(idle)}" if idle else "")
+        panel.set_ylabel(unit)
+    _finish(axes, times, note)
     return figure
 
 

@@ -123,11 +123,14 @@ def test_long_notes_leave_the_panels_their_width():
     assert box.x1 <= sheet.x1 and box.y0 >= 0 and box.y1 < panel.xaxis.label.get_window_extent().y0
 
 
-def test_states_of_a_kind_share_panels():
+def test_states_of_a_kind_share_panels_and_probes_have_theirs():
     muscles = {f"/forceset/m{place}": np.full(12, place) for place in range(9)}
     states = {f"{path}/{kind}": column for path, column in muscles.items() for kind in ("activation", "fiber_length")}
     motion = stroll(12)
     motion.auxiliary = states
+    motion.probes = {"work": np.arange(12.0)}
+    (panel,) = drawn("probes.png", motion).axes
+    assert lines(panel)["work"].get_ydata().tolist() == list(range(12))
     panels = drawn("states.png", motion).axes
     assert [panel.get_ylabel() for panel in panels] == ["activation"] * 2 + ["fiber length (m)"] * 2
     assert [name for panel in panels[:2] for name in lines(panel)] == [path[-2:] for path in muscles]

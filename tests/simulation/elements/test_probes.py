@@ -134,6 +134,12 @@ def test_columns_in_files(tmp_path):
     assert states == ("/jointset/slide/x/value", "/jointset/slide/x/speed", *own)
 
 
+def test_frames_have_columns_of_probes():
+    pytest.importorskip("pandas", reason="needs pandas (extra 'frame')")
+    trajectory = osimlite.simulate(muscular(), to=0.05)
+    assert trajectory.to_frame()["used_mu"].tolist() == trajectory.probes["used_mu"].tolist()
+
+
 def test_a_model_without_probes_has_no_file(model, tmp_path):
     files = osimlite.simulate(model, to=0.01).write(tmp_path)
     assert [path.name for path in files] == ["states.sto", "forces.sto", "summary.json"]
