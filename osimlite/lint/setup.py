@@ -85,6 +85,11 @@ class Setup(Subject):
         """The object itself: there is no tree of components."""
         return item
 
+    def _given(self, item: Object | None) -> int | None:
+        """The element of an object; of one the text does not give, that at the top."""
+        number = None if item is None else item._index
+        return number if number is not None or self.top is None else self.top._index
+
     def outside(self) -> list[str] | None:
         """Every path that was looked at."""
         known = super().outside()
