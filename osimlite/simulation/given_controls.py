@@ -103,7 +103,7 @@ def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for word in words:
         name, equals, value = (part.strip() for part in word.partition("="))
-        if equals and not Path(word).is_file():
+        if (equals or not Path(word).suffix) and not Path(word).is_file():
             try:
                 more: Mapping[str, Any] = {name: float(value)}
             except ValueError:

@@ -253,6 +253,7 @@ def test_what_is_doubtful_is_told_and_done(driven):
     ("words", "told"),
     [
         (("c=1",), "the model has no actuator 'c' to control"),
+        (("b",), "--controls takes a file, or NAME=VALUE with a number; got 'b'"),
         (("b=fast",), "--controls takes a file, or NAME=VALUE with a number; got 'b=fast'"),
         (("b=1", "b=2"), "'b' is controlled twice; leave one out"),
         (("controls.sto", "a=2"), "'/forceset/a' is controlled twice, by its name and by its path; leave one out"),
