@@ -280,6 +280,9 @@ class ObjectReader:
             if cls is not None:
                 # OpenSim reads no other file for the members of a set.
                 member: Object = self.object(child, cls) if spec.legacy else self._owned(child, cls)
+                if isinstance(member, Model):
+                    # Of a model inside another document the parts know their model by its tree.
+                    member.tree()
             elif is_element(child):
                 tag = as_written(child.tag)
                 known = class_for(tag)

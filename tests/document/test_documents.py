@@ -52,6 +52,17 @@ def test_the_object_is_of_the_class_at_the_top(fixtures: Path) -> None:
     assert isinstance(osimlite.read_document(fixtures / "walker" / "DynamicWalkerModel.osim"), osimlite.Model)
 
 
+def test_a_model_inside_a_study() -> None:
+    joint = "<PinJoint name='hip'><coordinates><Coordinate name='q'/></coordinates></PinJoint>"
+    model = f"<Model name='m'><JointSet><objects>{joint}</objects></JointSet></Model>"
+    top = read(document(f"<ModelProcessor><model>{model}</model></ModelProcessor>"))
+    assert isinstance(top, osimlite.ModelProcessor) and top.model is not None
+    (coordinate,) = top.model.joint_set.objects[0].coordinates
+    assert coordinate.path == "/jointset/hip/q"
+    top.model.add(osimlite.CoordinateActuator(name="motor", coordinate=coordinate))
+    assert "<coordinate>q</coordinate>" in osimlite.to_text(top)
+
+
 def test_a_tool_made_in_python(tmp_path: Path) -> None:
     body = osimlite.Body(name="foot")
     model = osimlite.Model(name="m")
