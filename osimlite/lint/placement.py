@@ -75,7 +75,7 @@ def about(axis: Vector, angle: float) -> Pose:
     """A rotation about an axis, by Rodrigues' formula."""
     length = math.sqrt(dot(axis, axis)) or 1.0
     x, y, z = (part / length for part in axis)
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = (math.cos(angle), math.sin(angle)) if math.isfinite(angle) else (math.nan, math.nan)
     v = 1 - c
     return Pose(
         (

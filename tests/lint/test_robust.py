@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+import osimlite
 from osimlite.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.reporters import render
 from osimlite.schema.fields import Held
+from osimlite.schema.path_forces import PathSpring
+from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.registry import class_for, tags
 from osimlite.schema.specs import field_specs
 
@@ -157,3 +160,26 @@ def test_a_property_of_tools_is_none_of_parts_of_a_model() -> None:
     weight, coordinates = (finding.message for finding in validate(source, select="OSIM101").findings)
     assert "it is a property of" not in weight
     assert "TransformAxis" in coordinates
+
+
+@pytest.mark.parametrize("tag", ["inertia", "xyz_body_rotation"])
+@pytest.mark.parametrize("number", ["1e308", "-1e-320", "inf"])
+def test_numbers_beyond_computation_raise_nothing(tag, number, tmp_path):
+    body = osimlite.Body(name="body", mass=1.0, inertia=(0.5, 0.5, 0.5, 0.006, -0.002, -0.03))
+    body.wrap_object_set.objects.append(osimlite.WrapSphere(name="ball", radius=0.1, xyz_body_rotation=(0.1, 0.2, 0.3)))
+    model = osimlite.Model(name="model")
+    model.add(body)
+    model.add(osimlite.PinJoint(name="joint").between(model.ground, body))
+    path = GeometryPath(name="path")
+    for name, frame in (("a", "/ground"), ("b", "/bodyset/body")):
+        path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame, location=(0.5, 0.0, 0.0)))
+    path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball"))
+    model.add(PathSpring(name="spring", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=path))
+    text = osimlite.to_text(model)
+    start = text.index(f"<{tag}>", text.index("<WrapSphere") if tag != "inertia" else 0) + len(tag) + 2
+    end = text.index("<", start)
+    for words in (text[start:end].split()[1:], []):
+        file = tmp_path / "model.osim"
+        values = [number, *words] if words else [number] * len(text[start:end].split())
+        file.write_text(text[:start] + " ".join(values) + text[end:])
+        validate(file)

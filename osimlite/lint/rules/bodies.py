@@ -226,8 +226,7 @@ def _closest(body: Body) -> str:
     nearest = possible_inertia(body.inertia)
     parts = [new - old for new, old in zip(nearest, body.inertia, strict=True)]
     # Each product stands in the matrix twice.
-    distance = math.sqrt(sum(part * part for part in parts[:3]) + 2 * sum(part * part for part in parts[3:]))
-    size = math.sqrt(sum(part * part for part in body.inertia[:3]) + 2 * sum(part * part for part in body.inertia[3:]))
+    distance, size = (math.hypot(*matrix, *matrix[3:]) for matrix in (parts, body.inertia))
     return (
         f"; the closest possible one, {' '.join(f'{number:.4g}' for number in nearest)}, is "
         f"{quantity(distance, 'kg m^2')} ({100 * distance / size:.2g} % of it) away"
@@ -255,10 +254,12 @@ def principal_moments(inertia: Sequence[float]) -> tuple[float, float, float]:
 
     The roots of the characteristic polynomial in trigonometric form (O. K. Smith, Commun. ACM 4, 168, 1961).
     """
-    xx, yy, zz, xy, xz, yz = inertia
+    # A power of 2 keeps the digits; squares of what is left are numbers.
+    scale = math.ldexp(1.0, math.frexp(max(map(abs, inertia)))[1] - 1)
+    xx, yy, zz, xy, xz, yz = (part / scale for part in inertia)
     off = xy * xy + xz * xz + yz * yz
-    if off == 0:
-        low, middle, high = sorted((xx, yy, zz))
+    if off < 1e-300:
+        low, middle, high = sorted(inertia[:3])
         return low, middle, high
     mean = (xx + yy + zz) / 3
     spread = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * off) / 6)
@@ -268,4 +269,4 @@ def principal_moments(inertia: Sequence[float]) -> tuple[float, float, float]:
     angle = math.acos(max(-1.0, min(1.0, half))) / 3
     high = mean + 2 * spread * math.cos(angle)
     low = mean + 2 * spread * math.cos(angle + 2 * math.pi / 3)
-    return low, 3 * mean - high - low, high
+    return low * scale, (3 * mean - high - low) * scale, high * scale
