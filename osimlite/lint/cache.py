@@ -115,7 +115,7 @@ def _code() -> str:
     """Which code this is. In a working copy the version stays the same while rules change: the files then tell."""
     package = Path(__file__).parents[1]
     newest = count = 0
-    for part in ("document", "document/upgrade", "lint", "lint/rules", "schema"):
+    for part in ("document", "document/upgrade", "lint", "lint/rules", "schema", "schema/tools"):
         with os.scandir(package / part) as entries:
             for entry in entries:
                 if entry.name.endswith(".py"):

@@ -439,6 +439,11 @@ def test_a_fault_is_found_on_its_line(pipeline, fault):
     assert (where, line) in {(file, at) for file, at, _, _ in found}, f"{where}:{line}\n{found}"
 
 
+def test_a_model_may_be_named_by_its_absolute_path(pipeline):
+    put_in(pipeline, Fault(281, "ik.xml", "model.osim", str(pipeline / "model.osim")))
+    assert checked(*sorted(pipeline.iterdir())) == []
+
+
 @pytest.mark.parametrize("fault", HARMLESS, ids=lambda fault: str(fault.number))
 def test_what_is_harmless_is_not_found(pipeline, fault):
     put_in(pipeline, fault)
