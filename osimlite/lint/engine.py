@@ -69,10 +69,12 @@ _MODULES = (
     "muscles",
     "files",
     "tables",
+    "table_rows",
     "marker_tables",
     "setup_files",
     "setup_names",
-    "setup_data",
+    "setup_columns",
+    "setup_times",
     "setup_tools",
 )
 

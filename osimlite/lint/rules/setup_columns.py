@@ -1,9 +1,7 @@
-"""OSIM84x: what a setup asks of the tables that it names."""
+"""OSIM841 to OSIM843: what a setup looks for in the columns of the tables that it names."""
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +9,6 @@ from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
-from osimlite.schema.base import Object
 from osimlite.text import listed
 
 
@@ -130,7 +127,7 @@ def missing_column(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
-    for item, tag, table in _motions(setup):
+    for item, tag, table in motions(setup):
         names = setup.names_of("Coordinate")
         if not names:
             continue
@@ -207,7 +204,7 @@ def _is_bound(setup: Setup, name: str) -> bool:
     return name in bound or (item is not None and bool(getattr(item, "locked", False)))
 
 
-def _motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
+def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
     """Every tool that is given a motion as coordinates, with the property and the table."""
     for item in setup.items:
         for tag in ("coordinates_file", "desired_kinematics_file"):
@@ -302,266 +299,3 @@ def load_columns(setup: Setup, found: Found) -> None:
                         f"'{loads.datafile}' has {listed(own)} in this order: OpenSim takes the first for x",
                         force, tag=tag, severity=WARNING,
                     )  # fmt: skip
-
-
-@rule("OSIM844", "time-outside-data", severity=WARNING, about="document")
-def time_outside_data(setup: Setup, found: Found) -> None:
-    """A tool runs over times that its data do not have, or that make no sense.
-
-    ## What it does
-    Compares the times of a tool with those of the tables that it reads: markers, coordinates, loads.
-
-    ## Why is this bad
-    Inverse kinematics cuts the times to the data without a word. Loads that end before the motion go on as their spline
-    leaves them. Times in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
-
-    ## Example
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <time_range>0 9</time_range>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <time_range>0 0.5</time_range>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-    """
-    for item in setup.items:
-        count = len(getattr(item, "time_range", (0, 0)))
-        if count != 2 and getattr(item, "apply", True):
-            found(f"a range has two times, this one {count}: OpenSim fails", item, tag="time_range", severity=ERROR)
-    for item, tag, motion in _motions(setup):
-        if 0 < motion.rows.count < 6:
-            found(
-                f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim lays a spline through six at least",
-                item, tag=tag, severity=ERROR,
-            )  # fmt: skip
-    for item, tags, first, last in _ranges(setup):
-        if any(number != number for number in (first, last)):
-            found(f"a time of {called(item)} is no number: OpenSim refuses it", item, tag=tags[0], severity=ERROR)
-            continue
-        if first > last:
-            found(
-                f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim fails",
-                item, tag=tags[-1], severity=ERROR,
-            )  # fmt: skip
-            continue
-        for name, kind in _data_of(item):
-            table = setup.table(name)
-            span = table.span if table is not None and not table.rows.of("order", "time") else None
-            if table is None or span is None:
-                continue
-            slack = max(table.step, 1e-9) * 1.01
-            if first > span[1] + slack or last < span[0] - slack:
-                found(
-                    f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
-                    item, tag=tags[0], severity=ERROR,
-                )  # fmt: skip
-                continue
-            said = [setup.element_of(item, tag) is not None for tag in tags]
-            if said[-1] and math.isfinite(last) and last > span[1] + slack:
-                found(f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}", item, tag=tags[-1])
-            if said[0] and math.isfinite(first) and first < span[0] - slack:
-                found(f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}", item, tag=tags[0])
-
-
-def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
-    for item in setup.items:
-        if getattr(item, "apply", True) is False:
-            continue
-        if hasattr(item, "time_range"):
-            if len(item.time_range) == 2:
-                yield item, ("time_range",), *item.time_range
-        elif hasattr(item, "final_time"):
-            yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
-        elif is_of(item, "Analysis") and item.start_time > item.end_time:
-            yield item, ("start_time", "end_time"), item.start_time, item.end_time
-
-
-def _data_of(item: Any) -> Iterator[tuple[str, str]]:
-    """The tables that a tool reads over its times, with what happens where they end."""
-    for tag in ("marker_file", "coordinates_file", "desired_kinematics_file", "coordinate_file"):
-        if is_of(item, "ForwardTool") or (tag == "coordinate_file" and is_of(item, "MarkerPlacer")):
-            continue
-        yield getattr(item, tag, ""), ": OpenSim takes what there is" if tag == "marker_file" else ""
-
-
-@rule("OSIM845", "loads-end-early", severity=WARNING, about="document")
-def loads_end_early(setup: Setup, found: Found) -> None:
-    """Measured loads do not last as long as the run of the tool.
-
-    ## What it does
-    Compares the times of the data of external loads with those of the tool, or of the motion that the tool is given.
-
-    ## Why is this bad
-    Before the first and after the last row OpenSim goes straight on, without a word: forces grow to thousands of
-    newtons.
-
-    ## Example
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <time_range>0 0.9</time_range>
-            <external_loads_file>leg_grf.xml</external_loads_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <time_range>0 0.4</time_range>
-            <external_loads_file>leg_grf.xml</external_loads_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-    """
-    for item, _, first, last in _ranges(setup):
-        loads: Any = setup.document(getattr(item, "external_loads_file", ""))
-        if loads is None or not hasattr(loads, "datafile"):
-            continue
-        beside = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
-        table = setup.table(loads.datafile) or setup.table(beside)
-        span = table.span if table is not None and not table.rows.of("order", "time") else None
-        if table is None or span is None:
-            continue
-        for tag in ("coordinates_file", "states_file", "desired_kinematics_file"):
-            motion = setup.table(getattr(item, tag, ""))
-            if motion is not None and motion.span is not None:
-                first, last = max(first, motion.span[0]), min(last, motion.span[1])
-        slack = max(table.step, 1e-9) * 1.01
-        if (math.isfinite(last) and last > span[1] + slack) or (math.isfinite(first) and first < span[0] - slack):
-            found(
-                f"the loads are measured from {span[0]:g} to {span[1]:g} s, the tool runs from {first:g} to {last:g} s",
-                item, tag="external_loads_file",
-            )  # fmt: skip
-
-
-@rule("OSIM846", "filter-frequency", severity=WARNING, about="document")
-def filter_frequency(setup: Setup, found: Found) -> None:
-    """A filter does not fit how often the data were measured.
-
-    ## What it does
-    Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of 0.
-
-    ## Why is this bad
-    A filter above half the sampling frequency cannot be made: OpenSim takes another one. With 0, nothing is left of
-    the motion.
-
-    ## Example
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-            <lowpass_cutoff_frequency_for_coordinates>60</lowpass_cutoff_frequency_for_coordinates>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-            <lowpass_cutoff_frequency_for_coordinates>6</lowpass_cutoff_frequency_for_coordinates>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-    """
-    for item, tag, table in _motions(setup):
-        for filter_tag in ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency"):
-            cutoff = getattr(item, filter_tag, -1.0)
-            if cutoff == 0.0:
-                found(f"{called(item)} filters the motion at 0 Hz", item, tag=filter_tag)
-            elif table.step > 0.0 and cutoff > 0.5 / table.step:
-                found(
-                    f"{called(item)} filters at {cutoff:g} Hz, and '{getattr(item, tag)}' has {1.0 / table.step:.4g} "
-                    f"rows a second, of which {0.5 / table.step:.4g} Hz is the highest that can be filtered",
-                    item, tag=filter_tag,
-                )  # fmt: skip
-
-
-@rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
-def motion_in_degrees(setup: Setup, found: Found) -> None:
-    """Angles of a motion are in degrees, and OpenSim takes them for radians.
-
-    ## What it does
-    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of more than 10 is no
-    angle in radians that a joint takes.
-
-    ## Why is this bad
-    Joint moments of hundreds of thousands, without a word.
-
-    ## Example
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg_degrees.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
-    ```
-    """
-    for item, tag, table in _motions(setup):
-        said = table.entries.get("inDegrees")
-        if (said is not None and said.value.text.lower() in ("yes", "y")) or setup.tree is None:
-            continue
-        if table.form < 1 and (table.file.lower().endswith(".mot") or "Angles" in table.entries):
-            continue
-        angles = _angles(setup)
-        largest, label = max(
-            (
-                (abs(sample[place]), column)
-                for place, column in enumerate(table.columns, 1)
-                if (column.removesuffix("/value").rpartition("/")[2]) in angles
-                for sample in table.rows.samples
-                if place < len(sample) and sample[place] == sample[place]
-            ),
-            default=(0.0, ""),
-        )
-        if largest > 10.0:
-            found(
-                f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is {largest:.4g} in it: OpenSim "
-                "takes it for radians",
-                item, tag=tag, severity=ERROR,
-            )  # fmt: skip
-
-
-def _angles(setup: Setup) -> set[str]:
-    """The coordinates that are angles."""
-    assert setup.tree is not None
-    joints: Any = setup.tree.of_class("Joint").values()
-    return {
-        coordinate.name
-        for joint in joints
-        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False)
-        if motion == "rotational"
-    }

@@ -1,0 +1,277 @@
+"""OSIM805 to OSIM809: the rows of a table, their cells and their times."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from osimlite.document.source import Position
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.rows import Fault
+from osimlite.lint.table import Table
+from osimlite.lint.words import times
+
+
+@rule("OSIM805", "no-rows", severity=ERROR, about="table")
+def no_rows(table: Table, found: Found) -> None:
+    """A table has no rows.
+
+    ## What it does
+    Reports tables without any row.
+
+    ## Why is this bad
+    OpenSim refuses a storage file without rows; of a marker file it looks for the first row for ever.
+
+    ## Example
+    ```sto
+    knee
+    version=1
+    nRows=0
+    nColumns=2
+    endheader
+    time knee_angle
+    ```
+
+    ## Use instead
+    ```sto
+    knee
+    version=1
+    nRows=1
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    ```
+    """
+    if table.labels and "," not in table.labels[0].text and not table.rows.count and not table.rows.faults:
+        fate = "looks for one for ever" if table.is_markers else "refuses the table"
+        found(f"there are no rows: OpenSim {fate}", at=Position(table.label_line, 1))
+
+
+def _more(fault: Fault, noun: str) -> str:
+    return f"; so it is in {times(fault.times - 1, f'more {noun}')}" if fault.times > 1 else ""
+
+
+@rule("OSIM806", "ragged-row", severity=ERROR, about="table")
+def ragged_row(table: Table, found: Found) -> None:
+    """A row of a table is no row of numbers, or has too many or too few.
+
+    ## What it does
+    Compares the cells of each row with the labels, and points out lines between the rows that are blank or remarks.
+
+    ## Why is this bad
+    OpenSim's older reader goes on in the next line for what a row lacks: from there on all numbers are in wrong
+    columns. The newer one refuses the file. In marker files and tables of version 2 and 3 a blank line ends the table,
+    and the rows behind it are lost without a word.
+
+    ## Example
+    ```sto
+    knee
+    version=1
+    nRows=3
+    nColumns=3
+    endheader
+    time knee hip
+    0.0 0.5 0.1
+    0.1 0.6
+    0.2 0.7 0.1
+    ```
+
+    ## Use instead
+    ```sto
+    knee
+    version=1
+    nRows=3
+    nColumns=3
+    endheader
+    time knee hip
+    0.0 0.5 0.1
+    0.1 0.6 0.1
+    0.2 0.7 0.1
+    ```
+    """
+    rows = table.rows
+    width = len(table.labels) * 3 + 2 if table.is_markers else len(table.labels)
+    for fault in rows.of("row", "comment", "blank"):
+        at = Position(fault.line, fault.column, fault.length)
+        if fault.kind == "row":
+            found(f"the row has {fault.text} cells and needs {width}{_more(fault, 'row')}", at=at)
+        elif fault.kind == "comment":
+            found(f"OpenSim knows no remarks among the rows{_more(fault, 'line')}", at=at)
+        elif rows.count and fault.line <= rows.line_of(rows.count - 1):
+            if table.is_markers or table.is_strict:
+                lost = rows.line_of(rows.count - 1) - fault.line
+                found(f"a blank line ends the table for OpenSim: {times(lost, 'row')} behind it are lost", at=at)
+            else:
+                found(f"there is a blank line among the rows{_more(fault, 'line')}", at=at, severity=INFO)
+
+
+@rule("OSIM807", "not-a-number", severity=ERROR, about="table")
+def not_a_number(table: Table, found: Found) -> None:
+    """A cell of a table is no number.
+
+    ## What it does
+    Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column, with the number of
+    rows in which it is so. In marker files a marker that was not seen has three empty cells, or NaN in all three.
+
+    ## Why is this bad
+    At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the rest of its row is
+    that of the row before, and all later rows are lost, without a word. The newer one takes NaN for it (a warning).
+
+    ## Example
+    ```sto
+    knee
+    version=1
+    nRows=2
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    0.1 NaN
+    ```
+
+    ## Use instead
+    ```sto
+    knee
+    version=1
+    nRows=2
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    0.1 0.5
+    ```
+    """
+    for fault in table.rows.of("cell", "time"):
+        label = _label(table, fault.number)
+        if table.is_markers:
+            fate = "OpenSim takes the marker for one that it did not see"
+        elif table.is_strict:
+            fate = "OpenSim takes it for NaN"
+        else:
+            lost = table.rows.line_of(table.rows.count - 1) - fault.line if table.rows.count else 0
+            fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {times(lost, 'row')}"
+        what = f"'{fault.text}' is no number" if fault.text else "there is no number"
+        found(
+            f"{what} (column '{label}'): {fate}{_more(fault, 'row')}",
+            at=Position(fault.line, fault.column, max(1, fault.length)),
+            severity=WARNING if fault.kind == "cell" and (table.is_markers or table.is_strict) else None,
+        )
+
+
+def _label(table: Table, number: int) -> str:
+    """The label of a column by its number; of a marker file its marker's."""
+    if table.is_markers:
+        place = (number - 2) // 3
+        return "Time" if number < 2 else table.labels[place].text if place < len(table.labels) else str(number)
+    return table.labels[number].text if number < len(table.labels) else str(number)
+
+
+@rule("OSIM808", "time-order", severity=ERROR, about="table")
+def time_order(table: Table, found: Found) -> None:
+    """A time of a table is not after the one before it.
+
+    ## What it does
+    Finds rows with the time of the row before, and rows that go back in time.
+
+    ## Why is this bad
+    Of two rows with one time OpenSim keeps the second, without a word; where time goes back the rows before are lost,
+    or the tool stops. A marker file is refused for either. One time twice in a storage file is a warning.
+
+    ## Example
+    ```sto
+    knee
+    version=1
+    nRows=3
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    0.1 0.6
+    0.1 0.7
+    ```
+
+    ## Use instead
+    ```sto
+    knee
+    version=1
+    nRows=3
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    0.1 0.6
+    0.2 0.7
+    ```
+    """
+    if not table.is_markers and table.labels and table.labels[0].text.lower() != "time":
+        return
+    for fault in table.rows.of("order"):
+        time, before = fault.text.split()
+        what = f"goes back from {before} to {time}" if fault.number else f"{time} is that of the row before, too"
+        # OpenSim itself writes the last row of some results twice.
+        severity = None if fault.number or table.is_markers else WARNING
+        at = Position(fault.line, fault.column, fault.length)
+        found(f"the time {what}{_more(fault, 'row')}", at=at, severity=severity)
+
+
+@rule("OSIM809", "time-gap", severity=WARNING, about="table")
+def time_gap(table: Table, found: Found) -> None:
+    """Rows are missing in a table of even times.
+
+    ## What it does
+    Finds steps that are at least half as long again as the usual one, in tables in which nearly all steps are alike.
+
+    ## Why is this bad
+    Rows were lost. OpenSim draws a spline through the gap; with a filter it does so at the smallest step.
+
+    ## Example
+    ```sto
+    knee
+    version=1
+    nRows=6
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    0.1 0.6
+    0.2 0.7
+    0.3 0.7
+    0.4 0.7
+    0.8 0.8
+    ```
+
+    ## Use instead
+    ```sto
+    knee
+    version=1
+    nRows=6
+    nColumns=2
+    endheader
+    time knee_angle
+    0.0 0.5
+    0.1 0.6
+    0.2 0.7
+    0.3 0.7
+    0.4 0.7
+    0.5 0.8
+    ```
+    """
+    rows = table.rows
+    moments = rows.times
+    if rows.count < 6 or rows.of("order", "time", "row") or table.step <= 0:
+        return
+    longest = 1.5 * table.step
+    steps = [after - before for before, after in pairwise(moments)]
+    if max(steps) < longest:
+        return
+    # OpenSim starts some results one step before the others.
+    gaps = [row for row, step in enumerate(steps, 1) if step >= longest and row > 1]
+    even = sum(abs(step - table.step) <= 0.2 * table.step for step in steps)
+    if len(gaps) <= max(1, len(steps) // 50) and even + len(gaps) >= 0.95 * len(steps):
+        for row in gaps[:20]:
+            missing = round(steps[row - 1] / table.step) - 1
+            lost = f": {times(missing, 'row')} seem to be missing" if missing else ""
+            found(
+                f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
+                at=Position(rows.line_of(row), 1),
+            )
