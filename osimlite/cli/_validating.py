@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
-from osimlite.files import model_files, read_standard_input
+from osimlite.files import read_standard_input
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
-from osimlite.lint.suffixes import PROJECT, begins_as_ours
+from osimlite.lint.suffixes import project_files
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _files(paths: list[str]) -> Iterator[str]:
     """Every file to check, folders opened up."""
     for text in paths:
         if text != "-" and os.path.isdir(text):
-            yield from filter(begins_as_ours, map(str, model_files([Path(text)], PROJECT)))
+            yield from project_files(text)
         else:
             yield text
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 from osimlite.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
+from osimlite.lint.suffixes import project_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,10 +27,11 @@ def validate(
     ignore: tuple[str, ...] | list[str] | str | None = None,
     config: Config | None = None,
 ) -> Report:
-    """Check a model, or a file, against every rule.
+    """Check a model, a setup, a table, or all that is in a folder against every rule.
 
     Args:
-        model: a Model, the path of a file, or a Source. Only of a text do findings know line and column.
+        model: a Model, the path of a file or of a folder, or a Source. Only of a text do findings know line and
+            column.
         select: codes, beginnings of codes, or names of rules to run; all if not given.
         ignore: the same, of rules to leave out.
         config: everything that can be set; `select` and `ignore` take its place.
@@ -46,6 +49,10 @@ def validate(
         config = Config(checked_words(select), checked_words(ignore), mesh_paths=meshes)
     if isinstance(model, Model):
         return check_model(model, config)
+    if not isinstance(model, Source) and os.path.isdir(model):
+        from osimlite.lint.many import check_files
+
+        return check_files(project_files(model), config, cached=False)
     return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
 
 

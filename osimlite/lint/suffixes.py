@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+
+from osimlite.files import model_files
 
 TABLES = (".sto", ".mot", ".trc")
 """Tables over time."""
@@ -22,6 +25,11 @@ def is_table(file: str | None) -> bool:
 def is_document(file: str | None) -> bool:
     """Whether a file is a document other than a model, by its name."""
     return file is not None and file.lower().endswith(DOCUMENTS)
+
+
+def project_files(folder: str | Path) -> list[str]:
+    """Every file below a folder that is checked; OsimliteError if there is none."""
+    return list(filter(begins_as_ours, map(str, model_files([Path(folder)], PROJECT))))
 
 
 def begins_as_ours(file: str) -> bool:
