@@ -4,7 +4,7 @@ Each number is of a new Python process with a folder of its own for the code. Wh
 the model's laws until all can be called, the loading of the compiler included; processor time adds up all processes
 that compile side by side. "One law edited" has files of all laws but one, which stands for one whose sources have
 changed. "Everything" is every law that there is: what a model with every kind of joint, constraint and force needs.
-Muscles are left out of the real models, which are of the corpus.
+The real models are of the corpus.
 """
 
 from __future__ import annotations

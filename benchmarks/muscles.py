@@ -210,7 +210,7 @@ def their_equilibria(model: Any) -> Callable[[], None]:
 # --------------------------------------------------------------------------------------- first use, many runs
 def first_use(path: Path) -> str:
     with tempfile.TemporaryDirectory() as cache:
-        environment = {**os.environ, "XDG_CACHE_HOME": cache}
+        environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
         command = [sys.executable, "-c", FIRST, str(path)]
         seconds = [
             float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
