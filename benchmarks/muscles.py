@@ -73,14 +73,15 @@ def main() -> None:
                 with Simulation(model, engine, opensim_derivatives=True) as simulation:
                     title = f"{name}, {engine}"
                     times["evaluation"].append(
-                        compared(title, evaluations(simulation), their_evaluations(theirs), POSES)
+                        compared(title, evaluations(simulation), in_poses(theirs, theirs.realizeAcceleration), POSES)
                     )
                     ours, other = motions(simulation), their_motions(theirs, ROUNDS + 2)
                     row = apart(simulation, ours(), other())
                     ends.add_row(name, str(theirs.getMuscles().getSize()), engine, *row)
                     times["motion"].append(compared(title, ours, other))
                     if engine == "compiled":
-                        times["equilibrium"].append(compared(name, equilibria(simulation), their_equilibria(theirs)))
+                        asked = in_poses(theirs, theirs.equilibrateMuscles)
+                        times["equilibrium"].append(compared(name, equilibria(simulation), asked, POSES))
             times["moment arms"].append(compared(name, moment_arms(model, theirs), their_moment_arms(theirs)))
             console.print(f"{name}: first use {first_use(path)}", highlight=False)
         console.print(ends)
@@ -110,12 +111,16 @@ def poses(count: int) -> np.ndarray:
     return np.random.default_rng(0).uniform(-0.02, 0.02, (POSES, count))
 
 
-def evaluations(simulation: Simulation) -> Callable[[], None]:
+def states_of(simulation: Simulation) -> np.ndarray:
     start = np.array(simulation.initial_state({}, {}, equilibrate=True))
     states = np.repeat(start[None], POSES, axis=0)
     count = len(simulation.state.order)
     states[:, :count] += poses(count)
-    engine = cast(System, simulation.engine)
+    return states
+
+
+def evaluations(simulation: Simulation) -> Callable[[], None]:
+    engine, states = cast(System, simulation.engine), states_of(simulation)
 
     def run() -> None:
         for y in states:
@@ -124,7 +129,7 @@ def evaluations(simulation: Simulation) -> Callable[[], None]:
     return run
 
 
-def their_evaluations(model: Any) -> Callable[[], None]:
+def in_poses(model: Any, ask: Callable[[Any], object]) -> Callable[[], None]:
     state = opensim.State(model.initializeState())
     model.equilibrateMuscles(state)
     start = state.getQ().to_numpy().copy()
@@ -133,7 +138,7 @@ def their_evaluations(model: Any) -> Callable[[], None]:
     def run() -> None:
         for q in vectors:
             state.setQ(q)
-            model.realizeAcceleration(state)
+            ask(state)
 
     return run
 
@@ -192,17 +197,12 @@ def their_moment_arms(model: Any) -> Callable[[], None]:
     return run
 
 
-def equilibria(simulation: Simulation) -> Callable[[], object]:
-    y = simulation.initial_state({}, {})
-    return lambda: simulation.engine.equilibrated(0.0, y)
-
-
-def their_equilibria(model: Any) -> Callable[[], None]:
-    start = opensim.State(model.initializeState())
+def equilibria(simulation: Simulation) -> Callable[[], None]:
+    engine, states = simulation.engine, states_of(simulation).tolist()
 
     def run() -> None:
-        state = opensim.State(start)
-        model.equilibrateMuscles(state)
+        for y in states:
+            engine.equilibrated(0.0, y)
 
     return run
 
