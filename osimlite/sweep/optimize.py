@@ -187,7 +187,8 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
         spare(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
         with damage_told(path), open(path, "rb") as stream:
-            before = pq.read_table(stream, page_checksum_verification=True)
+            # A program that ends while pyarrow's threads do is killed by their C++ now and then.
+            before = pq.ParquetFile(stream, page_checksum_verification=True).read(use_threads=False)
         if resume:
             partial = Partial(path, table)
             for batch in before.to_batches():
