@@ -23,6 +23,9 @@ def named_mesh_folders() -> tuple[Path, ...]:
     return tuple(Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name)
 
 
+unsaved: dict[str, bytes] = {}
+"""What is read in place of files: their texts in an editor, not written yet, by real path."""
+
 _SPECIAL = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
@@ -71,11 +74,23 @@ def read_file(path: str | Path) -> bytes:
         SpecialFileError: it is none, or larger than the settings of its folder allow.
         MissingFileError: it is not there or may not be read.
     """
+    if unsaved and (held := unsaved.get(os.path.realpath(path))) is not None:
+        return held
     with open_file(path) as stream:
         try:
             return _content(stream, os.fstat(stream.fileno()).st_size, path)
         except OSError as error:
             raise MissingFileError(f"cannot read the file: {error.strerror}", file=str(path)) from None
+
+
+def stamped(path: str | Path) -> int | None:
+    """What is another number when the content of a file has changed; None if there is no such file."""
+    if unsaved and (held := unsaved.get(os.path.realpath(path))) is not None:
+        return hash(held)
+    try:
+        return os.stat(path).st_mtime_ns
+    except (OSError, ValueError):
+        return None
 
 
 def read_standard_input() -> bytes:

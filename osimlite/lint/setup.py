@@ -7,31 +7,28 @@ tool that names it.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Iterator
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
 from osimlite.document.survey import Survey
-from osimlite.errors import OsimliteError
-from osimlite.files import read_file
+from osimlite.lint.beside import beginning, documents_of, folders_in, table_at, top_at, tree_at
 from osimlite.lint.config import Config
 from osimlite.lint.engine import Rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours, is_table
+from osimlite.lint.suffixes import is_table
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Reference
-from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, reference_specs
-from osimlite.schema.tree import Tree
+from osimlite.schema.specs import FieldSpec, name_spec, reference_specs
+from osimlite.schema.tree import Resolution, Tree, Use
 
 NOTHING = ("", "unassigned")
 """What stands for no file, in small letters."""
+_NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
 _MOST_NEIGHBOURS = 200
-_LARGEST_NEIGHBOUR = 2_000_000
 _OF_MODELS = frozenset(("OSIM110", "OSIM111", "OSIM209"))
 """Rules of tags and values that hold of models only."""
 
@@ -52,7 +49,6 @@ class Setup(Subject):
 
     def __init__(self, found: Survey, config: Config | None = None) -> None:
         super().__init__(found, config)
-        self.top: Object | None = found.document.top if found.document else None
         self._looked_at: dict[str, None] = {}
 
     def is_for(self, rule: Rule) -> bool:
@@ -122,17 +118,13 @@ class Setup(Subject):
         """The table in a file that is named here; None if there is none, or it cannot be read."""
         if name.strip().lower() in NOTHING or not is_table(name):
             return None
-        path = self.place(name.strip())
-        try:
-            return _table(path, os.stat(path).st_mtime_ns)
-        except (OSError, OsimliteError, ValueError):
-            return None
+        return table_at(self.place(name.strip()))
 
     def document(self, name: str) -> Object | None:
         """The top of a document that is named here; None if there is none, or it cannot be read."""
         if name.strip().lower() in NOTHING:
             return None
-        return _top(self.place(name.strip()))
+        return top_at(self.place(name.strip()))
 
     # ------------------------------------------------------------------------------------------------- context
 
@@ -142,15 +134,15 @@ class Setup(Subject):
         if self.folder is None:
             return []
         here = self.folder.resolve()
-        return self._tools_in([here, here.parent, *_folders_in(here), *_folders_in(here.parent)])
+        return self._tools_in([here, here.parent, *folders_in(here), *folders_in(here.parent)])
 
     def _tools_in(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
         found = []
         for folder in dict.fromkeys(folders):
             self._looked_at[str(folder)] = None
-            for file in _documents_in(folder)[:_MOST_NEIGHBOURS]:
-                top = _top(file) if b"Tool" in _beginning(file) else None
-                if top is not None and (hasattr(top, "model_file") or hasattr(top, "generic_model_maker")):
+            for file in (documents_of(str(folder)) or [])[:_MOST_NEIGHBOURS]:
+                top = top_at(file) if _NAMES_MODEL.search(beginning(file)) else None
+                if top is not None and _model_named_by(top) is not None:
                     found.append((file, top))
                     self._looked_at[file] = None
         return found
@@ -160,7 +152,7 @@ class Setup(Subject):
         """The tool that this is, or that reads this; with the path of its setup."""
         if self.top is None or self.file is None:
             return None
-        if hasattr(self.top, "model_file") or hasattr(self.top, "generic_model_maker"):
+        if _model_named_by(self.top) is not None:
             return self.file, self.top
         here = os.path.realpath(self.file)
         for file, top in self.neighbours:
@@ -174,17 +166,46 @@ class Setup(Subject):
         return None
 
     @cached_property
-    def tree(self) -> Tree | None:  # type: ignore[override]
-        """The component tree of the model that the tool works on; None if there is none to be read."""
+    def model_file(self) -> str | None:
+        """Where the model is that the tool works on; None if there is no tool, or it names none."""
         if self.tool is None:
             return None
         file, top = self.tool
-        name = getattr(getattr(top, "generic_model_maker", top), "model_file", "")
+        name = _model_named_by(top) or ""
         if name.strip().lower() in NOTHING:
             return None
         path = os.path.normpath(os.path.join(os.path.dirname(file), name.strip()))
         self._looked_at[path] = None
-        return _tree(path)
+        return path
+
+    @cached_property
+    def tree(self) -> Tree | None:  # type: ignore[override]
+        """The component tree of the model that the tool works on; None if there is none to be read."""
+        return None if self.model_file is None else tree_at(self.model_file)
+
+    @cached_property
+    def uses(self) -> list[Use]:
+        """Every name that stands in the document, of a component or of something else."""
+        found: list[Use] = []
+        for item in self.items:
+            cls = type(item)
+            # What is named in a setup is looked up in the model: nothing in the document owns it.
+            owner: Any = item
+            if cls.name_reference is not None and item.name:
+                found.append(Use(item, owner, name_spec(cls), item.name))
+            for spec in reference_specs(cls):
+                value = getattr(item, spec.name)
+                if isinstance(value, tuple):
+                    found += [Use(item, owner, spec, word, position) for position, word in enumerate(value)]
+                elif value:
+                    found.append(Use(item, owner, spec, value))
+        return found
+
+    def resolution(self, use: Use) -> Resolution:
+        """What a name leads to in the model of the tool."""
+        if self.tree is None:
+            return Resolution(None, "missing")
+        return self.tree.lookup(use.reference, str(use.value), self.tree.model)
 
     @property
     def tool_folder(self) -> str:
@@ -197,20 +218,25 @@ class Setup(Subject):
             return None
         path = os.path.join(self.tool_folder, name.strip())
         self._looked_at[path] = None
-        return _top(path)
+        return top_at(path)
 
     def names_of(self, target: str) -> set[str]:
         """The names of all components of a class that the tool works with: those of the model and of added sets."""
         if self.tree is None or self.tool is None:
             return set()
         names = {item.name for item in self.tree.of_class(target).values()}
+        return names | {item.name for _, added in self.added for item in added.walk() if is_of(item, target)}
+
+    @cached_property
+    def added(self) -> list[tuple[str, Object]]:
+        """The sets of forces and markers that the tool adds to its model, with the paths of their files."""
+        if self.tool is None:
+            return []
         top = self.tool[1]
-        files = [*getattr(top, "force_set_files", ()), getattr(top, "marker_set_file", "")]
-        files.append(getattr(getattr(top, "generic_model_maker", None), "marker_set_file", ""))
-        for file in files:
-            added = self.beside_tool(file)
-            names |= {item.name for item in added.walk() if is_of(item, target)} if added is not None else set()
-        return names
+        names = [*getattr(top, "force_set_files", ()), getattr(top, "marker_set_file", "")]
+        names.append(getattr(getattr(top, "generic_model_maker", None), "marker_set_file", ""))
+        found = ((os.path.join(self.tool_folder, name.strip()), self.beside_tool(name)) for name in names)
+        return [(file, added) for file, added in found if added is not None]
 
     def is_written(self, path: str) -> bool:
         """Whether another setup of the project writes a file: it need not be there yet."""
@@ -242,74 +268,11 @@ def is_of(item: Object, target: str) -> bool:
     return any(base.__name__ == target for base in type(item).__mro__)
 
 
-def stamped(path: str) -> tuple[str, int] | None:
-    """A path with the time at which its file was written."""
-    try:
-        return path, os.stat(path).st_mtime_ns
-    except (OSError, ValueError):
-        return None
-
-
-def _top(path: str) -> Object | None:
-    stamp = stamped(path)
-    return None if stamp is None else _top_at(*stamp)
-
-
-@lru_cache(maxsize=256)
-def _top_at(path: str, changed: int) -> Object | None:
-    try:
-        return read_document(Source.of_file(path), of=Object).top
-    except (OsimliteError, ValueError, RecursionError):
-        return None
-
-
-def _tree(path: str) -> Tree | None:
-    stamp = stamped(path)
-    return None if stamp is None else _tree_at(*stamp)
-
-
-@lru_cache(maxsize=4)
-def _tree_at(path: str, changed: int) -> Tree | None:
-    top = _top_at(path, changed)
-    return Tree(top) if isinstance(top, Model) else None
-
-
-@lru_cache(maxsize=8)
-def _table(path: str, changed: int) -> Table:
-    return Table(read_file(path), path)
-
-
-def _folders_in(folder: Path) -> list[Path]:
-    try:
-        with os.scandir(folder) as entries:
-            return sorted(Path(entry.path) for entry in entries if entry.is_dir() and not entry.name.startswith("."))[
-                :100
-            ]
-    except OSError:
-        return []
-
-
-@lru_cache(maxsize=256)
-def _documents_at(folder: str, changed: int) -> list[str]:
-    with os.scandir(folder) as entries:
-        return sorted(
-            entry.path
-            for entry in entries
-            if entry.name.lower().endswith(DOCUMENTS)
-            and entry.is_file()
-            and entry.stat().st_size < _LARGEST_NEIGHBOUR
-            and begins_as_ours(entry.path)
-        )
-
-
-def _documents_in(folder: Path) -> list[str]:
-    stamp = stamped(str(folder))
-    return [] if stamp is None else _documents_at(*stamp)
-
-
-def _beginning(file: str) -> bytes:
-    try:
-        with open(file, "rb") as stream:
-            return stream.read(2000)
-    except OSError:
-        return b""
+def _model_named_by(top: Object) -> str | None:
+    """The file of the model that a tool works on; None of what is no tool."""
+    for item in top.walk():
+        if hasattr(item, "model_file"):
+            return str(item.model_file)
+        if is_of(item, "ModelProcessor"):
+            return str(getattr(item, "filepath", ""))
+    return None

@@ -30,24 +30,28 @@ T = TypeVar("T", bound=Object)
 
 
 class Subject(Checked):
-    """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read."""
+    """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
+
+    `top` is the object at the top of the document, whatever it is.
+    """
 
     def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
         super().__init__(config)
         self.model: Model | None
+        self.top: Object | None
         self.faults: list[DocumentError] = []
         self.notes: list[Note] = []
         self.changes: list[Change] = []
         self.refusals: list[Refusal] = []
         self.kept: dict[str, object] = {}
         if isinstance(found, Model):
-            self.model = found
+            self.model = self.top = found
         else:
             self.source = found.source
             self.faults = found.faults
             self.sure_until = found.sure_until
-            top = found.document.top if found.document else None
-            self.model = top if isinstance(top, Model) else None
+            self.top = found.document.top if found.document else None
+            self.model = self.top if isinstance(self.top, Model) else None
             self.notes = found.document.notes if found.document else []
             self.version = found.document.version if found.document else None
             self.changes = found.document.changes if found.document else []

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
-from typing import NamedTuple
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called, nearest_name
-from osimlite.schema.base import Object, Unknown
+from osimlite.schema.base import Unknown
 from osimlite.schema.fields import Reference
-from osimlite.schema.specs import FieldSpec, name_spec, reference_specs
 
 _IN_MODEL = {
     "coordinate-name": "coordinate",
@@ -58,27 +55,6 @@ _SILENT_CLASSES = ("IKMarkerTask", "BodyScale", "ControlSetController")
 """Classes of which it does so."""
 
 
-class Word(NamedTuple):
-    """One name in a property."""
-
-    item: Object
-    spec: FieldSpec
-    text: str
-    nth: int = 0
-
-
-def _words(setup: Setup) -> Iterator[Word]:
-    for item in setup.items:
-        cls = type(item)
-        if cls.name_reference is not None and item.name:
-            yield Word(item, name_spec(cls), item.name)
-        for spec in reference_specs(cls):
-            value = getattr(item, spec.name)
-            for text in value if isinstance(value, tuple) else (value,):
-                if isinstance(text, str) and text.strip():
-                    yield Word(item, spec, text.strip())
-
-
 @rule("OSIM831", "unknown-name", severity=ERROR, about="document")
 def unknown_name(setup: Setup, found: Found) -> None:
     """A setup names what the model of its tool does not have.
@@ -123,25 +99,24 @@ def unknown_name(setup: Setup, found: Found) -> None:
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
     model = tree.model
     known: dict[tuple[str, str], set[str]] = {}
-    for word in _words(setup):
-        kind = word.spec.kind
-        assert isinstance(kind, Reference)
+    for use in setup.uses:
+        item, kind, tag, text = use.holder, use.reference, use.spec.tag, str(use.value).strip()
         what = _IN_MODEL.get(kind.rule)
-        if kind.rule == "socket" and word.text.startswith(("/bodyset/", "/jointset/")):
+        if kind.rule == "socket" and text.startswith(("/bodyset/", "/jointset/")):
             what = "component"
-        elif kind.rule == "socket" and is_of(word.item, "Controller"):
+        elif kind.rule == "socket" and is_of(item, "Controller"):
             what = "actuator"
-            word = word._replace(text=word.text.rpartition("/")[2])
-        if what is None or word.text in _WORDS.get(word.spec.tag, ()) or word.text.lower() == "unassigned":
+            text = text.rpartition("/")[2]
+        if what is None or not text or text in _WORDS.get(tag, ()) or text.lower() == "unassigned":
             continue
-        if is_of(word.item, "ObjectGroup") or (is_of(word.item, "Controller") and word.text == "ALL"):
+        if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):
             continue
-        if not getattr(word.item, "on", True) or not getattr(word.item, "apply", True):
+        if not getattr(item, "on", True) or not getattr(item, "apply", True):
             continue
         reference = kind if kind.rule != "body-name-or-com" else Reference("body-name", "Body")
-        if tree.lookup(reference, word.text, model).target is not None:
+        if tree.lookup(reference, text, model).target is not None:
             continue
-        if what == "frame" and tree.lookup(Reference("model-path", "Frame"), word.text, model).target is not None:
+        if what == "frame" and tree.lookup(Reference("model-path", "Frame"), text, model).target is not None:
             continue
         key = (what, kind.target)
         if key not in known:
@@ -151,17 +126,17 @@ def unknown_name(setup: Setup, found: Found) -> None:
                 else setup.names_of({"body": "Body", "frame": "Body", "joint": "Joint"}.get(what, kind.target))
             )
         names = known[key]
-        if word.text in names or word.text in unknown:
+        if text in names or text in unknown:
             continue
-        silent = word.spec.tag in _SILENT or any(map(partial(is_of, word.item), _SILENT_CLASSES))
+        silent = tag in _SILENT or any(map(partial(is_of, item), _SILENT_CLASSES))
         fate = "OpenSim leaves it out" if silent else "OpenSim refuses it"
-        more = "; it is written in small letters" if word.text == "ALL" else ""
-        of_name = word.spec.tag == "@name"
+        more = "; it is written in small letters" if text == "ALL" else ""
+        of_name = tag == "@name"
         found(
-            f"the model has no {what} '{word.text}', which {called(word.item)} names: {fate}{more}",
-            word.item, tag=None if of_name else word.spec.tag, word=None if of_name else word.text,
+            f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}",
+            item, tag=None if of_name else tag, word=None if of_name else text,
             attribute="name" if of_name else None, severity=WARNING if silent else None,
-            suggestion="all" if more else nearest_name(word.text, sorted(names)),
+            suggestion="all" if more else nearest_name(text, sorted(names)),
         )  # fmt: skip
     if setup.tool is not None and type(setup.tool[1]).__name__ in ("AnalyzeTool", "ForwardTool"):
         actuators = setup.names_of("Actuator")
