@@ -1,8 +1,8 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
 Everything public is here: ``read``, ``read_document``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``paths``,
-``to_urdf``, ``simulate``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names
-are imported when first used, so that importing osimlite costs nothing.
+``to_urdf``, ``to_mjcf``, ``simulate``, the errors, and every component class under OpenSim's own name
+(``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
     from osimlite.simulation.paths import paths as paths
+    from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
 
     # When the program runs, `__getattr__` makes the list, of the component classes too.
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
         "read_document",
         "read_text",
         "simulate",
+        "to_mjcf",
         "to_text",
         "to_urdf",
         "validate",
@@ -50,6 +52,7 @@ _FUNCTIONS = {
     "to_text": "osimlite.document.printer",
     "validate": "osimlite.lint",
     "mechanism": "osimlite.multibody:build_mechanism",
+    "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",
     "paths": "osimlite.simulation.paths",
     "simulate": "osimlite.simulation",

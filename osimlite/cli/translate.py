@@ -11,84 +11,121 @@ from osimlite.cli._console import add_row, plain_console, say
 from osimlite.text import listed, visible
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from osimlite.translate.export import Urdf
     from osimlite.translate.fidelity import Fidelity
+    from osimlite.translate.mjcf.export import Mjcf
 
 
 def translate(
     file: options.File,
-    to: Annotated[str, typer.Option("--to", help="The format: 'urdf'.")] = "urdf",
+    to: Annotated[str, typer.Option("--to", help="The format: 'urdf', or 'mjcf' for MuJoCo.")] = "urdf",
     output: options.Folder = None,
+    geometry: options.Geometry = None,
     limits: Annotated[
-        str, typer.Option(help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.")
-    ] = "none",
+        str | None,
+        typer.Option(
+            help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
+            show_default="none",
+            rich_help_panel="URDF",
+        ),
+    ] = None,
     merge: Annotated[
-        bool, typer.Option("--merge", help="Make bodies that do not move relative to each other one link.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--merge", help="Make bodies that do not move relative to each other one link.", rich_help_panel="URDF"
+        ),
+    ] = None,
     collision: Annotated[
-        bool,
-        typer.Option("--collision", help="Write contact geometry as collision shapes (a half space as a large box)."),
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--collision",
+            help="Write contact geometry as collision shapes (a half space as a large box).",
+            rich_help_panel="URDF",
+        ),
+    ] = None,
     effort: Annotated[
         float | None,
         typer.Option(
             help="Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
             show_default="no limit",
+            rich_help_panel="URDF",
         ),
     ] = None,
     velocity: Annotated[
-        float | None, typer.Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit")
+        float | None,
+        typer.Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit", rich_help_panel="URDF"),
     ] = None,
-    geometry: options.Geometry = None,
+    mujoco: Annotated[
+        int | None, typer.Option(help="The version to write for, 3 or 4.", show_default="4", rich_help_panel="MJCF")
+    ] = None,
+    contact: Annotated[
+        str | None,
+        typer.Option(
+            help="'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
+            show_default="native",
+            rich_help_panel="MJCF",
+        ),
+    ] = None,
 ) -> None:
-    """Translate a model: writes <file>.urdf, its meshes, <file>.coordinates.json and fidelity.json.
+    """Translate a model: writes its text, its meshes and fidelity.json.
 
+    --to urdf writes <file>.urdf and <file>.coordinates.json, which says how
+    coordinates drive joints where URDF cannot; --to mjcf writes <file>.xml.
     Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
-    coordinates.json says how coordinates drive joints, where URDF cannot.
     fidelity.json says what became of every component, and the table what is lost.
 
-    Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry --collision -o robot
+    Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
-    from typing import cast
-
     from osimlite.document.reader import read
-    from osimlite.errors import OsimliteError
-    from osimlite.translate.export import Limits, to_urdf
+    from osimlite.errors import OsimliteError, SettingError
+    from osimlite.translate import to_mjcf, to_urdf
 
-    if to != "urdf":
-        raise OsimliteError(f"--to is 'urdf', not '{to}'")
-    if limits not in ("none", "range"):
-        raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
-    urdf = to_urdf(
-        read(file),
-        limits=cast("Limits", limits),
-        merge=merge,
-        collision=collision,
-        effort=effort,
-        velocity=velocity,
-        folder=file.parent,
-        name=file.stem,
-        geometry=options.mesh_folders(file, geometry),
+    formats: dict[str, tuple[Callable[..., Urdf | Mjcf], dict[str, Any]]] = {
+        "urdf": (
+            to_urdf,
+            {"limits": limits, "merge": merge, "collision": collision, "effort": effort, "velocity": velocity},
+        ),
+        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact}),
+    }
+    if to not in formats:
+        raise OsimliteError(f"--to is 'urdf' or 'mjcf', not '{to}'")
+    for name, (_, choices) in formats.items():
+        strange = [choice for choice, value in choices.items() if value is not None and name != to]
+        if strange:
+            raise SettingError(f"--{strange[0]} is an option of --to {name}")
+    export, choices = formats[to]
+    given = {name: value for name, value in choices.items() if value is not None}
+    made = export(
+        read(file), folder=file.parent, name=file.stem, geometry=options.mesh_folders(file, geometry), **given
     )
-    written = urdf.write(options.results_folder(file, output))
+    written = made.write(options.results_folder(file, output))
 
-    if len(urdf.fidelity):
-        plain_console().print(_table(urdf.fidelity))
-    robot = urdf.robot
+    if len(made.fidelity):
+        plain_console().print(_table(made.fidelity, to.upper()))
+    robot = made.robot
     say(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
         + listed([str(path) for path in written], most=4)
     )
 
 
-def _table(fidelity: Fidelity) -> Any:
+def _table(fidelity: Fidelity, target: str) -> Any:
     """What is lost, one row for all components of which the same is said."""
     from rich.table import Table
 
-    table = Table(title=visible(f"What URDF cannot say of {fidelity.model}"), title_justify="left", show_lines=True)
+    table = Table(title=visible(f"What {target} cannot say of {fidelity.model}"), title_justify="left", show_lines=True)
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("done about it", overflow="fold", ratio=3)
     table.add_column("where", overflow="fold", ratio=3)
+    measured = any(record.errors for record in fidelity)
+    if measured:
+        table.add_column("worst error", overflow="fold", ratio=2)
     for group in fidelity.groups():
         names = dict.fromkeys(path.rsplit("/", 1)[1] or "the model" for path in group.components)
-        add_row(table, group.cannot_say, group.done, listed(list(names), most=3))
+        worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
+        add_row(
+            table, group.cannot_say, group.done, listed(list(names), most=3), *(["\n".join(worst)] if measured else [])
+        )
     return table

@@ -33,6 +33,21 @@ class UniqueNames:
         return word
 
 
+def coordinate_names(robot: Robot) -> Robot:
+    """The same robot with joints named by their coordinates: by its path with dots where coordinates share a name."""
+    names = robot.mechanism.coordinate_names
+    own = {joint.name: names[place].strip("/").replace("/", ".") for place, joint in robot.joint_of.items()}
+    taken = set(own.values())
+    for joint in robot.joints:
+        if joint.name not in own:
+            name, count = joint.name, 1
+            while name in taken:
+                name, count = f"{joint.name}_{count}", count + 1
+            own[joint.name] = name
+            taken.add(name)
+    return replace(robot, joints=tuple(replace(joint, name=own[joint.name]) for joint in robot.joints))
+
+
 def legal_names(robot: Robot) -> Robot:
     """The same robot with legal names.
 

@@ -12,14 +12,18 @@ if TYPE_CHECKING:
     from osimlite.translate.export import Urdf as Urdf
     from osimlite.translate.export import to_urdf as to_urdf
     from osimlite.translate.fidelity import Fidelity as Fidelity
+    from osimlite.translate.mjcf.export import Mjcf as Mjcf
+    from osimlite.translate.mjcf.export import to_mjcf as to_mjcf
 
 __getattr__ = imported_when_used(
     __name__,
     {
         "Fidelity": "osimlite.translate.fidelity",
+        "Mjcf": "osimlite.translate.mjcf.export",
         "Robot": "osimlite.robot.robot",
         "Urdf": "osimlite.translate.export",
         "build_robot": "osimlite.robot.build",
+        "to_mjcf": "osimlite.translate.mjcf.export",
         "to_urdf": "osimlite.translate.export",
     },
 )

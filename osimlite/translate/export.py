@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 from osimlite.errors import OsimliteError
-from osimlite.files import make_folder, write_atomically
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.robot.build import build_robot
@@ -23,6 +22,7 @@ from osimlite.robot.visuals import Visuals, collect_visuals
 from osimlite.schema.model import Model
 from osimlite.translate.collisions import collect_collisions
 from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.files import write_files
 from osimlite.translate.sidecar import coordinates_json
 from osimlite.translate.strength import strength
 from osimlite.translate.survey import survey
@@ -62,18 +62,15 @@ class Urdf:
         Raises:
             OsimliteError: a file cannot be written.
         """
-        base = Path(folder)
-        urdf, account = base / f"{self.name}.urdf", base / "fidelity.json"
-        meshes = [(base / name, content) for name, content in self.files.items()]
-        for parent in sorted({base, *(path.parent for path, _ in meshes)}):
-            make_folder(parent)
-        for path, content in meshes:
-            write_atomically(path, content)
-        coordinates = base / f"{self.name}.coordinates.json"
-        write_atomically(coordinates, self.coordinates)
-        write_atomically(account, self.fidelity.to_json())
-        write_atomically(urdf, self.text)
-        return [urdf, *(path for path, _ in meshes), coordinates, account]
+        return write_files(
+            Path(folder),
+            {
+                f"{self.name}.urdf": self.text,
+                **self.files,
+                f"{self.name}.coordinates.json": self.coordinates,
+                "fidelity.json": self.fidelity.to_json(),
+            },
+        )
 
 
 def to_urdf(
@@ -109,10 +106,12 @@ def to_urdf(
         name: of the files to write, without ending; that of the model if not given.
 
     Raises:
-        OsimliteError: a limit is not a positive number.
+        OsimliteError: a limit is not a positive number, or `limits` is no word of these.
         ModelError: the model is not a mechanism: something it names is not there, or a body is not connected.
         UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
     """
+    if limits not in ("none", "range"):
+        raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
     for what, limit in (("effort", effort), ("velocity", velocity)):
         if limit is not None and not 0.0 < limit < math.inf:
             raise OsimliteError(f"a limit of {what} is a positive number, not {limit:g}; leave it out for no limit")

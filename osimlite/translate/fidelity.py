@@ -3,8 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+
+LEFT_OUT = "left out"
+"""What `Record.done` starts with where nothing of the component is in the target."""
+
+
+class Error(NamedTuple):
+    """How far the target is from the model over the poses that were compared: the worst, and the root mean square."""
+
+    max: float
+    rms: float
+    unit: str
+
+    @classmethod
+    def of(cls, differences: Sequence[float] | Array, unit: str) -> Error:
+        """The error that these differences are."""
+        off = np.abs(differences)
+        return cls(float(off.max()), float(np.sqrt(np.mean(off**2))), unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +39,7 @@ class Record:
         cannot_say: what the target cannot say.
         done: what was done about it.
         detail: the numbers and names of this case; may be empty.
+        errors: what was measured of an approximation, by the name of the quantity: length, value, force ...
     """
 
     kind: str
@@ -24,6 +47,12 @@ class Record:
     cannot_say: str
     done: str
     detail: str = ""
+    errors: Mapping[str, Error] = field(default_factory=dict)
+
+    @property
+    def how(self) -> Literal["approximate", "dropped"]:
+        """Whether something of it is left."""
+        return "dropped" if self.done.startswith(LEFT_OUT) else "approximate"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +62,20 @@ class Group:
     kind: str
     cannot_say: str
     done: str
-    components: tuple[str, ...]
+    records: tuple[Record, ...]
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Absolute paths of the components."""
+        return tuple(record.component for record in self.records)
+
+    def worst(self) -> list[tuple[str, Error]]:
+        """The largest error of each quantity and unit."""
+        found: dict[tuple[str, str], Error] = {}
+        for record in self.records:
+            for name, error in record.errors.items():
+                found[name, error.unit] = max(error, found.get((name, error.unit), error))
+        return [(name, error) for (name, _), error in found.items()]
 
 
 @dataclass
@@ -61,16 +103,24 @@ class Fidelity:
     def __len__(self) -> int:
         return len(self.records)
 
-    def add(self, kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+    def add(
+        self,
+        kind: str,
+        component: str,
+        cannot_say: str,
+        done: str,
+        detail: str = "",
+        errors: Mapping[str, Error] | None = None,
+    ) -> None:
         """Add a record."""
-        self.records.append(Record(kind, component, cannot_say, done, detail))
+        self.records.append(Record(kind, component, cannot_say, done, detail, errors or {}))
 
     def groups(self) -> list[Group]:
         """The records, those of one kind that say the same together, in the order of the first of each."""
-        found: dict[tuple[str, str, str], list[str]] = {}
+        found: dict[tuple[str, str, str], list[Record]] = {}
         for record in self.records:
-            found.setdefault((record.kind, record.cannot_say, record.done), []).append(record.component)
-        return [Group(*key, tuple(paths)) for key, paths in found.items()]
+            found.setdefault((record.kind, record.cannot_say, record.done), []).append(record)
+        return [Group(*key, tuple(records)) for key, records in found.items()]
 
     def left_out(self, paths: Iterable[str]) -> list[str]:
         """Those of the paths that nothing accounts for: neither translated nor recorded, nor below a record."""
@@ -88,10 +138,16 @@ class Fidelity:
         records = [
             {
                 "kind": record.kind,
+                "how": record.how,
                 "component": record.component,
                 "cannot_say": record.cannot_say,
                 "done": record.done,
                 **({"detail": record.detail} if record.detail else {}),
+                **(
+                    {"errors": {name: error._asdict() for name, error in record.errors.items()}}
+                    if record.errors
+                    else {}
+                ),
             }
             for record in self.records
         ]

@@ -21,8 +21,9 @@ from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.probes import Probe
 from osimlite.schema.sets import ModelComponentSet
+from osimlite.schema.tree import Tree
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
-from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
 COMPUTE = "compute its value by the file of coordinates"
 """What to do about a joint that the robot's file leaves free."""
@@ -54,6 +55,24 @@ def survey(model: Model, robot: Robot, fidelity: Fidelity) -> None:
     _Survey(model, robot, fidelity).run()
 
 
+def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
+    """Record everything that nothing accounts for yet as left out, but for the parts of what is left out itself."""
+    accounted = {record.component for record in fidelity.records} | fidelity.translated.keys()
+    dropped: set[int] = set()
+    for component in tree.components:
+        path = tree.path_of(component) or ""
+        above = tree.parent_of(component)
+        if above is not None and id(above) in dropped:
+            # A part of something left out, such as the path of a muscle.
+            dropped.add(id(component))
+        elif path not in accounted and not isinstance(component, CONTAINERS):
+            dropped.add(id(component))
+            name = getattr(component, "class_name", "") or type(component).__name__
+            known = ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls))
+            kind, what = next(known, ("component", f"a component of class {name}"))
+            fidelity.add(kind, path, what, LEFT_OUT, name)
+
+
 class _Survey:
     def __init__(self, model: Model, robot: Robot, fidelity: Fidelity) -> None:
         self.model, self.robot, self.fidelity = model, robot, fidelity
@@ -75,7 +94,7 @@ class _Survey:
                     self.fidelity.translated[shape.source] = f"{kind} of link {link.name}"
         self._couplers()
         self._frames()
-        self._rest()
+        account_for_rest(self.tree, self.fidelity)
 
     def _gravity(self) -> None:
         units = f"{self.model.length_units} {self.model.force_units}".lower().split()
@@ -252,22 +271,6 @@ class _Survey:
                 "left out as a frame; what is fixed to it is in the body's link",
                 f"in {owner} at ({x:g}, {y:g}, {z:g}) m",
             )
-
-    def _rest(self) -> None:
-        accounted = {record.component for record in self.fidelity.records} | self.fidelity.translated.keys()
-        dropped: set[int] = set()
-        for component in self.tree.components:
-            path = self.tree.path_of(component) or ""
-            above = self.tree.parent_of(component)
-            if above is not None and id(above) in dropped:
-                # A part of something left out, such as the path of a muscle.
-                dropped.add(id(component))
-            elif path not in accounted and not isinstance(component, CONTAINERS):
-                dropped.add(id(component))
-                name = getattr(component, "class_name", "") or type(component).__name__
-                known = ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls))
-                kind, what = next(known, ("component", f"a component of class {name}"))
-                self.note(kind, path, what, "left out", name)
 
     def _renamed(self, path: str, name: str) -> None:
         self.note("name", path, "the name of a component as it is", "renamed", name)

@@ -79,7 +79,10 @@ def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("walker.osim", "--to", "mjcf"), "--to is 'urdf', not 'mjcf'"),
+        (("walker.osim", "--to", "sdf"), "--to is 'urdf' or 'mjcf', not 'sdf'"),
+        (("walker.osim", "--to", "mjcf", "--merge"), "--merge is an option of --to urdf"),
+        (("walker.osim", "--mujoco", "3"), "--mujoco is an option of --to mjcf"),
+        (("walker.osim", "--to", "mjcf", "--mujoco", "2"), "MuJoCo 3 or 4, not 2"),
         (("walker.osim", "--limits", "all"), "--limits is 'none' or 'range'"),
         (("walker.osim", "--effort", "0"), "a limit of effort is a positive number, not 0"),
         (("gone.osim",), "gone.osim"),

@@ -1,0 +1,121 @@
+"""Bodies and joints: every body of the model is one element, whatever joint carries it.
+
+Several joints in one element of MuJoCo move it one after the other, each about an anchor and an axis that it carries
+along. So a chain of one-axis joints needs no massless bodies between them: the anchors and axes are those of the chain
+at zero, seen from its end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from lxml.etree import _Element
+
+from osimlite.multibody.spatial import Array, inverse
+from osimlite.robot.principal_axes import breaks_triangle_rule, principal_axes
+from osimlite.robot.robot import Link, RobotJoint
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.joints import Joint
+from osimlite.translate.fidelity import Error
+from osimlite.translate.mjcf.draft import Draft, add, pose, quaternion, tidy
+
+LEAST_MASS = 1e-14
+"""Mass (kg) and principal moments (kg·m²) of a moving body without: MuJoCo wants more than 1e-15."""
+
+MOST_JOINTS = 6
+"""That MuJoCo lets one body have."""
+
+
+def add_bodies(draft: Draft) -> None:
+    """Add all bodies with their inertia and joints."""
+    robot = draft.robot
+    carriers = {joint.child: joint for joint in robot.joints}
+    bodies = {path: index for index, path in enumerate(body.path for body in draft.mechanism.bodies)} | {"/ground": -1}
+    elements: dict[str, _Element] = {}
+    for link in robot.links:
+        if not link.bodies:
+            continue
+        (path,) = link.bodies
+        if path == "/ground":
+            element = draft.section("worldbody")
+            draft.fidelity.translated[path] = "worldbody"
+        else:
+            chain: list[RobotJoint] = []
+            while not chain or chain[0].parent not in elements:
+                chain.insert(0, carriers[chain[0].parent if chain else link.name])
+            element = _add_chain(elements[chain[0].parent], chain, link.name)
+            _add_inertia(draft, element, link, path, moves=any(part.kind != "fixed" for part in chain))
+            if path in draft.tree.by_path:
+                draft.fidelity.translated[path] = f"body {element.get('name')}"
+        elements[link.name] = draft.bodies[bodies[path]] = element
+    for component, path in draft.components(Joint):
+        names = [part.name for part in robot.moving if part.source == path]
+        draft.fidelity.translated[path] = f"joints {' '.join(names)}" if names else "welded"
+        for frame in component.frames:
+            draft.fidelity.translated[draft.tree.path_of(frame) or ""] = "anchors of joints"
+
+
+def add_frames(draft: Draft) -> None:
+    """Add a site for every frame that is no body, so that it can be asked for."""
+    for _, path in draft.components(PhysicalFrame):
+        if path in draft.mechanism.frames:
+            draft.fidelity.translated[path] = f"site {draft.site(path, *draft.mechanism.frames[path], group='5')}"
+
+
+def _add_chain(parent: _Element, chain: list[RobotJoint], name: str) -> _Element:
+    """The element of the body at the end of a chain of joints, in the body that carries it."""
+    moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
+    if len(moving) > MOST_JOINTS:
+        cut = moving[MOST_JOINTS]
+        parent = _add_chain(parent, chain[:cut], f"{name}_carrier")
+        add(parent, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
+        chain = chain[cut:]
+    rest, joints = np.eye(4), []
+    for joint in reversed(chain):
+        if joint.kind != "fixed":
+            joints.append((joint, rest[:3, :3].T @ joint.axis, inverse(rest)[:3, 3]))
+        rest = joint.origin @ rest
+    element = add(parent, "body", name=name, **pose(rest))
+    for joint, axis, anchor in reversed(joints):
+        kind, place = ("hinge", tidy(anchor)) if joint.kind == "revolute" else ("slide", None)
+        add(element, "joint", name=joint.name, type=kind, axis=tidy(axis), pos=place)
+    return element
+
+
+def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, moves: bool) -> None:
+    moments, axes = principal_axes(link.inertia)
+    mass = link.mass
+    if breaks_triangle_rule(moments):
+        draft.fidelity.add(
+            "inertia",
+            path,
+            "an inertia that no body can have (one principal moment exceeds the sum of the others): MuJoCo stops with "
+            "'inertia must satisfy A + B >= C'",
+            "the least moment raised until it can be (MuJoCo's own option, balanceinertia, would make all three their "
+            "mean); set body_inertia of the compiled model for the model's own",
+            "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
+            {"moment": Error.of(_possible(moments) - moments, "kg m^2")},
+        )
+    moments = _possible(moments)
+    if moves and (mass < LEAST_MASS or moments.min() < LEAST_MASS):
+        if mass < LEAST_MASS:
+            draft.fidelity.add(
+                "massless",
+                path,
+                "a moving body without mass: MuJoCo stops with 'mass and inertia of moving bodies must be larger than "
+                "mjMINVAL'",
+                f"a mass of {LEAST_MASS:g} kg",
+            )
+        mass, moments = max(mass, LEAST_MASS), np.maximum(moments, LEAST_MASS)
+    if mass > 0.0:
+        quat = tidy(quaternion(axes))
+        add(element, "inertial", pos=tidy(link.center), quat=quat, mass=mass, diaginertia=moments)
+
+
+def _possible(moments: Array) -> Array:
+    """The moments with the least one raised until none exceeds the sum of the others, in floating point too."""
+    raised = moments.copy()
+    least, middle, greatest = np.argsort(moments)
+    raised[least] = max(raised[least], raised[greatest] - raised[middle], 0.0)
+    while raised[least] + raised[middle] < raised[greatest]:
+        raised[least] = np.nextafter(raised[least], np.inf)
+    return raised

@@ -1,0 +1,50 @@
+"""Coordinates: what each became, and what the model says of it besides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, ScapulothoracicJoint
+from osimlite.translate.mjcf.couplings import hold_joint
+from osimlite.translate.mjcf.draft import Draft
+
+_ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
+
+
+def add_coordinates(draft: Draft) -> None:
+    """Write ranges, which limit nothing, to the joints that are coordinates, and hold prescribed coordinates."""
+    elements = {joint.get("name"): joint for joint in draft.section("worldbody").iter("joint")}
+    note, moving = draft.fidelity.add, {place for joint in draft.robot.moving for place in joint.coordinates}
+    for place, info in enumerate(draft.mechanism.coordinates):
+        lead = draft.leads.get(place)
+        done = "locked: a part of the body that carries it" if info.locked else "what its joints follow"
+        draft.fidelity.translated[info.path] = done if lead is None else f"joint {lead.joint}"
+        if lead is None and place not in moving and not info.locked:
+            note("coordinate", info.path, "a coordinate that moves nothing", "left out")
+        if lead is not None and lead.line == (1.0, 0.0):
+            element = elements[lead.joint]
+            if all(map(math.isfinite, info.range)) and info.range[0] < info.range[1]:
+                element.set("range", " ".join(map(repr, info.range)))
+                element.set("limited", "false")
+        if info.clamped:
+            note("clamped", info.path, "that a user interface must not leave the range", "left out")
+        if info.prescribed is not None and not info.locked and lead is not None:
+            start = info.prescribed.evaluate(np.zeros(1))[0]
+            hold_joint(draft, lead.joint, lead.line.slope * start + lead.line.start)
+            note(
+                "prescribed",
+                info.path,
+                "a coordinate that follows a function of time",
+                "held at its value at time 0; write the function into eq_data at every step",
+                f"equality {lead.joint}",
+            )
+    for joint in draft.tree.components:
+        if isinstance(joint, _ANGULAR_SPEEDS):
+            note(
+                "speeds",
+                draft.tree.path_of(joint) or "",
+                "three rotations at once, whose speeds are an angular velocity",
+                "three hinges: the same coordinates, whose speeds are their rates; singular where OpenSim's are",
+            )

@@ -1,0 +1,216 @@
+"""The MJCF under construction: what every pass reads, and adds to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeVar
+
+import numpy as np
+from lxml.etree import Element, SubElement, _Element
+
+from osimlite.errors import ModelError, SimulationError
+from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.robot.lines import Line
+from osimlite.robot.mesh_files import MeshFiles
+from osimlite.robot.robot import Robot
+from osimlite.robot.urdf import number, numbers
+from osimlite.schema.base import Component
+from osimlite.schema.model import Model
+from osimlite.schema.tree import Tree
+from osimlite.translate.fidelity import Fidelity
+
+Version = Literal[3, 4]
+Contact = Literal["native", "none"]
+Value = str | bool | int | float | Sequence[float] | Array | None
+C = TypeVar("C", bound=Component)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user chooses.
+
+    Attributes:
+        version: of MuJoCo, whose first number decides what a side site means.
+        visuals: whether to say what bodies look like.
+        contact: whether contact forces become contacts of MuJoCo's own law, or nothing.
+    """
+
+    version: Version = 4
+    visuals: bool = True
+    contact: Contact = "native"
+
+
+class Lead(NamedTuple):
+    """A joint of the MJCF whose value (rad, m) is a straight line of a coordinate."""
+
+    joint: str
+    line: Line
+
+
+class Follower(NamedTuple):
+    """How a joint follows another: its value is the polynomial, constant first, of the leader's, or constant."""
+
+    leader: str | None
+    polynomial: tuple[float, ...]
+
+
+def add(parent: _Element, tag: str, **attributes: Value) -> _Element:
+    """Add an element; attributes that are None are left out, and ``class_`` stands for ``class``."""
+    said = {name.rstrip("_"): text(value) for name, value in attributes.items() if value is not None}
+    return SubElement(parent, tag, said)
+
+
+@dataclass
+class Draft:
+    """A model on its way to MJCF.
+
+    Attributes:
+        model: the model.
+        robot: its mechanism as one-axis joints; locked coordinates are fixed joints.
+        fidelity: the account; a pass puts components into `translated`, and what is lost into records.
+        options: what the user chooses.
+        mesh_files: takes up the mesh files that the text names.
+        root: the element ``<mujoco>``.
+        bodies: the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
+        leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
+        followers: what equality constraints make of joints, by name.
+    """
+
+    model: Model
+    robot: Robot
+    fidelity: Fidelity
+    options: Options
+    mesh_files: MeshFiles
+    root: _Element = field(default_factory=lambda: Element("mujoco"))
+    bodies: dict[int, _Element] = field(default_factory=dict)
+    leads: dict[int, Lead] = field(default_factory=dict)
+    followers: dict[str, Follower] = field(default_factory=dict)
+    _names: dict[str, set[str]] = field(default_factory=dict)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism of the model."""
+        return self.robot.mechanism
+
+    @cached_property
+    def tree(self) -> Tree:
+        """The components of the model, and where they are."""
+        return self.model.tree()
+
+    @cached_property
+    def default_state(self) -> tuple[Array, Array]:
+        """Values (n,) and speeds (n,) of the coordinates in the default pose, which fulfil the constraints.
+
+        Where no pose near the model's own does, the model's own.
+        """
+        try:
+            return self.mechanism.default_state()
+        except SimulationError:
+            self.fidelity.add("default-pose", "/", "a default pose near none that fulfils the constraints", "as it is")
+            return self.mechanism.values({}), self.mechanism.speeds({})
+
+    def components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
+        """Components of a class that no pass has spoken of yet, with their absolute paths."""
+        spoken_of = self.fidelity.translated.keys() | {record.component for record in self.fidelity.records}
+        for component in self.tree.components:
+            if isinstance(component, kind) and (path := self.tree.path_of(component) or "") not in spoken_of:
+                yield component, path
+
+    def section(self, tag: str) -> _Element:
+        """The part of the file with this tag: ``tendon``, ``actuator``, ``equality`` ..."""
+        found = self.root.find(tag)
+        return add(self.root, tag) if found is None else found
+
+    def name(self, kind: str, path: str) -> str:
+        """A name for a component, unlike any other of this kind: its own, or its path with dots where that is taken.
+
+        Args:
+            kind: MuJoCo's name space: ``geom``, ``site``, ``tendon``, ``actuator``, ``equality`` ...
+            path: absolute path of the component, or any name.
+        """
+        taken = self._names.setdefault(kind, set())
+        dotted = path.strip("/").replace("/", ".")
+        candidates = [path.rsplit("/", 1)[-1] or dotted, dotted]
+        count = 1
+        while (name := candidates.pop(0)) in taken:
+            count += 1
+            candidates.append(f"{dotted}_{count}")
+        taken.add(name)
+        return name
+
+    def placement(self, owner: Component, socket: str) -> FramePlacement:
+        """The frame that a socket of a component names: index of its body, and transform (4, 4) in that.
+
+        Raises:
+            ModelError: there is no such frame, or it is not fixed to a body.
+        """
+        path = self.tree.path_of(self.tree.target(owner, socket, getattr(owner, socket))) or ""
+        if path not in self.mechanism.frames:
+            raise ModelError(f"the frame '{path}' is not fixed to a body")
+        return self.mechanism.frames[path]
+
+    def site(self, path: str, body: int, place: Array, **attributes: Value) -> str:
+        """Add a site to a body (-1: ground).
+
+        Args:
+            path: of the component that it stands for, from which it has its name.
+            body: index in the mechanism.
+            place: in the frame of the body, location (3,) in m or transform (4, 4).
+            **attributes: more of the element's.
+
+        Returns:
+            Its name.
+        """
+        name = self.name("site", path)
+        frame = pose(place) if place.shape == (4, 4) else {"pos": tidy(place)}
+        add(self.bodies[body], "site", name=name, **frame, **attributes)
+        return name
+
+    def body_name(self, body: int) -> str:
+        """Name of the element of a body (-1: ground)."""
+        return "world" if body == GROUND else self.bodies[body].get("name", "")
+
+
+def pose(matrix: Array) -> dict[str, Value]:
+    """The attributes that place a frame (4, 4) in that of its parent."""
+    return {"pos": tidy(matrix[:3, 3]), "quat": tidy(quaternion(matrix[:3, :3]))}
+
+
+def quaternion(rotation: Array) -> Array:
+    """Unit quaternion (4,), scalar first, of a rotation matrix, by the largest of its components."""
+    m = rotation
+    squares = 1.0 + np.array(
+        (
+            m[0, 0] + m[1, 1] + m[2, 2],
+            m[0, 0] - m[1, 1] - m[2, 2],
+            m[1, 1] - m[0, 0] - m[2, 2],
+            m[2, 2] - m[0, 0] - m[1, 1],
+        )
+    )
+    a, b, c = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    d, e, f = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
+    products = np.array(((0.0, a, b, c), (a, 0.0, d, e), (b, d, 0.0, f), (c, e, f, 0.0)))
+    largest = int(np.argmax(squares))
+    found: Array = products[largest]
+    found[largest] = squares[largest]
+    return found / np.linalg.norm(found)
+
+
+def tidy(values: Array) -> Array:
+    """The numbers with zeros for those that are zero but for rounding, which nobody wants to read."""
+    return np.where(np.abs(values) < 1e-16, 0.0, values)
+
+
+def text(value: str | bool | int | float | Sequence[float] | Array) -> str:
+    """An attribute as MuJoCo reads it; numbers in the shortest form that reads back equal."""
+    match value:
+        case str():
+            return value
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return number(value)
+    return numbers(value)

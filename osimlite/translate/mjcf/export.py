@@ -1,0 +1,139 @@
+"""The translation of a whole model to MJCF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lxml.etree import Comment, tostring
+
+from osimlite import __version__
+from osimlite.errors import SettingError
+from osimlite.meshes.folders import MeshFolders
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Values
+from osimlite.robot.build import build_robot
+from osimlite.robot.mesh_files import MeshFiles
+from osimlite.robot.names import coordinate_names, legal
+from osimlite.robot.robot import Robot
+from osimlite.schema.model import Model
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.files import write_files
+from osimlite.translate.mjcf.bodies import add_bodies, add_frames
+from osimlite.translate.mjcf.coordinates import add_coordinates
+from osimlite.translate.mjcf.couplings import add_couplings
+from osimlite.translate.mjcf.draft import Contact, Draft, Lead, Options, Version, add
+from osimlite.translate.mjcf.keyframe import add_keyframe
+from osimlite.translate.survey import account_for_rest
+
+PASSES: tuple[Callable[[Draft], None], ...] = (
+    add_bodies,
+    add_couplings,
+    add_coordinates,
+    add_frames,
+    add_keyframe,
+)
+"""What makes a file of a model, in this order: bodies and joints come before what is fixed to them or acts on them."""
+
+
+@dataclass(frozen=True)
+class Mjcf:
+    """A model as MJCF.
+
+    Attributes:
+        name: of the files.
+        text: the MJCF.
+        fidelity: what became of every component, exact where there is no record of it.
+        robot: the neutral robot that was written; its joints and links have MuJoCo's names.
+        files: mesh files that the text names, by name relative to it.
+        leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
+    """
+
+    name: str
+    text: str
+    fidelity: Fidelity
+    robot: Robot
+    files: dict[str, bytes] = field(default_factory=dict)
+    leads: Mapping[int, Lead] = field(default_factory=dict)
+
+    def joint_values(self, q: Values) -> dict[str, float]:
+        """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
+        values = self.robot.mechanism.values(q)
+        leads = {joint: line.slope * values[place] + line.start for place, (joint, line) in self.leads.items()}
+        return leads | self.robot.joint_values(values)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write ``<name>.xml``, its meshes and ``fidelity.json`` into a folder, which is made if it is not there.
+
+        Returns:
+            The files written, the MJCF first. It is written last, when all it needs is in place.
+
+        Raises:
+            OsimliteError: a file cannot be written.
+        """
+        return write_files(
+            Path(folder), {f"{self.name}.xml": self.text, **self.files, "fidelity.json": self.fidelity.to_json()}
+        )
+
+
+def to_mjcf(
+    model: Model,
+    *,
+    mujoco: Version = 4,
+    visuals: bool = True,
+    contact: Contact = "native",
+    folder: str | Path | None = None,
+    geometry: Sequence[str | Path] = (),
+    name: str | None = None,
+) -> Mjcf:
+    """Translate a model to MJCF, without MuJoCo and without OpenSim.
+
+    Bodies keep their names and frames. Joints are named by their coordinates, whose values are theirs (rad, m).
+
+    Args:
+        model: the model.
+        mujoco: the version to write for, 3 or 4.
+        visuals: whether to say what bodies look like.
+        contact: ``"native"`` writes contact forces as contacts of MuJoCo's own law, ``"none"`` leaves them out.
+        folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
+        geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
+            separated as in PATH, follow them.
+        name: of the files to write, without ending; that of the model if not given.
+
+    Raises:
+        SettingError: an option has a value that it does not take.
+        ModelError: the model is not a mechanism: something it names is not there, or a body is not connected.
+        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+    """
+    if mujoco not in (3, 4):
+        raise SettingError(f"MJCF is written for MuJoCo 3 or 4, not {mujoco}")
+    if contact not in ("native", "none"):
+        raise SettingError(f"contact is 'native' or 'none', not '{contact}'")
+    mechanism = build_mechanism(model)
+    fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
+    mesh_files = MeshFiles(MeshFolders(None if folder is None else Path(folder), [Path(place) for place in geometry]))
+    robot = coordinate_names(build_robot(mechanism))
+    draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact), mesh_files)
+    _add_settings(draft)
+    fidelity.translated["/"] = f"mujoco {mechanism.name}"
+    for make in PASSES:
+        make(draft)
+    account_for_rest(draft.tree, fidelity)
+    text = tostring(draft.root, pretty_print=True, xml_declaration=True, encoding="utf-8").decode()
+    return Mjcf(
+        legal(model.name or "model") if name is None else name, text, fidelity, robot, mesh_files.files, draft.leads
+    )
+
+
+def _add_settings(draft: Draft) -> None:
+    root = draft.root
+    root.set("model", draft.mechanism.name)
+    root.append(Comment(f" Written by osimlite {__version__} for MuJoCo {draft.options.version}. "))
+    add(root, "compiler", angle="radian", autolimits=True, inertiafromgeom=False, balanceinertia=False)
+    add(root, "option", timestep=0.001, gravity=draft.mechanism.gravity, integrator="implicitfast")
+    # Two steps is the quickest that MuJoCo lets a constraint be; the nearer to 1 the impedance, the less it gives way.
+    add(add(root, "default"), "equality", solref="0.002 1", solimp="0.9999 0.9999 0.001 0.5 2")
+    # The sections in the order in which they are best read.
+    for tag in ("asset", "worldbody", "contact", "equality", "tendon", "actuator", "keyframe"):
+        draft.section(tag)

@@ -1,0 +1,27 @@
+"""The default pose."""
+
+from __future__ import annotations
+
+from numpy.polynomial.polynomial import polyval
+
+from osimlite.translate.mjcf.draft import Draft, add
+
+
+def add_keyframe(draft: Draft) -> None:
+    """Add the default pose and speeds, which fulfil the constraints; joints that follow others stand where these do."""
+    q, u = draft.default_state
+    qdot = draft.mechanism.coordinate_rates(q, u)
+    values = draft.robot.joint_values(q)
+    rates = dict(zip(values, (draft.robot.joint_jacobian(q) @ qdot).tolist(), strict=True))
+    for place, (joint, line) in draft.leads.items():
+        values[joint], rates[joint] = line.slope * q[place] + line.start, line.slope * qdot[place]
+    for joint, follower in draft.followers.items():
+        values[joint] = float(polyval(values.get(follower.leader or "", 0.0), follower.polynomial))
+    names = [joint.get("name", "") for joint in draft.section("worldbody").iter("joint")]
+    add(
+        draft.section("keyframe"),
+        "key",
+        name="default",
+        qpos=[values[name] for name in names],
+        qvel=[rates[name] for name in names],
+    )

@@ -1,0 +1,105 @@
+"""Functions as the quartics that MuJoCo's joint equalities hold: written exactly where they are, fitted where not."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
+
+from osimlite.multibody import functions as f
+from osimlite.multibody.spatial import Array
+from osimlite.robot.drivers import Composed, knots
+from osimlite.robot.lines import as_line
+from osimlite.translate.fidelity import Error
+
+DEGREE = 4
+"""Of the polynomials in an equality of MuJoCo."""
+
+_SAMPLES = 400
+_WIDEST = 4.0 * np.pi
+"""A range (rad, m) that is wider is taken for one that nobody meant."""
+
+
+class Fit(NamedTuple):
+    """A polynomial, constant first, and how far it is from the function; no error where it is the function."""
+
+    coefficients: tuple[float, ...]
+    error: Error | None = None
+
+
+def as_polynomial(function: f.Function) -> Polynomial | None:
+    """The polynomial that a function of one argument is, or None."""
+    line = as_line(function)
+    if line is not None:
+        return Polynomial((line.start, line.slope))
+    match function:
+        case f.Constant(value):
+            return Polynomial((value,))
+        case f.Polynomial(coefficients):
+            return Polynomial(coefficients[::-1]).trim()
+        case f.MultivariatePolynomial(coefficients, powers) if all(len(item) == 1 for item in powers):
+            dense = np.zeros(1 + max(power for (power,) in powers))
+            for coefficient, (power,) in zip(coefficients, powers, strict=True):
+                dense[power] += coefficient
+            return Polynomial(dense).trim()
+        case f.Scaled(scale, inner):
+            own = as_polynomial(inner)
+            return None if own is None else scale * own
+        case Composed(outer, inner):
+            first, second = as_polynomial(inner), as_polynomial(outer)
+            if first is not None and second is not None:
+                whole = second(first)
+                return whole if isinstance(whole, Polynomial) else None
+    return None
+
+
+def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
+    """The polynomial of degree four that is a function of one argument, or whose greatest error is least on a span.
+
+    Fitted by Lawson's algorithm: least squares, again and again, with weights that grow where the error is large.
+    """
+    exact = as_polynomial(function)
+    if exact is not None and exact.degree() <= DEGREE:
+        return Fit(tuple(exact.coef.tolist()))
+    low, high = span
+    middle, half = 0.5 * (high + low), 0.5 * (high - low)
+    x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLES))
+    y = sampled(function, x)
+    basis = np.polynomial.chebyshev.chebvander((x - middle) / half, DEGREE)
+    weights, best, least = np.full(_SAMPLES, 1.0 / _SAMPLES), np.zeros(DEGREE + 1), np.inf
+    for _ in range(60):
+        root = np.sqrt(weights)
+        found = np.linalg.lstsq(root[:, None] * basis, root * y, rcond=None)[0]
+        off = np.abs(basis @ found - y)
+        if off.max() < least:
+            best, least = found, off.max()
+        if not off.any():
+            break
+        weights *= off
+        weights /= weights.sum()
+    fitted = Chebyshev(best, domain=[low, high]).convert(kind=Polynomial)
+    even = np.linspace(low, high, _SAMPLES)
+    return Fit(tuple(fitted.coef.tolist()), Error.of(fitted(even) - sampled(function, even), unit))
+
+
+def sampled(function: f.Function, x: Array) -> Array:
+    """Values of a function of one argument at many."""
+    return np.array([function.evaluate(np.array((value,)))[0] for value in x])
+
+
+def span(function: f.Function, limits: tuple[float, float], start: float) -> tuple[float, float]:
+    """Where a function of a coordinate is wanted: in the coordinate's range, as far as that means anything.
+
+    Args:
+        function: of the coordinate.
+        limits: the range.
+        start: the default value of the coordinate, which belongs to the span.
+    """
+    low, high = limits
+    points = knots(function)
+    if not high - low <= _WIDEST and points:
+        low, high = max(low, min(points)), min(high, max(points))
+    if not 0.0 < high - low <= _WIDEST:
+        low, high = start - 1.0, start + 1.0
+    return min(low, start), max(high, start)

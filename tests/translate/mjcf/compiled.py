@@ -1,0 +1,44 @@
+"""What MuJoCo makes of a translation."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from osimlite.multibody.spatial import Array, transform
+from osimlite.robot.principal_axes import principal_axes
+from osimlite.translate.mjcf.export import Mjcf
+
+
+class Compiled:
+    """A translation as MuJoCo has it, bodies and joints by name; impossible inertias are put back after compiling."""
+
+    def __init__(self, mjcf: Mjcf) -> None:
+        self.mjcf, self.robot = mjcf, mjcf.robot
+        self.model = mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)
+        self.data = mujoco.MjData(self.model)
+        for record in mjcf.fidelity:
+            if record.kind == "inertia":
+                link, _ = self.robot.link_of[record.component]
+                self.model.body(link.name).inertia[:] = principal_axes(link.inertia)[0]
+
+    def place(self, q: Array) -> None:
+        """Set all joints by the exact functions of the coordinates."""
+        for name, value in self.mjcf.joint_values(q).items():
+            self.data.joint(name).qpos[0] = value
+        mujoco.mj_forward(self.model, self.data)
+
+    def body(self, name: str) -> Array:
+        """Pose (4, 4) of a body in ground."""
+        body = self.data.body(name)
+        return transform(body.xmat.reshape(3, 3), body.xpos)
+
+    def mass_matrix(self, q: Array) -> Array:
+        """Mass matrix (n, n) for the rates of the coordinates, at the pose that `place` was given."""
+        # mj_fullM takes other arguments in 3 than in 4.
+        whole = np.zeros((self.model.nv, self.model.nv))
+        for row, unit in zip(whole, np.eye(self.model.nv), strict=True):
+            mujoco.mj_mulM(self.model, self.data, row, unit)
+        dofs = [self.model.joint(joint.name).dofadr[0] for joint in self.robot.moving]
+        jacobian = self.robot.joint_jacobian(q)
+        return jacobian.T @ whole[np.ix_(dofs, dofs)] @ jacobian
