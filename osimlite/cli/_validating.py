@@ -15,7 +15,7 @@ from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
-from osimlite.lint.suffixes import project_files
+from osimlite.lint.suffixes import is_table, project_files
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -98,11 +98,13 @@ def _source(path: str) -> Source:
 
 
 def _check(source: Source, given: Config) -> Report:
-    """Check one document by the settings of its folder and of the command line."""
-    from osimlite.lint.engine import check_source
+    """Check one file by the settings of its folder and of the command line."""
+    from osimlite.document.reader import collector_paused
+    from osimlite.lint.engine import run, subject_in
 
     assert source.file is not None
-    return check_source(source, settings_of(source.file).config_for(source.file, given))
+    with collector_paused():
+        return run(subject_in(source, settings_of(source.file).config_for(source.file, given)))
 
 
 def _fail_on_of(files: list[str]) -> Severity:
@@ -115,7 +117,7 @@ def _places(count: int) -> str:
 
 
 def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int, int]:
-    """A document, its bytes once everything is mended, how many mends that took, and how many guesses are left."""
+    """A file, its bytes once everything is mended, how many mends that took, and how many guesses are left."""
     from osimlite.document.source import Source
     from osimlite.lint.fixes import mended
 
@@ -125,7 +127,7 @@ def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int,
     for _ in range(10):
         current = Source(data, source.file)
         report = _check(current, given)
-        data, count = mended(current, report, unsafe=unsafe)
+        data, count = mended(data if is_table(path) else current, report, unsafe=unsafe)
         total += count
         if not count:
             left = sum(finding.fix is not None for finding in report.findings)

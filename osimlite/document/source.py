@@ -42,8 +42,6 @@ class Source:
     def __init__(self, data: bytes, file: str | None = None) -> None:
         self.file = file
         self.data = data
-        self.encoding = _encoding(data)
-        self.text = _decoded(data, self.encoding)
         self.elements: int | None = None
         """The number of elements, once the parser has found the text well-formed."""
         self.remarks = True
@@ -55,6 +53,16 @@ class Source:
         self._attributes: dict[int, dict[str, Attribute]] = {}
         self.moved: dict[tuple[int, str], int] = {}
         """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
+
+    @cached_property
+    def encoding(self) -> str:
+        """The encoding of the bytes."""
+        return _encoding(self.data)
+
+    @cached_property
+    def text(self) -> str:
+        """The characters."""
+        return _decoded(self.data, self.encoding)
 
     @classmethod
     def of_file(cls, path: str | Path) -> Source:
@@ -74,8 +82,8 @@ class Source:
             text: the characters.
             file: where they are kept, if anywhere.
         """
-        source = cls(b"", file)
-        source.data, source.text = text.encode("utf-8", "replace"), text
+        source = cls(text.encode("utf-8", "replace"), file)
+        source.encoding, source.text = "utf-8", text
         return source
 
     def attributes_of(self, number: int) -> dict[str, Attribute]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from osimlite.lint.config import Config
+from osimlite.lint.fixes import suggested
+from osimlite.lint.suppressions import Suppression, suppressions
 
 if TYPE_CHECKING:
     from osimlite.document.source import Position, Source
+    from osimlite.lint.diagnostic import Fix
     from osimlite.lint.engine import Rule
     from osimlite.schema.base import Object
 
@@ -59,6 +62,14 @@ class Checked:
     ) -> Position | None:
         """Where something is in the text."""
         return None
+
+    def replacing(self, at: Position, named: object, text: str, *, certain: bool) -> Fix | None:
+        """The mend that puts a text in a place where the words `named` stand; None if something else does."""
+        return suggested(self.source, at, named, text, certain=certain)
+
+    def suppressions(self) -> list[Suppression]:
+        """The comments that ignore findings."""
+        return suppressions(self.source) if self.source is not None and self.source.remarks else []
 
     def outside(self) -> list[str] | None:
         """Every path outside the text that findings may depend on; None if nobody can say."""

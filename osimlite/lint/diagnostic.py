@@ -33,7 +33,7 @@ _RANKS = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """Replace the characters from `start` to `end` of the text by `text`."""
+    """Replace the characters from `start` to `end` of the text, of a table the bytes, by `text`."""
 
     start: int
     end: int

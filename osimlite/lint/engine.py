@@ -23,7 +23,7 @@ from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
 from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_document, is_table
-from osimlite.lint.suppressions import suppressions
+from osimlite.lint.suppressions import Suppression
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
@@ -95,9 +95,14 @@ class Found(Protocol):
         at: Position | None = None,
         severity: Severity | None = None,
         suggestion: str | None = None,
+        certain: bool = False,
         fix: Fix | None = None,
     ) -> None:
-        """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`."""
+        """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
+
+        Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is `certain` or differs in
+        letter case alone.
+        """
 
 
 Check = Callable[[Any, Found], None]
@@ -182,10 +187,19 @@ def all_rules() -> tuple[Rule, ...]:
 
 def check_source(source: Source, config: Config | None = None) -> Report:
     """Check a text: a table if its file is called so, else a document."""
-    if source.file is not None and is_table(source.file):
-        return run(Table(source.data, source.file, config))
     with collector_paused():
-        return run(_subject_of(survey(source, of=_class_in(source.file)), config))
+        subject = subject_in(source, config)
+        report = run(subject)
+    if report.findings and source.file is not None:
+        report.texts[source.file] = subject.text
+    return report
+
+
+def subject_in(source: Source, config: Config | None = None) -> Checked:
+    """A text to check; what it is, the name of its file tells."""
+    if source.file is not None and is_table(source.file):
+        return Table(source.data, source.file, config)
+    return _subject_of(survey(source, of=_class_in(source.file)), config)
 
 
 def subject_of(file: str, config: Config | None = None) -> Checked:
@@ -224,20 +238,16 @@ def run(subject: Checked) -> Report:
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
-    if subject.source is not None and subject.source.remarks and "osimlite:" in subject.source.text:
-        findings = _not_ignored(subject, findings)
+    comments = subject.suppressions()
+    if comments:
+        findings = _not_ignored(subject, comments, findings)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
-    report = Report(unique)
-    if unique and subject.file is not None:
-        report.texts[subject.file] = subject.text
-    return report
+    return Report(unique)
 
 
-def _not_ignored(subject: Checked, findings: list[Finding]) -> list[Finding]:
+def _not_ignored(subject: Checked, comments: list[Suppression], findings: list[Finding]) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
-    assert subject.source is not None
-    comments = suppressions(subject.source)
     kept = [finding for finding in findings if not any([comment.covers(finding) for comment in comments])]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):
@@ -266,11 +276,18 @@ def _collector(known: Rule, subject: Checked, findings: list[Finding]) -> Found:
         at: Position | None = None,
         severity: Severity | None = None,
         suggestion: str | None = None,
+        certain: bool = False,
         fix: Fix | None = None,
     ) -> None:
         if at is None and (item is not None or number is not None):
             at = subject.position(item, tag=tag, word=word, nth=nth, attribute=attribute, number=number)
         line, column, length = at if at is not None else (None, None, 1)
+        if known.mends and known.about != "model" and suggestion is not None and at is not None:
+            named = word if word is not None or item is None else getattr(item, attribute or tag or "name")
+            fix = fix or subject.replacing(at, named, suggestion, certain=certain)
+        elif subject.upgraded:
+            # What is said of an upgraded document need not be said of its text.
+            fix = None
         findings.append(
             Finding(
                 known.code,
@@ -283,8 +300,8 @@ def _collector(known: Rule, subject: Checked, findings: list[Finding]) -> Found:
                 max(1, length),
                 subject.path(item),
                 suggestion,
-                # What is said of an upgraded document, or of one that was guessed at, need not be said of its text.
-                None if subject.upgraded or subject.sure_until is not None else fix,
+                # Nor need what is said of one that was guessed at.
+                None if subject.sure_until is not None else fix,
             )
         )
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from bisect import bisect_left, insort
+from collections.abc import Iterable, Iterator
+from typing import AnyStr
 
+from osimlite.document.escape import escape
 from osimlite.document.source import Position, Source
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
@@ -15,6 +18,16 @@ def replaced(source: Source | None, place: Position | None, text: str | None, *,
         return None
     start = source.line_start(place.line) + place.column - 1
     return Fix((Edit(start, start + place.length, text),), safe)
+
+
+def suggested(source: Source | None, place: Position, named: object, text: str, *, certain: bool) -> Fix | None:
+    """Put what is meant in the place of a name; None if that name is not what stands there."""
+    if source is None or not isinstance(named, str) or "'" in text or '"' in text:
+        return None
+    start = source.line_start(place.line) + place.column - 1
+    if source.text[start : start + place.length] != escape(named.strip()):
+        return None
+    return replaced(source, place, escape(text), safe=certain or text.lower() == named.lower())
 
 
 def renamed(source: Source | None, number: int, tag: str | None, *, safe: bool = True) -> Fix | None:
@@ -49,46 +62,64 @@ def without_text(source: Source, start: int, end: int) -> Fix:
     return Fix((_whole_line(source.text, start, end),), True)
 
 
-def apply(text: str, findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[str, int]:
-    """The text with every mend in it that does not touch another, and how many these are."""
-    chosen, count = edits_of(findings, unsafe=unsafe)
-    for edit in sorted(chosen, key=lambda edit: edit.start, reverse=True):
-        text = text[: edit.start] + edit.text + text[edit.end :]
-    return text, count
-
-
 def edits_of(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list[Edit], int]:
-    """The edits of every mend that does not touch another before it, and how many mends these are."""
+    """The edits of every mend that does not touch another before it, by place, and how many mends these are."""
     chosen: list[Edit] = []
     count = 0
     for finding in findings:
         fix = finding.fix
         if fix is None or not (fix.safe or unsafe):
             continue
-        if any(edit.start < other.end and other.start < edit.end for edit in fix.edits for other in chosen):
+        if any(_touches(edit, chosen) for edit in fix.edits):
             continue
-        chosen.extend(fix.edits)
+        for edit in fix.edits:
+            insort(chosen, edit, key=_start)
         count += 1
     return chosen, count
 
 
-def mended(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
-    """The bytes of a document with its mends, in its own encoding, and how many there are.
+def _start(edit: Edit) -> int:
+    return edit.start
+
+
+def _touches(edit: Edit, chosen: list[Edit]) -> bool:
+    """Whether an edit changes what one of some others does, which are sorted and touch none of each other."""
+    before = bisect_left(chosen, edit.end, key=_start)
+    return before > 0 and chosen[before - 1].end > edit.start
+
+
+def mended(source: Source | bytes, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
+    """The bytes of a document, or of a table, with its mends, and how many there are; a document keeps its encoding.
 
     Raises:
         OsimliteError: the bytes are in no single encoding, so that they cannot be written back as they were.
     """
-    text, count = apply(source.text, report.findings, unsafe=unsafe)
+    edits, count = edits_of(report.findings, unsafe=unsafe)
+    if isinstance(source, bytes):
+        if not count:
+            return source, 0
+        return b"".join(_spliced(source, [(edit.start, edit.end, edit.text.encode()) for edit in edits])), count
     if not count:
         return source.data, 0
     if source.text.encode(source.encoding, "replace") != source.data:
         raise OsimliteError("the file mixes encodings and cannot be mended; save it as UTF-8 first", file=source.file)
+    text = "".join(_spliced(source.text, [(edit.start, edit.end, edit.text) for edit in edits]))
     try:
         return text.encode(source.encoding), count
     except UnicodeEncodeError:
         raise OsimliteError(
             f"a mend cannot be written in {source.encoding}; save the file as UTF-8 first", file=source.file
         ) from None
+
+
+def _spliced(whole: AnyStr, edits: list[tuple[int, int, AnyStr]]) -> Iterator[AnyStr]:
+    """The pieces of a text with others in their places."""
+    last = 0
+    for start, end, text in edits:
+        yield whole[last:start]
+        yield text
+        last = end
+    yield whole[last:]
 
 
 def _whole_line(text: str, start: int, end: int) -> Edit:

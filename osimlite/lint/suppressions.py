@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass, field
 
 from osimlite.document.source import Position, Source
 from osimlite.lint.diagnostic import Finding
 
 _COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^>]*?)-->")
+_LINE = re.compile(r"^\W*osimlite:\s*ignore\b(.*)$")
+LAST_LINE = sys.maxsize
 
 
 @dataclass(slots=True)
@@ -44,15 +47,28 @@ def suppressions(source: Source) -> list[Suppression]:
     root = source.spans[0].start if source.spans else len(source.text)
     for match in _COMMENT.finditer(source.text):
         place = source.position(match.start(), match.end() - match.start())
-        words = tuple(word for word in re.split(r"[\s,]+", match[1]) if word)
-        codes = tuple(word.upper() if word.upper().startswith("OSIM") else word for word in words)
         line_before = source.text[source.text.rfind("\n", 0, match.start()) + 1 : match.start()]
         first = last = place.line
         if match.start() < root:
-            first, last = 1, len(source.lines)
+            first, last = 1, LAST_LINE
         elif not line_before.strip():
             following = next((span for span in source.spans if span.start >= match.end()), None)
             if following is not None:
                 last = source.position(following.end - 1).line
-        found.append(Suppression(place, codes, first, last))
+        found.append(Suppression(place, _codes(match[1]), first, last))
     return found
+
+
+def suppressions_in_header(lines: list[bytes]) -> list[Suppression]:
+    """Every ignoring line in the header of a storage file, which OpenSim passes over; it speaks of the whole file."""
+    found = []
+    for number, line in enumerate(lines, 1):
+        match = _LINE.match(line.decode("utf-8", "replace")) if b"osimlite:" in line else None
+        if match:
+            found.append(Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE))
+    return found
+
+
+def _codes(text: str) -> tuple[str, ...]:
+    words = (word for word in re.split(r"[\s,]+", text) if word)
+    return tuple(word.upper() if word.upper().startswith("OSIM") else word for word in words)

@@ -11,7 +11,9 @@ from typing import ClassVar, NamedTuple
 from osimlite.document.source import Position
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
+from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.rows import Rows, Scan
+from osimlite.lint.suppressions import Suppression, suppressions_in_header
 
 MARKER_KEYS = (
     "DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames",
@@ -96,6 +98,11 @@ class Table(Checked):
     def ends_header(self) -> bool:
         """Whether there is a line that ends the header, as OpenSim looks for it."""
         return self._end is not None and b"endheader" in self._end[0]
+
+    @property
+    def ends_header_otherwise(self) -> bool:
+        """Whether there is one in other letters."""
+        return not self.ends_header and self._end is not None and self._end[0].strip().lower() == b"endheader"
 
     @property
     def end_line(self) -> Position:
@@ -222,6 +229,39 @@ class Table(Checked):
         """The usual step from one time to the next, s; 0 of fewer than two rows."""
         times = self.rows.times
         return median(after - before for before, after in pairwise(times)) if len(times) > 1 else 0
+
+    def suppressions(self) -> list[Suppression]:
+        """The lines of the header that ignore findings; a marker file cannot have any."""
+        return [] if self.is_markers else suppressions_in_header(self.head)
+
+    def replacing(self, at: Position, named: object, text: str, *, certain: bool) -> Fix | None:
+        """The mend that puts a text in a place of the header, or among the labels; None where nobody knows the bytes.
+
+        `named` is what stands there, or None for whatever does.
+        """
+        start = self.line_start(at.line)
+        line = self.data[start : self.line_start(2, start)].rstrip(b"\r\n")
+        if start == 0 and line.startswith(_MARK):
+            start, line = len(_MARK), line.removeprefix(_MARK)
+        try:
+            letters = line.decode()
+        except UnicodeDecodeError:
+            return None
+        before, old = letters[: at.column - 1], letters[at.column - 1 :][: at.length]
+        start += len(before.encode())
+        safe = certain or text.lower() == old.lower()
+        return Fix((Edit(start, start + len(old.encode()), text),), safe)
+
+    def inserting(self, number: int, line: str) -> Fix:
+        """The mend that puts a line before another."""
+        start = self.line_start(number)
+        return Fix((Edit(start, start, line + ("\r\n" if b"\r\n" in self.data[:1000] else "\n")),))
+
+    def line_start(self, number: int, start: int = 0) -> int:
+        """Where a line begins, in bytes, as they are counted from the one that begins at `start`."""
+        for _ in range(number - 1):
+            start = self.data.find(b"\n", start) + 1 or len(self.data)
+        return start
 
     def place(self, number: int, line: bytes, start: int, end: int) -> Position:
         """The place of some bytes of a line."""

@@ -11,7 +11,7 @@ _LARGEST, _SMALLEST = 8.0, 0.02
 """Between these, m, is how far the markers of one frame are spread."""
 
 
-@rule("OSIM811", "marker-units", severity=WARNING, about="table")
+@rule("OSIM811", "marker-units", severity=WARNING, mends="unsafe", about="table")
 def marker_units(table: Table, found: Found) -> None:
     """The units of a marker file do not fit its numbers.
 

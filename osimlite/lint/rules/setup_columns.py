@@ -213,7 +213,7 @@ def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
                 yield item, tag, table
 
 
-@rule("OSIM843", "load-columns", severity=ERROR, about="document")
+@rule("OSIM843", "load-columns", severity=ERROR, mends="both", about="document")
 def load_columns(setup: Setup, found: Found) -> None:
     """The columns of a measured force are not in the data.
 

@@ -21,7 +21,7 @@ _NEEDED = {
 """Without which files OpenSim refuses a tool, or crashes."""
 
 
-@rule("OSIM821", "missing-input", severity=ERROR, about="document")
+@rule("OSIM821", "missing-input", severity=ERROR, mends="safe", about="document")
 def missing_input(setup: Setup, found: Found) -> None:
     """A file that a setup reads is not there, or is not named.
 
@@ -66,7 +66,7 @@ def missing_input(setup: Setup, found: Found) -> None:
         found(
             f"the file '{naming.name}' of {called(naming.item)} is not there{why}: {fate}",
             naming.item, tag=naming.spec.tag, word=naming.name if naming.spec.tag == "force_set_files" else None,
-            suggestion=twin,
+            suggestion=twin, certain=True,
         )  # fmt: skip
     for item in setup.items:
         for tag in _NEEDED.get(type(item).__name__, ()):
@@ -141,7 +141,7 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
                 )  # fmt: skip
 
 
-@rule("OSIM823", "lost-output", severity=WARNING, about="document")
+@rule("OSIM823", "lost-output", severity=WARNING, mends="both", about="document")
 def lost_output(setup: Setup, found: Found) -> None:
     """Results would be lost, or land in another place.
 
@@ -191,7 +191,7 @@ def lost_output(setup: Setup, found: Found) -> None:
             if folder:
                 found(
                     f"OpenSim leaves the folder of '{naming.name}' out and writes into results_directory",
-                    naming.item, tag=naming.spec.tag, suggestion=os.path.basename(naming.name),
+                    naming.item, tag=naming.spec.tag, suggestion=os.path.basename(naming.name), certain=True,
                 )  # fmt: skip
         elif folder and not os.path.isdir(os.path.join(setup.folder, folder)) and os.path.normpath(folder) not in made:
             found(

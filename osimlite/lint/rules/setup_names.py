@@ -55,7 +55,7 @@ _SILENT_CLASSES = ("IKMarkerTask", "BodyScale", "ControlSetController")
 """Classes of which it does so."""
 
 
-@rule("OSIM831", "unknown-name", severity=ERROR, about="document")
+@rule("OSIM831", "unknown-name", severity=ERROR, mends="both", about="document")
 def unknown_name(setup: Setup, found: Found) -> None:
     """A setup names what the model of its tool does not have.
 
@@ -149,7 +149,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
                 )  # fmt: skip
 
 
-@rule("OSIM832", "excluded-force", severity=WARNING, about="document")
+@rule("OSIM832", "excluded-force", severity=WARNING, mends="unsafe", about="document")
 def excluded_force(setup: Setup, found: Found) -> None:
     """Inverse dynamics is told to leave out a force that there is not.
 

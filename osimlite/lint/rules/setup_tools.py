@@ -63,7 +63,7 @@ def task_weight(setup: Setup, found: Found) -> None:
                 )  # fmt: skip
 
 
-@rule("OSIM852", "tool-setting", severity=ERROR, about="document")
+@rule("OSIM852", "tool-setting", severity=ERROR, mends="unsafe", about="document")
 def tool_setting(setup: Setup, found: Found) -> None:
     """A tool has a setting with which it cannot work.
 
@@ -186,7 +186,7 @@ def tool_setting(setup: Setup, found: Found) -> None:
             found(f"{called(controller)} is off", controller, tag="enabled", severity=INFO)
 
 
-@rule("OSIM853", "scale-setting", severity=ERROR, about="document")
+@rule("OSIM853", "scale-setting", severity=ERROR, mends="both", about="document")
 def scale_setting(setup: Setup, found: Found) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 

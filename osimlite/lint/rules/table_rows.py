@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 from osimlite.document.source import Position
+from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rows import Fault
 from osimlite.lint.table import Table
@@ -51,7 +53,7 @@ def _more(fault: Fault, noun: str) -> str:
     return f"; so it is in {times(fault.times - 1, f'more {noun}')}" if fault.times > 1 else ""
 
 
-@rule("OSIM806", "ragged-row", severity=ERROR, about="table")
+@rule("OSIM806", "ragged-row", severity=ERROR, mends="safe", about="table")
 def ragged_row(table: Table, found: Found) -> None:
     """A row of a table is no row of numbers, or has too many or too few.
 
@@ -94,15 +96,40 @@ def ragged_row(table: Table, found: Found) -> None:
     for fault in rows.of("row", "comment", "blank"):
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
-            found(f"the row has {fault.text} cells and needs {width}{_more(fault, 'row')}", at=at)
+            fix = _without_last_tabs(table, width) if table.is_markers and int(fault.text) > width else None
+            found(f"the row has {fault.text} cells and needs {width}{_more(fault, 'row')}", at=at, fix=fix)
         elif fault.kind == "comment":
             found(f"OpenSim knows no remarks among the rows{_more(fault, 'line')}", at=at)
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
-                found(f"a blank line ends the table for OpenSim: {times(lost, 'row')} behind it are lost", at=at)
+                found(
+                    f"a blank line ends the table for OpenSim: {times(lost, 'row')} behind it are lost", at=at,
+                    fix=_without_blank_lines(table, fault.line),
+                )  # fmt: skip
             else:
                 found(f"there is a blank line among the rows{_more(fault, 'line')}", at=at, severity=INFO)
+
+
+_LAST_TABS = re.compile(rb"\t+(?=\r?(\n|\Z))")
+_BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?=\s*\S)", re.MULTILINE)
+
+
+def _without_last_tabs(table: Table, width: int) -> Fix | None:
+    """The mend that takes out what ends rows of markers beyond their cells; None if that is more than tabs."""
+    edits = []
+    for match in _LAST_TABS.finditer(table.data, table.line_start(table.label_line + 2)):
+        start = table.data.rfind(b"\n", 0, match.start()) + 1
+        surplus = min(table.data.count(b"\t", start, match.end()) - (width - 1), len(match[0]))
+        if surplus > 0:
+            edits.append(Edit(match.end() - surplus, match.end(), ""))
+    return Fix(tuple(edits)) if edits else None
+
+
+def _without_blank_lines(table: Table, first: int) -> Fix:
+    """The mend that takes out blank lines between rows, from a line on."""
+    found = _BLANK_LINES.finditer(table.data, table.line_start(first))
+    return Fix(tuple(Edit(*match.span(), "") for match in found))
 
 
 @rule("OSIM807", "not-a-number", severity=ERROR, about="table")

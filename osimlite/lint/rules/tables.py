@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 
 from osimlite.document.source import Position
+from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.table import COUNTS, MARKER_KEYS, Table
 from osimlite.text import nearest
 
 
-@rule("OSIM801", "table-header", severity=ERROR, about="table")
+@rule("OSIM801", "table-header", severity=ERROR, mends="safe", about="table")
 def table_header(table: Table, found: Found) -> None:
     """The header of a table is not as OpenSim needs it.
 
@@ -57,26 +58,35 @@ def table_header(table: Table, found: Found) -> None:
             found("these are markers over time; a file of them is called .trc", at=start)
         elif not table.end_line.line > 1:
             found("there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it", at=start)
-        elif table.end_line.length > 1:
+        elif table.ends_header_otherwise:
             found(
                 "the header must end with 'endheader' in small letters: OpenSim takes all that follows for header",
                 at=table.end_line, suggestion="endheader",
             )  # fmt: skip
         else:
-            found("no line 'endheader' stands before the labels: OpenSim refuses the table", at=table.end_line)
+            found(
+                "no line 'endheader' stands before the labels: OpenSim refuses the table", at=table.end_line,
+                fix=table.inserting(table.label_line, "endheader"),
+            )  # fmt: skip
     elif not table.is_strict:
-        for key in ("nRows", "nColumns"):
+        for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
                 near = nearest(key, table.entries, cutoff=75)
                 at = table.entries[near].key.at if near else table.end_line
-                found(f"the header does not say '{key}': OpenSim refuses the table", at=at, suggestion=near and key)
+                found(
+                    f"the header does not say '{key}': OpenSim refuses the table",
+                    at=at, suggestion=near and key, certain=True,
+                    fix=None if near else table.inserting(at.line, f"{key}={count}"),
+                )  # fmt: skip
 
 
 def _marker_header(table: Table, found: Found) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
         why = "starts with a byte order mark; save it as UTF-8 without one" if mark else "must start with PathFileType"
-        found(f"a marker file {why}: OpenSim refuses it", at=Position(1, 1))
+        found(
+            f"a marker file {why}: OpenSim refuses it", at=Position(1, 1), fix=Fix((Edit(0, 3, ""),)) if mark else None
+        )
     if len(table.head) < 4:
         ends = ": its lines end with CR alone" if b"\r" in table.data else ""
         found(f"a marker file has five lines before its rows, this has {len(table.head)}{ends}", at=Position(1, 1))
@@ -84,7 +94,11 @@ def _marker_header(table: Table, found: Found) -> None:
     keys, values = table.words(2), table.words(3)
     for key, right in zip(keys, MARKER_KEYS, strict=False):
         if key.text != right:
-            found(f"the header says '{key.text}' where OpenSim wants '{right}'", at=key.at, suggestion=right)
+            meant = right if len(keys) == len(MARKER_KEYS) else None
+            found(
+                f"the header says '{key.text}' where OpenSim wants '{right}'",
+                at=key.at, suggestion=meant, certain=True,
+            )  # fmt: skip
             break
     else:
         if len(keys) < len(MARKER_KEYS):
@@ -100,10 +114,14 @@ def _marker_header(table: Table, found: Found) -> None:
     if subscripts[: 3 * count] != wanted:
         wrong = next((k for k, word in enumerate(wanted) if subscripts[k : k + 1] != [word]), 0)
         place = table.words(5)[wrong].at if wrong < len(subscripts) else Position(5, 1)
-        found(f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file", at=place)
+        line = "\t\t" + "\t".join(wanted)
+        fix: Fix | None = table.inserting(5, line)
+        if any(word.startswith(("X", "Y", "Z")) for word in subscripts):
+            fix = table.replacing(Position(5, 1, len(table.head[4].rstrip())), None, line, certain=True)
+        found(f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file", at=place, fix=fix)
 
 
-@rule("OSIM802", "table-count", severity=ERROR, about="table")
+@rule("OSIM802", "table-count", severity=ERROR, mends="safe", about="table")
 def table_count(table: Table, found: Found) -> None:
     """A count in the header of a table is not that of the table.
 
@@ -162,11 +180,11 @@ def table_count(table: Table, found: Found) -> None:
             fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim takes numbers for others"
         found(
             f"'{entry.key.text}' is '{said}', and there are {count} {what}{fate}",
-            at=entry.value.at, severity=severity, suggestion=str(count),
+            at=entry.value.at, severity=severity, suggestion=None if odd_rows else str(count), certain=True,
         )  # fmt: skip
 
 
-@rule("OSIM803", "table-setting", severity=ERROR, about="table")
+@rule("OSIM803", "table-setting", severity=ERROR, mends="safe", about="table")
 def table_setting(table: Table, found: Found) -> None:
     """A setting in the header of a table has a value that OpenSim does not know.
 
@@ -212,7 +230,7 @@ def table_setting(table: Table, found: Found) -> None:
             right = near.get(units.value.text.lower().rstrip("s"), units.value.text.lower())
             found(
                 f"OpenSim does not know the units '{units.value.text}' and refuses the file",
-                at=units.value.at, suggestion=right if right in ("m", "mm", "cm") else None,
+                at=units.value.at, suggestion=right if right in ("m", "mm", "cm") else None, certain=True,
             )  # fmt: skip
         rate = entries.get("DataRate")
         if rate is not None and not _is_positive(rate.value.text):
@@ -228,7 +246,7 @@ def table_setting(table: Table, found: Found) -> None:
         harmless = meant == "no"
         found(
             f"'inDegrees' is 'yes' or 'no'; of '{degrees.value.text}' OpenSim makes no: it takes angles for radians",
-            at=degrees.value.at, suggestion=meant, severity=WARNING if harmless else None,
+            at=degrees.value.at, suggestion=meant, certain=True, severity=WARNING if harmless else None,
         )  # fmt: skip
     version = entries.get("version")
     if version is not None and not version.value.text.isdecimal():
@@ -242,7 +260,7 @@ def _is_positive(text: str) -> bool:
         return False
 
 
-@rule("OSIM804", "column-label", severity=ERROR, about="table")
+@rule("OSIM804", "column-label", severity=ERROR, mends="safe", about="table")
 def column_label(table: Table, found: Found) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
@@ -284,8 +302,9 @@ def column_label(table: Table, found: Found) -> None:
         for word, right in zip(table.words(4) if len(table.head) > 3 else [], ("Frame#", "Time"), strict=False):
             if word.text != right:
                 found(
-                    f"the label '{word.text}' must be '{right}': OpenSim refuses the file", at=word.at, suggestion=right
-                )
+                    f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
+                    at=word.at, suggestion=right, certain=True,
+                )  # fmt: skip
         for label in labels:
             if " " in label.text:
                 found(f"the marker '{label.text}' has a blank in its name, which no marker of a model has", at=label.at)
@@ -301,9 +320,8 @@ def column_label(table: Table, found: Found) -> None:
         elif all(label.text not in ("time", "range") for label in labels):
             found(
                 f"the first column is '{first}': OpenSim needs one called 'time'",
-                at=at,
-                suggestion=near,
-            )
+                at=at, suggestion=near, certain=True,
+            )  # fmt: skip
         else:
             found(f"the first column is '{first}': OpenSim takes it for the time", at=at)
     seen = Counter(label.text for label in labels)
