@@ -17,6 +17,7 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.joints import Joint
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, add, pose, quaternion, tidy
+from osimlite.translate.mjcf.scenery import FRAMES
 
 LEAST_MASS = 1e-14
 """Mass (kg) and principal moments (kg·m²) of a moving body without: MuJoCo wants more than 1e-15."""
@@ -58,7 +59,7 @@ def add_frames(draft: Draft) -> None:
     """Add a site for every frame that is no body, so that it can be asked for."""
     for _, path in draft.components(PhysicalFrame):
         if path in draft.mechanism.frames:
-            draft.fidelity.translated[path] = f"site {draft.site(path, *draft.mechanism.frames[path], group='5')}"
+            draft.fidelity.translated[path] = f"site {draft.site(path, *draft.mechanism.frames[path], group=FRAMES)}"
 
 
 def _add_chain(parent: _Element, chain: list[RobotJoint], name: str) -> _Element:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.robot.lines import Line
 from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.robot import Robot
+from osimlite.robot.robot import Link, Robot
 from osimlite.robot.urdf import number, numbers
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
@@ -77,6 +78,7 @@ class Draft:
         bodies: the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
+        activations: at the start, of the actuators that have one, by name.
     """
 
     model: Model
@@ -88,7 +90,9 @@ class Draft:
     bodies: dict[int, _Element] = field(default_factory=dict)
     leads: dict[int, Lead] = field(default_factory=dict)
     followers: dict[str, Follower] = field(default_factory=dict)
+    activations: dict[str, float] = field(default_factory=dict)
     _names: dict[str, set[str]] = field(default_factory=dict)
+    _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -168,6 +172,23 @@ class Draft:
         frame = pose(place) if place.shape == (4, 4) else {"pos": tidy(place)}
         add(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
+
+    def mesh(self, file: str, scale: tuple[float, float, float]) -> str:
+        """The asset that is a mesh file at a scale.
+
+        Its inertia is said to be that of its surface: MuJoCo refuses bones whose surface does not close otherwise.
+        """
+        key = (file, scale)
+        if key not in self._meshes:
+            name = self._meshes[key] = self.name("mesh", Path(file).stem)
+            size = None if scale == (1.0, 1.0, 1.0) else scale
+            add(self.section("asset"), "mesh", name=name, file=file, scale=size, inertia="shell")
+        return self._meshes[key]
+
+    def links(self) -> Iterator[tuple[Link, _Element]]:
+        """Links that are bodies (or ground), with their elements."""
+        for index, path in enumerate(["/ground", *(body.path for body in self.mechanism.bodies)], GROUND):
+            yield self.robot.link_of[path][0], self.bodies[index]
 
     def body_name(self, body: int) -> str:
         """Name of the element of a body (-1: ground)."""

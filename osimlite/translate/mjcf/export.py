@@ -17,6 +17,7 @@ from osimlite.robot.build import build_robot
 from osimlite.robot.mesh_files import MeshFiles
 from osimlite.robot.names import coordinate_names, legal
 from osimlite.robot.robot import Robot
+from osimlite.robot.visuals import Visuals, collect_visuals
 from osimlite.schema.model import Model
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
@@ -25,12 +26,15 @@ from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import Contact, Draft, Lead, Options, Version, add
 from osimlite.translate.mjcf.keyframe import add_keyframe
+from osimlite.translate.mjcf.scenery import add_markers, add_shapes
 from osimlite.translate.survey import account_for_rest
 
 PASSES: tuple[Callable[[Draft], None], ...] = (
     add_bodies,
     add_couplings,
     add_coordinates,
+    add_shapes,
+    add_markers,
     add_frames,
     add_keyframe,
 )
@@ -113,7 +117,8 @@ def to_mjcf(
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
     mesh_files = MeshFiles(MeshFolders(None if folder is None else Path(folder), [Path(place) for place in geometry]))
-    robot = coordinate_names(build_robot(mechanism))
+    shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
+    robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
     draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact), mesh_files)
     _add_settings(draft)
     fidelity.translated["/"] = f"mujoco {mechanism.name}"

@@ -18,10 +18,12 @@ def add_keyframe(draft: Draft) -> None:
     for joint, follower in draft.followers.items():
         values[joint] = float(polyval(values.get(follower.leader or "", 0.0), follower.polynomial))
     names = [joint.get("name", "") for joint in draft.section("worldbody").iter("joint")]
+    actuators = [actuator.get("name", "") for actuator in draft.section("actuator")]
     add(
         draft.section("keyframe"),
         "key",
         name="default",
         qpos=[values[name] for name in names],
         qvel=[rates[name] for name in names],
+        act=[draft.activations[name] for name in actuators if name in draft.activations] or None,
     )
