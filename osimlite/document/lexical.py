@@ -20,7 +20,7 @@ Trouble = Literal["unreadable", "cut", "too-many", "too-few", "empty", "ignored"
 ABSENT: Any = object()
 """Stands for "OpenSim keeps the default"."""
 
-_PLAIN_FLAGS = {"true": True, "false": False}
+_PLAIN_FLAGS = {"true": True, "false": False, "0": False}
 
 _PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "infinity": math.inf, "+inf": math.inf, "+infinity": math.inf}
@@ -80,18 +80,26 @@ def flag(word: str) -> bool:
 
 
 def legacy_flag(word: str) -> bool:
-    """A switch of the first property system, where everything but ``true`` is false."""
+    """A switch of the first property system, where everything but ``true`` is false, ``1`` too."""
     lowered = word.lower()
-    if lowered not in ("true", "false"):
+    if lowered not in _PLAIN_FLAGS:
         raise Unclean("ignored", word, False)
-    return lowered == "true"
+    return _PLAIN_FLAGS[lowered]
 
 
 def _exact_flag(word: str) -> bool:
     """A switch in a list of the first property system, where everything but ``true`` in these letters is false."""
     if word not in _PLAIN_FLAGS:
-        raise Unclean("cut", word, False)
+        raise Unclean("ignored", word, False)
     return _PLAIN_FLAGS[word]
+
+
+def _entire(word: str) -> float:
+    """A number in a list of the first property system: where anything is left over, OpenSim refuses the file."""
+    try:
+        return real(word)
+    except Unclean:
+        raise Unclean("unreadable", word) from None
 
 
 def text(raw: str) -> str:
@@ -122,7 +130,7 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     if kind.shape == "vector":
         return _words(word, 0, None)
     if kind.legacy and kind.scalar != "string":
-        return _legacy_list(_exact_flag if kind.scalar == "bool" else word)
+        return _legacy_list({"bool": _exact_flag, "double": _entire, "int": whole}[kind.scalar])
     return _words(word, kind.least, kind.most)
 
 
@@ -194,14 +202,14 @@ def _exactly(size: int) -> Callable[[str], Any]:
 def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         words = split(raw)
-        if read is real and least <= len(words) and (most is None or len(words) <= most):
+        if read in (real, _entire) and least <= len(words) and (most is None or len(words) <= most):
             try:
                 numbers = tuple(map(float, words))
                 if isfinite(sum(numbers)) and "_" not in raw and raw.isascii():
                     return numbers
             except ValueError:
                 pass
-        cut: str | None = None
+        first: Unclean | None = None
         if read is str:
             values: list[Any] = list(words)
         else:
@@ -213,11 +221,11 @@ def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable
                     if unclean.value is ABSENT:
                         raise
                     values.append(unclean.value)
-                    cut = cut or word
+                    first = first or unclean
         if len(values) < least:
             raise Unclean("too-few" if values else "empty", raw.strip())
-        if cut is not None:
-            raise Unclean("cut", cut, tuple(values[:most]))
+        if first is not None:
+            raise Unclean(first.trouble, first.word, tuple(values[:most]))
         if most is not None and len(values) > most:
             raise Unclean("too-many", raw.strip(), tuple(values[:most]))
         return tuple(values)

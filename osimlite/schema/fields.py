@@ -86,14 +86,13 @@ class Value(Kind):
 
     def words(self) -> str:
         """What the text must hold, in words: ``"3 numbers"``, ``"true or false"``."""
-        noun = {"double": "number", "int": "whole number", "bool": "true/false", "string": "word"}[self.scalar]
+        nouns = {"double": "numbers", "int": "whole numbers", "bool": "true or false", "string": "words"}[self.scalar]
         if self.size == 1:
-            return {"bool": "true or false", "string": "a text"}.get(self.scalar, f"one {noun}")
-        if self.size is not None:
-            return f"{self.size} {noun}s"
-        if self.most is not None and self.most == self.least:
-            return f"{self.most} {noun}s"
-        return f"a list of {noun}s" if not self.least else f"at least {self.least} {noun}s"
+            return {"bool": nouns, "string": "a text"}.get(self.scalar, f"one {nouns[:-1]}")
+        exact = self.size if self.size is not None else self.most if self.most == self.least else None
+        if exact is not None:
+            return f"{exact} {nouns}"
+        return f"at least {self.least} {nouns}" if self.least else f"a list of {nouns}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import osimlite
 from osimlite.document.reader import read_document
 from osimlite.document.source import Source
+from osimlite.schema.base import Object
 from osimlite.schema.frames import Body
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
@@ -88,6 +90,23 @@ def test_objects_take_what_their_class_has_in_the_block_as_opensim_does() -> Non
 def test_the_block_is_printed_back_and_its_values_only_there() -> None:
     assert osimlite.to_text(osimlite.read_text(BODIES)) == BODIES
     assert osimlite.to_text(osimlite.read_text(BODIES).copy_deep()) == BODIES
+
+
+def test_defaults_of_a_class_under_its_old_name_count_for_nothing() -> None:
+    # OpenSim looks for the present name of the class in the block, and does not find it.
+    text = """<OpenSimDocument Version="20302">
+	<CMC_TaskSet>
+		<defaults>
+			<rdCMC_Joint name="default"> <kp>7 7 7</kp> </rdCMC_Joint>
+			<CMC_Point name="default"> <kp>5 5 5</kp> </CMC_Point>
+		</defaults>
+		<objects> <rdCMC_Joint name="knee"/> <rdCMC_Point name="hand"/> </objects>
+	</CMC_TaskSet>
+</OpenSimDocument>
+"""
+    tasks: Any = read_document(Source(text.encode()), of=Object).top
+    assert [task.kp for task in tasks.objects] == [(1.0, 1.0, 1.0), (5.0, 5.0, 5.0)]
+    assert "<rdCMC_Joint name" in osimlite.to_text(tasks)
 
 
 def test_the_next_document_knows_nothing_of_it() -> None:

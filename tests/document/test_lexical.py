@@ -135,6 +135,7 @@ def test_switches_know_no_other_word() -> None:
 
 def test_legacy_switches_are_false_unless_true() -> None:
     assert converter(Value("bool", legacy=True))("TRUE") is True
+    assert converter(Value("bool", legacy=True))("0") is False
     with pytest.raises(Unclean) as caught:
         converter(Value("bool", legacy=True))("1")
     assert caught.value.value is False
@@ -153,6 +154,21 @@ def test_texts_collapse_white_space() -> None:
 
 def test_legacy_lists_take_commas_and_brackets() -> None:
     assert converter(Value("double", "list", legacy=True))("(1, 2,3)") == (1.0, 2.0, 3.0)
+
+
+def test_legacy_lists_of_switches_are_false_but_for_true_in_small_letters() -> None:
+    flags = converter(Value("bool", "list", legacy=True))
+    assert flags("true false 0") == (True, False, False)
+    with pytest.raises(Unclean) as caught:
+        flags("true 1 TRUE")
+    assert (caught.value.trouble, caught.value.word, caught.value.value) == ("ignored", "1", (True, False, False))
+
+
+@pytest.mark.parametrize("text", ["1x 2", "1 2mm", "1.5kg"])
+def test_legacy_lists_of_numbers_with_something_behind_one_are_refused(text: str) -> None:
+    with pytest.raises(Unclean) as caught:
+        converter(Value("double", "list", legacy=True))(text)
+    assert (caught.value.trouble, caught.value.value) == ("unreadable", ABSENT)
 
 
 @given(st.floats())

@@ -39,14 +39,16 @@ RENAMED_MEMBERS = {"Force": "PointActuator", "Torque": "TorqueActuator"}
 def class_names(draft: Draft) -> None:
     """Classes get their present names.
 
-    It comes first: the steps after it know the present names only.
+    It comes first: the steps after it know the present names only. Defaults of a class under its old name keep it:
+    OpenSim passes over them.
     """
-    for element in draft.tagged(*RENAMED):
-        _name(draft, element, RENAMED[element.tag])
-    for element in draft.tagged(*RENAMED_MEMBERS):
+    for element in draft.tagged(*RENAMED, *RENAMED_MEMBERS):
         parent = element.getparent()
-        if parent is not None and parent.tag == "objects":
+        place = None if parent is None else parent.tag
+        if element.tag in RENAMED_MEMBERS and place == "objects":
             _name(draft, element, RENAMED_MEMBERS[element.tag])
+        elif element.tag in RENAMED and place != "defaults":
+            _name(draft, element, RENAMED[element.tag])
 
 
 def _name(draft: Draft, element: Element, new: str) -> None:

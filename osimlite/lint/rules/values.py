@@ -109,10 +109,8 @@ def cut_number(subject: Subject, found: Found) -> None:
     ```
     """
     for note, owner, spec, _ in _value_notes(subject, "cut"):
-        value = note.value[-1] if isinstance(note.value, tuple) and note.value else note.value
-        ends = " and ends the list there" if isinstance(note.value, tuple) else ""
         found(
-            f"{subject.titled(owner, spec)}: OpenSim reads '{note.word}' as {shown(value)}{ends}",
+            f"{subject.titled(owner, spec)}: OpenSim reads '{note.word}' as {shown(_beginning(note.word))}",
             owner,
             number=note.number,
             word=note.word,
@@ -173,6 +171,13 @@ def _value_notes(subject: Subject, *kinds: str) -> Iterator[tuple[Note, Object, 
             yield note, note.owner, spec, spec.kind
 
 
+def _beginning(word: str) -> object:
+    try:
+        return real(word)
+    except Unclean as unclean:
+        return unclean.value
+
+
 def _all_read(text: str, kind: Value) -> bool:
     """Whether every word is one of its kind, so that only their count is wrong."""
     readers: dict[str, Callable[[str], object]] = {"double": real, "int": whole, "bool": flag, "string": str}
@@ -215,7 +220,7 @@ def _foreign(text: str) -> str:
 def _readable(text: str, kind: Value) -> str | None:
     """The same value as OpenSim would read it, if that is plain."""
     if kind.scalar == "bool":
-        return {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(text.lower())
+        return {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}.get(text.lower())
     if kind.scalar == "double":
         words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _plain_digits(text)).split()
         try:
