@@ -23,7 +23,7 @@ T = TypeVar("T")
 _LARGEST_NEIGHBOUR = 2_000_000
 
 
-def _while_unchanged(size: int) -> Callable[[Callable[[str], T]], Callable[[str], T | None]]:
+def while_unchanged(size: int) -> Callable[[Callable[[str], T]], Callable[[str], T | None]]:
     """Keep what was made of the last `size` files as long as these do not change; None of one that is not there."""
 
     def decorated(make: Callable[[str], T]) -> Callable[[str], T | None]:
@@ -45,7 +45,7 @@ def _while_unchanged(size: int) -> Callable[[Callable[[str], T]], Callable[[str]
     return decorated
 
 
-@_while_unchanged(256)
+@while_unchanged(256)
 def top_at(path: str) -> Object | None:
     """The top of a document; None if it cannot be read."""
     try:
@@ -54,14 +54,14 @@ def top_at(path: str) -> Object | None:
         return None
 
 
-@_while_unchanged(4)
+@while_unchanged(4)
 def tree_at(path: str) -> Tree | None:
     """The component tree of a model; None if it cannot be read."""
     top = top_at(path)
     return Tree(top) if isinstance(top, Model) else None
 
 
-@_while_unchanged(8)
+@while_unchanged(8)
 def table_at(path: str) -> Table | None:
     """A table; None if it cannot be read."""
     try:
@@ -81,7 +81,7 @@ def folders_in(folder: Path) -> list[Path]:
         return []
 
 
-@_while_unchanged(256)
+@while_unchanged(256)
 def documents_of(folder: str) -> list[str]:
     """The documents in a folder that may be OpenSim's, other than models."""
     try:

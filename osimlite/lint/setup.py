@@ -23,7 +23,7 @@ from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Reference
 from osimlite.schema.specs import FieldSpec, name_spec, reference_specs
-from osimlite.schema.tree import Resolution, Tree, Use
+from osimlite.schema.tree import Tree, Use
 
 NOTHING = ("", "unassigned")
 """What stands for no file, in small letters."""
@@ -190,7 +190,7 @@ class Setup(Subject):
         for item in self.items:
             cls = type(item)
             # What is named in a setup is looked up in the model: nothing in the document owns it.
-            owner: Any = item
+            owner: Any = item if self.tree is None else self.tree.model
             if cls.name_reference is not None and item.name:
                 found.append(Use(item, owner, name_spec(cls), item.name))
             for spec in reference_specs(cls):
@@ -200,12 +200,6 @@ class Setup(Subject):
                 elif value:
                     found.append(Use(item, owner, spec, value))
         return found
-
-    def resolution(self, use: Use) -> Resolution:
-        """What a name leads to in the model of the tool."""
-        if self.tree is None:
-            return Resolution(None, "missing")
-        return self.tree.lookup(use.reference, str(use.value), self.tree.model)
 
     @property
     def tool_folder(self) -> str:

@@ -38,6 +38,11 @@ def begins_as_ours(file: str) -> bool:
         return True
     try:
         with open(file, "rb") as stream:
-            return _OURS.search(stream.read(4000)) is not None
+            return is_ours(stream.read(4000))
     except OSError:
         return True
+
+
+def is_ours(beginning: bytes) -> bool:
+    """Whether XML that begins so is OpenSim's."""
+    return _OURS.search(beginning) is not None

@@ -1,23 +1,48 @@
-"""What is known of one version of an open file: its model as far as it can be read, its findings, its elements."""
+"""What is known of one version of an open file: its objects as far as it can be read, its findings, its names."""
 
 from __future__ import annotations
 
+import os
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from osimlite.document.reader import collector_paused
-from osimlite.document.source import Source
+from osimlite.document.source import Position, Source
 from osimlite.document.spans import Span
-from osimlite.document.survey import survey
+from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import run
+from osimlite.lint.engine import run, subject_in
 from osimlite.lint.settings import settings_for
+from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.subject import Subject
+from osimlite.lint.suffixes import is_ours, is_table
+from osimlite.lsp.cursor import Cursor, cursor_at
 from osimlite.lsp.text import Text
 from osimlite.schema.base import Component, Object
-from osimlite.schema.fields import Reference
+from osimlite.schema.editing import named_by
 from osimlite.schema.tree import Tree, Use
+
+
+class Target(NamedTuple):
+    """What a name leads to: an object that stands in a document, or a file.
+
+    `number` is that of its element, or of the element of what has a part that stands in no file; `path` is its path in
+    the model; `at` is the place in a file that is no document.
+    """
+
+    file: str
+    item: Object | None = None
+    path: str = ""
+    number: int | None = None
+    at: Position | None = None
+
+    def is_same(self, other: Target | None) -> bool:
+        """Whether another is the same thing."""
+        if other is None or self.item is None or (self.path, self.number) != (other.path, other.number):
+            return False
+        return self.file == other.file or os.path.realpath(self.file) == os.path.realpath(other.file)
 
 
 class Analysis:
@@ -32,9 +57,20 @@ class Analysis:
         self.text = text
         self.file = file
         self.source = Source.of_characters(text.content, file)
+        self.is_table = is_table(file)
+        self.is_foreign = file.lower().endswith(".xml") and not is_ours(self.source.data[:4000])
+
+    @property
+    def markup(self) -> str:
+        """The text of a document; nothing is told of what stands in tables, and in XML of other programs."""
+        return "" if self.is_table or self.is_foreign else self.text.content
+
+    def cursor(self, offset: int) -> Cursor:
+        """What stands at an offset."""
+        return cursor_at(self.markup, min(offset, len(self.markup)))
 
     @cached_property
-    def subject(self) -> Subject:
+    def subject(self) -> Checked:
         """What the rules look at.
 
         Raises:
@@ -42,39 +78,54 @@ class Analysis:
         """
         config = settings_for(Path(self.file).resolve().parent).config_for(self.file, Config())
         with collector_paused():
-            return Subject(survey(self.source), config)
+            return Checked(config) if self.is_foreign else subject_in(self.source, config)
 
     @cached_property
     def report(self) -> Report:
         """What the rules find."""
         with collector_paused():
-            return run(self.subject)
+            return Report([]) if self.is_foreign else run(self.subject)
 
     @property
-    def tree(self) -> Tree | None:
-        """The component tree, None if no model can be read."""
-        return None if self.subject.model is None else self.subject.tree
+    def is_checked(self) -> bool:
+        """Whether the rules have looked at it."""
+        return "report" in self.__dict__
+
+    @property
+    def document(self) -> Subject | None:
+        """The subject, if its elements are numbered as in the text: it is a document, and well-formed."""
+        subject = self.subject
+        return subject if isinstance(subject, Subject) and subject.top and subject.sure_until is None else None
 
     @property
     def is_certain(self) -> bool:
-        """Whether elements are numbered as in the text: it is well-formed."""
-        return self.subject.model is not None and self.subject.sure_until is None
+        """Whether there is a document that can be read."""
+        return self.document is not None
+
+    @property
+    def tree(self) -> Tree | None:
+        """The components that names lead to: those of the model, or of the model of the tool; None if there is none."""
+        return None if self.document is None else self.document.tree
 
     @cached_property
     def objects(self) -> dict[int, Object]:
-        """The objects of the model by the number of their element."""
-        items = [item for held in self.subject.by_class.values() for item in held]
-        return {item._index: item for item in items if item._index is not None}
+        """The objects of the document by the number of their element."""
+        held = () if self.document is None else self.document.by_class.values()
+        return {item._index: item for items in held for item in items if item._index is not None}
 
     def span(self, number: int) -> Span:
         """Where an element stands."""
         return self.source.spans[number]
 
+    def offset_of(self, place: Position) -> int:
+        """The offset of a place as findings tell it."""
+        return min(self.source.line_start(place.line) + place.column - 1, len(self.text.content))
+
     @cached_property
     def places(self) -> list[tuple[Use, int, int]]:
         """Every reference that stands in the text, with the offsets of the beginning and the end of its word."""
         found = []
-        for use in self.subject.uses:
+        for use in () if self.document is None else self.document.uses:
             place = self._place(use)
             if place is not None:
                 found.append((use, *place))
@@ -107,34 +158,55 @@ class Analysis:
         """The offsets of the name that an element gives its object."""
         span = self.span(number)
         place = self.source.of_attribute(number, "name")
-        start = self.source.line_start(place.line) + place.column - 1
+        start = self.offset_of(place)
         return (start, start + place.length) if start > span.start else None
 
-    def target_at(self, offset: int) -> Component | None:
-        """The component that is named at an offset, or whose start tag or name stands there."""
-        tree = self.tree
-        if tree is None or not self.is_certain:
-            return None
+    def place_of(self, number: int) -> tuple[int, int]:
+        """The offsets of the name that an element gives its object, or of its tag."""
+        span = self.span(number)
+        return self.name_of(number) or (span.start + 1, span.start + 1 + len(span.tag))
+
+    def target_at(self, offset: int) -> Target | None:
+        """What is named at an offset, or the component whose start tag or name stands there."""
         for use, start, end in self.places:
-            if start <= offset <= end and isinstance(use.spec.kind, Reference):
-                return self.subject.resolution(use).target
+            if start <= offset <= end:
+                return self.led_to(use)
         for number, item in self.objects.items():
             span = self.span(number)
             if span.start <= offset <= span.tag_end and isinstance(item, Component):
-                return item
+                return self._target(self.file, item)
         return None
 
-    def definition(self, component: Component) -> tuple[int, int] | None:
-        """The offsets of the name of a component, or of its tag; of a part that stands in no file, of what has it."""
-        tree = self.tree
-        item: Component | None = component
-        while item is not None and item._index is None:
-            item = None if tree is None else tree.parent_of(item)
-        if item is None or item._index is None:
+    def led_to(self, use: Use) -> Target | None:
+        """What a name in the text leads to, here or in another file; None if it leads nowhere."""
+        setup = self.document if isinstance(self.document, Setup) else None
+        text = str(use.value).strip()
+        if use.reference.rule in ("file", "output-file"):
+            path = setup.place(text) if setup is not None else os.path.join(os.path.dirname(self.file), text)
+            return Target(path) if os.path.isfile(path) else None
+        if use.reference.rule == "column" and setup is not None:
+            table = setup.table(getattr(setup.top, "datafile", ""))
+            labels = () if table is None else (label.at for label in table.labels if label.text.startswith(text))
+            return next((Target(str(table.file), at=at) for at in labels), None) if table is not None else None
+        if self.tree is None:
             return None
-        span = self.span(item._index)
-        return self.name_of(item._index) or (span.start + 1, span.start + 1 + len(span.tag))
+        found = named_by(self.tree, use)
+        if setup is None:
+            return None if found is None else self._target(self.file, found)
+        if found is not None and setup.model_file is not None:
+            return self._target(setup.model_file, found)
+        named = ((file, item) for file, top in setup.added for item in top.walk() if item.name == text)
+        return next((Target(*one, number=one[1]._index) for one in named if is_of(one[1], use.reference.target)), None)
 
-    def references(self, component: Component) -> list[tuple[int, int]]:
-        """The offsets of every word that names a component."""
-        return [(start, end) for use, start, end in self.places if self.subject.resolution(use).target is component]
+    def _target(self, file: str, item: Component) -> Target:
+        tree = self.tree
+        path = "" if tree is None else tree.path_of(item) or ""
+        shown: Component | None = item
+        while tree is not None and shown is not None and shown._index is None:
+            # A part that OpenSim makes stands in no file.
+            shown = tree.parent_of(shown)
+        return Target(file, item, path, None if shown is None else shown._index)
+
+    def references(self, target: Target) -> list[tuple[int, int]]:
+        """The offsets of every word that leads to something."""
+        return [(start, end) for use, start, end in self.places if target.is_same(self.led_to(use))]

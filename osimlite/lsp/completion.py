@@ -8,18 +8,24 @@ from functools import cache
 from lsprotocol import types
 
 from osimlite.document.lexical import formatter
+from osimlite.lint.suffixes import is_document
 from osimlite.lsp.analysis import Analysis
-from osimlite.lsp.cursor import Cursor, Element, cursor_at, single_objects
+from osimlite.lsp.cursor import Cursor, Element, single_objects
 from osimlite.lsp.hover import is_list
-from osimlite.schema.base import Component, Object
+from osimlite.lsp.names import names, reference_of
+from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import class_for, tags
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.schema.tree import Use
 
-_OPAQUE = ("input", "file", "column", "positional", "point-index")
-"""Rules of references whose texts are no names of components."""
+_TOPS = (
+    "AnalyzeTool", "CMCTool", "CMC_TaskSet", "ContactGeometrySet", "ControlSet", "ExternalLoads", "ForceSet",
+    "ForwardTool", "IKTaskSet", "IMUInverseKinematicsTool", "IMUPlacer", "InverseDynamicsTool",
+    "InverseKinematicsTool", "MarkerSet", "MeasurementSet", "MocoInverse", "MocoStudy", "MocoTrack", "RRATool",
+    "ScaleSet", "ScaleTool",
+)  # fmt: skip
+"""What may be at the top of documents other than models."""
 
 
 def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list[types.CompletionItem]:
@@ -30,16 +36,16 @@ def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list
         known: of the last version that could be read: what names there are.
         offset: of the cursor.
     """
-    cursor = cursor_at(analysis.text.content, offset)
+    cursor = analysis.cursor(offset)
     around = cursor.inner
     if cursor.kind == "closing tag" and around is not None:
         return [_item(analysis, cursor, around.tag, f"{around.tag}>", types.CompletionItemKind.Keyword)]
     if cursor.kind == "tag":
         return [*_tags(analysis, cursor, around, bracket="")]
     if cursor.kind == "attribute" and cursor.attribute == "name" and cursor.element is not None:
-        cls = cursor.element.cls
-        if cls is not None and cls.name_reference is not None:
-            return [*_names(analysis, known, cursor, cls.name_reference, cursor.element)]
+        reference = reference_of(cursor.element.cls)
+        if reference is not None:
+            return [*_names(analysis, known, cursor, reference, cursor.element)]
     if cursor.kind != "text" or around is None:
         return []
     if around.cls is not None or (around.spec is not None and is_list(around.spec)):
@@ -59,19 +65,11 @@ def _names(
     analysis: Analysis, known: Analysis | None, cursor: Cursor, reference: Reference, holder: Element | None
 ) -> Iterator[types.CompletionItem]:
     """The texts that a reference may take."""
-    if known is None or known.tree is None or reference.rule in _OPAQUE:
-        return
-    tree = known.tree
-    item = known.objects.get(holder.number) if holder is not None and known is analysis else None
-    if item is None and holder is not None and holder.given:
-        # Elements before it may have come and gone since; its name tells which it is.
-        item = next((c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None)
-    owner: Component = tree.model if item is None else tree.owner_of(item)
-    spec = FieldSpec("", "", reference, None, None, None, type(owner))
-    for text in tree.spellings(Use(owner, owner, spec, "")):
-        target = tree.lookup(reference, text, owner).target
-        detail = "" if target is None else f"{type(target).tag} {tree.path_of(target)}"
-        yield _item(analysis, cursor, text, text, types.CompletionItemKind.Reference, detail)
+    for name in names(known, cursor, reference, holder) if known is not None else ():
+        item = _item(analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail)
+        # Editors sort by it.
+        item.sort_text = f"{'0' if name.likely else '1'}{name.text}"
+        yield item
 
 
 def _tags(analysis: Analysis, cursor: Cursor, around: Element | None, bracket: str) -> Iterator[types.CompletionItem]:
@@ -80,7 +78,8 @@ def _tags(analysis: Analysis, cursor: Cursor, around: Element | None, bracket: s
         return
     if around.cls is None:
         if around.tag == "OpenSimDocument":
-            yield _object(analysis, cursor, "Model", bracket, "")
+            for tag in _TOPS if is_document(analysis.file) else ("Model",):
+                yield _object(analysis, cursor, tag, bracket, "")
         elif around.spec is not None and is_list(around.spec) and around.spec.accepts is not None:
             for tag in _concrete(around.spec.accepts):
                 yield _object(analysis, cursor, tag, bracket, "")

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from lsprotocol import types
 
+from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Finding, Severity
 from osimlite.lint.fixes import edits_of
 from osimlite.lsp.analysis import Analysis
@@ -40,14 +41,16 @@ def _diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
 def _offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
     if finding.line is None or finding.column is None:
         return 0, 0
-    start = analysis.source.line_start(finding.line) + finding.column - 1
-    start = min(start, len(analysis.text.content))
+    start = analysis.offset_of(Position(finding.line, finding.column))
     return start, min(start + finding.length, len(analysis.text.content))
 
 
 def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
     """What can be done about the findings in a range: their mends, and to ignore them; and to mend all of the file."""
-    found = []
+    found: list[types.CodeAction] = []
+    if not analysis.is_checked:
+        # The editor asks again when it is told of the findings.
+        return found
     first, last = analysis.text.offset(wanted.start), analysis.text.offset(wanted.end)
     for finding in analysis.report:
         start, end = _offsets(analysis, finding)
@@ -62,7 +65,7 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
                     is_preferred=finding.fix.safe, edit=types.WorkspaceEdit({uri: edits}),
                 )
             )  # fmt: skip
-        if finding.line is not None and finding.code[4] != "0":
+        if finding.line is not None and finding.code[4] != "0" and analysis.markup:
             found.append(
                 types.CodeAction(
                     f"Ignore {finding.code} ({finding.name}) on this line", kind=types.CodeActionKind.QuickFix,

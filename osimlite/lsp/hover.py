@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import os
+
 from lsprotocol import types
 
 from osimlite.document.lexical import formatter
+from osimlite.lint.setup import Setup
 from osimlite.lsp.analysis import Analysis
-from osimlite.lsp.cursor import Element, cursor_at
+from osimlite.lsp.cursor import Element
+from osimlite.lsp.names import measured
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Value
 from osimlite.schema.specs import FieldSpec
+from osimlite.schema.tree import is_a
 
 
 def hover(analysis: Analysis, offset: int) -> types.Hover | None:
     """What stands at an offset: a class, a property with its type, unit and default, or what a name leads to."""
-    cursor = cursor_at(analysis.text.content, offset)
+    cursor = analysis.cursor(offset)
     element = cursor.subject
     if cursor.kind == "comment" or element is None:
         return None
@@ -54,14 +59,22 @@ def _default(spec: FieldSpec) -> str:
 
 def _led_to(analysis: Analysis, offset: int) -> str:
     target = analysis.target_at(offset)
-    if target is None or analysis.tree is None:
+    if target is None:
         return ""
-    return f"{type(target).tag} `{analysis.tree.path_of(target)}`"
+    file = os.path.relpath(target.file, os.path.dirname(analysis.file) or ".")
+    if target.item is None:
+        return f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."
+    said = f"{type(target.item).tag} `{target.path or target.item.name}`"
+    if target.file == analysis.file:
+        return said
+    data = measured(analysis.document) if isinstance(analysis.document, Setup) and is_a(target.item, "Marker") else None
+    also = f"; {'in' if target.item.name in data[1] else '**not** in'} `{data[0]}`" if data is not None else ""
+    return f"{said} of `{file}`{also}"
 
 
 def _path(analysis: Analysis, element: Element) -> str:
     """The path of the component that an element is, if the text can be read."""
-    if not analysis.is_certain or analysis.tree is None:
+    if analysis.tree is None:
         return ""
     item = analysis.objects.get(element.number)
     path = None if item is None else analysis.tree.path_of(item)

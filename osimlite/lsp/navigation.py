@@ -1,14 +1,12 @@
-"""Ways through a file: outline, folding, renaming with all references."""
+"""Ways through a file: outline and folding."""
 
 from __future__ import annotations
 
 from lsprotocol import types
 
 from osimlite.document.spans import markup
-from osimlite.errors import ModelError
 from osimlite.lsp.analysis import Analysis
-from osimlite.schema.base import Component, Object
-from osimlite.schema.editing import rename
+from osimlite.schema.base import Object
 from osimlite.schema.specs import object_specs
 from osimlite.schema.tree import is_a
 
@@ -27,11 +25,9 @@ _SYMBOLS = {
 
 
 def outline(analysis: Analysis) -> list[types.DocumentSymbol]:
-    """The objects of a model as a tree; empty while the text is broken."""
-    model = analysis.subject.model
-    if model is None or not analysis.is_certain:
-        return []
-    return _symbols(analysis, model)
+    """The objects of a document as a tree; empty while the text is broken."""
+    top = None if analysis.document is None else analysis.document.top
+    return [] if top is None else _symbols(analysis, top)
 
 
 def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
@@ -58,7 +54,7 @@ def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
 def folds(analysis: Analysis) -> list[types.FoldingRange]:
     """Elements and comments of more than one line."""
     found, open_lines = [], []
-    for piece in markup(analysis.text.content):
+    for piece in markup(analysis.markup):
         line = analysis.text.position(piece.start).line
         if piece.kind == "open":
             open_lines.append((piece.tag, line))
@@ -73,27 +69,3 @@ def folds(analysis: Analysis) -> list[types.FoldingRange]:
             if line > first:
                 found.append(types.FoldingRange(first, line))
     return found
-
-
-def renaming(analysis: Analysis, component: Component, name: str) -> list[types.TextEdit]:
-    """The changes of the text that give a component another name, everywhere.
-
-    Raises:
-        ModelError: the name is illegal or taken, or the text gives the component no name.
-    """
-    place = None if component._index is None else analysis.name_of(component._index)
-    if place is None or component._index is None:
-        raise ModelError(f"the text does not give '{component.name}' a name; nothing can be renamed")
-    # Renaming changes a model, so it is done to another one of the same text.
-    twin = Analysis(analysis.text, analysis.file)
-    target, model = twin.objects[component._index], twin.subject.model
-    assert isinstance(target, Component) and model is not None
-    uses = twin.places
-    rename(model, target, name)
-    edits = [types.TextEdit(analysis.text.range(*place), name)]
-    for use, start, end in uses:
-        value = getattr(use.holder, use.spec.name)
-        text = value if use.position is None else value[use.position]
-        if text != use.value and (start, end) != place:
-            edits.append(types.TextEdit(analysis.text.range(start, end), str(text)))
-    return edits

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import typing
+from collections.abc import Iterable
 from typing import Any
 
 from lsprotocol import types
@@ -15,17 +16,19 @@ from osimlite import __version__
 from osimlite.document.formatting import formatted as formatted_text
 from osimlite.errors import OsimliteError
 from osimlite.lint.settings import settings_for
-from osimlite.lsp.analysis import Analysis
+from osimlite.lsp.analysis import Analysis, Target
 from osimlite.lsp.completion import completions
 from osimlite.lsp.findings import actions, diagnostics
 from osimlite.lsp.hover import hover
-from osimlite.lsp.navigation import folds, outline, renaming
+from osimlite.lsp.navigation import folds, outline
+from osimlite.lsp.project import Project
 from osimlite.lsp.protocol import NO_JSON, Protocol, keep_log_plain, strict_converter
 from osimlite.lsp.text import Text
-from osimlite.schema.base import Component
 
 PAUSE = 0.02
 """A check begins when nothing has been typed for so long, s."""
+LONG_PAUSE = 0.4
+"""And that of what depends on what is typed, s."""
 
 
 class Asked(typing.Protocol):
@@ -36,12 +39,7 @@ class Asked(typing.Protocol):
 
 
 class Server(LanguageServer):
-    """The server, with the files that are open.
-
-    Attributes:
-        open: the analysis of each open file as it is now, by URI.
-        known: of each, the last one that could be read.
-    """
+    """The server, with the files that are open."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -51,8 +49,7 @@ class Server(LanguageServer):
             protocol_cls=Protocol,
             converter_factory=strict_converter,
         )
-        self.open: dict[str, Analysis] = {}
-        self.known: dict[str, Analysis] = {}
+        self.project = Project()
         self._checks: dict[str, asyncio.Task[None]] = {}
 
     def report_server_error(self, error: Exception, source: Any) -> None:
@@ -63,11 +60,21 @@ class Server(LanguageServer):
         else:
             super().report_server_error(error, source)
 
-    def show(self, uri: str, text: Text, version: int | None) -> None:
-        """Take a new version of a file, and check it as soon as nobody types."""
-        self.open[uri] = Analysis(text, to_fs_path(uri) or uri)
+    def show(self, uri: str, text: Text) -> Analysis:
+        """Take a new version of a file."""
+        found = self.project.open[uri] = Analysis(text, to_fs_path(uri) or uri)
+        return found
+
+    def check(self, uri: str, pause: float = PAUSE) -> None:
+        """Check a file as soon as nobody types."""
         self.forget(uri)
-        self._checks[uri] = asyncio.get_running_loop().create_task(self._check(uri, version))
+        self._checks[uri] = asyncio.get_running_loop().create_task(self._check(uri, pause))
+
+    def check_again(self, uris: Iterable[str], pause: float = PAUSE) -> None:
+        """Check files whose text is the same, but not what they depend on."""
+        for uri in uris:
+            self.show(uri, self.project.open[uri].text)
+            self.check(uri, pause)
 
     def forget(self, uri: str) -> None:
         """Give up a check that has not begun."""
@@ -75,9 +82,9 @@ class Server(LanguageServer):
         if task is not None:
             task.cancel()
 
-    async def _check(self, uri: str, version: int | None) -> None:
-        await asyncio.sleep(PAUSE)
-        analysis = self.open[uri]
+    async def _check(self, uri: str, pause: float) -> None:
+        await asyncio.sleep(pause)
+        analysis = self.project.open[uri]
         try:
             found = diagnostics(analysis)
         except OsimliteError as error:
@@ -88,9 +95,13 @@ class Server(LanguageServer):
             # The next keystroke may well be checked again: a server that ends takes everything else with it.
             self.report_server_error(error, FeatureRequestError)
             return
-        if analysis.is_certain:
-            self.known[uri] = analysis
+        document = self.workspace.text_documents.get(uri)
+        version = None if document is None else document.version
         self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, found, version))
+        if analysis.is_certain:
+            self.project.known[uri] = analysis
+            if self.project.hold(analysis):
+                self.check_again(self.project.depending_on(analysis), LONG_PAUSE)
 
     def at(self, place: Asked) -> tuple[Analysis, int]:
         """The file that a question is about, and the offset in it.
@@ -103,15 +114,15 @@ class Server(LanguageServer):
 
     def of(self, document: types.TextDocumentIdentifier) -> Analysis:
         """The file that a question is about; JsonRpcInvalidParams if it is not open."""
-        analysis = self.open.get(document.uri)
+        analysis = self.project.open.get(document.uri)
         if analysis is None:
             raise JsonRpcInvalidParams(f"{document.uri} is not open")
         return analysis
 
-    def component(self, place: Asked) -> tuple[Analysis, Component | None]:
-        """The file, and the component that a question is about."""
+    def target(self, place: Asked) -> Target | None:
+        """What a question about a name is about."""
         analysis, offset = self.at(place)
-        return analysis, analysis.target_at(offset)
+        return analysis.target_at(offset)
 
 
 def make_server() -> Server:
@@ -128,32 +139,40 @@ def _add_files(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
     async def opened(_: Server, params: types.DidOpenTextDocumentParams) -> None:
         document = params.text_document
-        unit = server.workspace.position_encoding or types.PositionEncodingKind.Utf16
-        server.show(document.uri, Text(document.text, unit), document.version)
+        server.project.unit = server.workspace.position_encoding or types.PositionEncodingKind.Utf16
+        server.show(document.uri, Text(document.text, server.project.unit))
+        server.check(document.uri)
 
     @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
     async def changed(_: Server, params: types.DidChangeTextDocumentParams) -> None:
-        text = server.of(types.TextDocumentIdentifier(params.text_document.uri)).text
+        uri = params.text_document.uri
+        text = server.of(types.TextDocumentIdentifier(uri)).text
         for change in params.content_changes:
             text = text.changed(change)
-        server.show(params.text_document.uri, text, params.text_document.version)
+        # A table may have a million rows: it is checked when it is written.
+        if not server.show(uri, text).is_table:
+            server.check(uri)
 
     @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
     async def closed(_: Server, params: types.DidCloseTextDocumentParams) -> None:
         uri = params.text_document.uri
         server.forget(uri)
-        server.open.pop(uri, None)
-        server.known.pop(uri, None)
+        analysis = server.project.close(uri)
         server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
+        if analysis is not None:
+            server.check_again(server.project.depending_on(analysis))
 
     @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
-    @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
-    async def saved(_: Server, params: object) -> None:
-        # Settings, meshes and included files may have changed, of which the text knows nothing.
+    async def saved(_: Server, params: types.DidSaveTextDocumentParams) -> None:
+        # Settings and files that others name may have changed, of which their texts know nothing.
         settings_for.cache_clear()
-        for uri, analysis in list(server.open.items()):
-            document = server.workspace.text_documents.get(uri)
-            server.show(uri, analysis.text, None if document is None else document.version)
+        files = server.project.open.items()
+        server.check_again([uri for uri, file in files if not (file.is_table and file.is_checked)])
+
+    @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
+    async def watched(_: Server, params: object) -> None:
+        settings_for.cache_clear()
+        server.check_again([*server.project.open])
 
 
 def _add_reading(server: Server) -> None:
@@ -166,25 +185,22 @@ def _add_reading(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)
     def completed(_: Server, params: types.CompletionParams) -> types.CompletionList:
         analysis, offset = server.at(params)
-        known = analysis if analysis.is_certain else server.known.get(params.text_document.uri)
+        known = analysis if analysis.is_certain else server.project.known.get(params.text_document.uri)
         return types.CompletionList(False, completions(analysis, known, offset))
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def defined(_: Server, params: types.DefinitionParams) -> types.Location | None:
-        analysis, component = server.component(params)
-        place = None if component is None else analysis.definition(component)
-        return None if place is None else types.Location(params.text_document.uri, analysis.text.range(*place))
+        target = server.target(params)
+        return None if target is None else server.project.location(target)
 
     @server.feature(types.TEXT_DOCUMENT_REFERENCES)
     def referred(_: Server, params: types.ReferenceParams) -> list[types.Location]:
-        analysis, component = server.component(params)
-        if component is None:
+        target = server.target(params)
+        if target is None:
             return []
-        places = analysis.references(component)
-        own = analysis.definition(component) if params.context.include_declaration else None
-        if own is not None and own not in places:
-            places.insert(0, own)
-        return [types.Location(params.text_document.uri, analysis.text.range(*place)) for place in places]
+        places = server.project.references(target)
+        own = server.project.location(target) if params.context.include_declaration else None
+        return [own, *places] if own is not None and own not in places else places
 
     @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     def outlined(_: Server, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
@@ -206,27 +222,25 @@ def _add_writing(server: Server) -> None:
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepared(_: Server, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
-        analysis, component = server.component(params)
-        if component is None or component._index is None or analysis.name_of(component._index) is None:
+        analysis, offset = server.at(params)
+        target = analysis.target_at(offset)
+        if target is None or target.item is None or server.project.location(target) is None:
             return None
-        place = types.Range(params.position, params.position)
-        offset = analysis.text.offset(params.position)
-        spots = [analysis.name_of(component._index), *analysis.references(component)]
-        for spot in spots:
-            if spot is not None and spot[0] <= offset <= spot[1]:
-                place = analysis.text.range(*spot)
-        return types.PrepareRenamePlaceholder(place, component.name)
+        spots = [*analysis.references(target)]
+        if target.file == analysis.file and target.number is not None:
+            spots.append(analysis.place_of(target.number))
+        place = next((spot for spot in spots if spot[0] <= offset <= spot[1]), (offset, offset))
+        return types.PrepareRenamePlaceholder(analysis.text.range(*place), target.item.name)
 
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
     def renamed(_: Server, params: types.RenameParams) -> types.WorkspaceEdit | None:
-        analysis, component = server.component(params)
-        if component is None:
+        target = server.target(params)
+        if target is None or target.item is None:
             return None
         try:
-            edits = renaming(analysis, component, params.new_name)
+            return types.WorkspaceEdit(server.project.renaming(target, params.new_name))
         except OsimliteError as error:
             raise JsonRpcInvalidParams(error.message) from None
-        return types.WorkspaceEdit({params.text_document.uri: edits})
 
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def formatted(_: Server, params: types.DocumentFormattingParams) -> list[types.TextEdit]:

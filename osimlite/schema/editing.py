@@ -8,8 +8,14 @@ from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
+from osimlite.schema.resolution import RULES, nothing_to_resolve
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, Tree, Use
 from osimlite.text import listed
+
+_NAME_NOTHING = frozenset(rule for rule, follow in RULES.items() if follow is nothing_to_resolve) - {"input"}
+
+_OF_INPUT = Reference("socket", "Component")
+"""How the text of an input names a component, before the bar and the output."""
 
 
 def rename(model: Model, component: Component, name: str) -> None:
@@ -29,11 +35,11 @@ def rename(model: Model, component: Component, name: str) -> None:
     taken = tree.by_path.get(wanted)
     if parent is not None and taken is not None and taken is not component:
         raise ModelError(f"cannot rename '{path}': its parent has a '{name}' already")
-    texts = [(use, _target(tree, use)) for use in tree.uses() if isinstance(use.value, str)]
+    texts = [(use, named_by(tree, use)) for use in tree.uses() if isinstance(use.value, str)]
     component.name = name
     tree = model.tree()
     for use, target in texts:
-        if target is None or _target(tree, use) is target:
+        if target is None or named_by(tree, use) is target:
             continue
         assert isinstance(use.value, str)
         if use.reference.rule == "input":
@@ -71,20 +77,7 @@ def remove(model: Model, component: Component) -> None:
     raise ModelError(f"cannot remove '{path}': every model has one")
 
 
-_NAME_NOTHING = ("file", "column", "positional", "point-index")
-
-_OF_INPUT = Reference("socket", "Component")
-"""How the text of an input names a component, before the bar and the output."""
-
-
-def _path_in(model: Model, component: Object) -> str:
-    path = model.tree().path_of(component)
-    if path is None:
-        raise ModelError(f"'{component.name}' is not in the model")
-    return path
-
-
-def _target(tree: Tree, use: Use) -> Component | None:
+def named_by(tree: Tree, use: Use) -> Component | None:
     """What a reference names; of an input, the component that has the output."""
     if use.reference.rule in _NAME_NOTHING:
         return None
@@ -94,8 +87,15 @@ def _target(tree: Tree, use: Use) -> Component | None:
     return tree.resolve(use).target
 
 
+def _path_in(model: Model, component: Object) -> str:
+    path = model.tree().path_of(component)
+    if path is None:
+        raise ModelError(f"'{component.name}' is not in the model")
+    return path
+
+
 def _target_path(tree: Tree, use: Use) -> str | None:
-    target = _target(tree, use)
+    target = named_by(tree, use)
     return None if target is None else tree.path_of(target)
 
 

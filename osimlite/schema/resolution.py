@@ -121,7 +121,13 @@ def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Ca
     return rule
 
 
-def _nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+def _state_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    """The component that has the state or the control: the path of a state goes on with its name."""
+    whole = _model_path(tree, text, owner, "Component")
+    return _model_path(tree, text.rpartition("/")[0], owner, "Component") if whole.target is None else whole
+
+
+def nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     """Files, columns and positions name nothing in the component tree."""
     return Resolution(owner)
 
@@ -149,15 +155,15 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "set-member": _bare(lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Component")),
     "frame-path-or-body-name": _path_or_member("/bodyset"),
     "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),
-    "input": _nothing_to_resolve,
-    "file": _nothing_to_resolve,
-    "output-file": _nothing_to_resolve,
-    "input-folder": _nothing_to_resolve,
-    "output-folder": _nothing_to_resolve,
-    "column": _nothing_to_resolve,
-    "state-path": _nothing_to_resolve,
-    "external-force-name": _nothing_to_resolve,
-    "positional": _nothing_to_resolve,
-    "point-index": _nothing_to_resolve,
+    "input": nothing_to_resolve,
+    "file": nothing_to_resolve,
+    "output-file": nothing_to_resolve,
+    "input-folder": nothing_to_resolve,
+    "output-folder": nothing_to_resolve,
+    "column": nothing_to_resolve,
+    "state-path": _state_path,
+    "external-force-name": nothing_to_resolve,
+    "positional": nothing_to_resolve,
+    "point-index": nothing_to_resolve,
 }
 """By the name of a rule, what follows a text by it: the tree, the text, its owner, the class to be found."""

@@ -76,7 +76,6 @@ def test_no_question_about_a_damaged_text_fails(offset: int, cut: int, put: str)
     target = analysis.target_at(place)
     if target is not None:
         try:
-            analysis.definition(target)
             analysis.references(target)
         except OsimliteError as error:  # pragma: no cover
             pytest.fail(str(error))

@@ -2,92 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
-import sys
-from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
 from lsprotocol import types
 
-pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
-pytest.importorskip("pytest_lsp", reason="needs pytest-lsp (extra 'dev')")
-
-import pytest_lsp
-
-Edit = Callable[[str, str], "asyncio.Future[None]"]
-
-
-@pytest_lsp.fixture(
-    config=pytest_lsp.ClientServerConfig(server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"])
-)
-async def client(lsp_client: pytest_lsp.LanguageClient) -> AsyncIterator[None]:
-    capabilities = pytest_lsp.client_capabilities("visual-studio-code")
-    await lsp_client.initialize_session(types.InitializeParams(capabilities=capabilities))
-    yield
-    await lsp_client.shutdown_session()
-
-
-class File:
-    """An open file, and the changes that its user makes."""
-
-    def __init__(self, client, path: Path, text: str) -> None:
-        self.client, self.uri, self.text, self.version = client, path.as_uri(), text, 1
-
-    @property
-    def document(self) -> types.TextDocumentIdentifier:
-        return types.TextDocumentIdentifier(self.uri)
-
-    def place(self, text: str, within: int = 0, nth: int = 0) -> types.Position:
-        offset = -1
-        for _ in range(nth + 1):
-            offset = self.text.index(text, offset + 1)
-        offset += within
-        return types.Position(self.text.count("\n", 0, offset), offset - self.text.rfind("\n", 0, offset) - 1)
-
-    async def open(self) -> list[types.Diagnostic]:
-        item = types.TextDocumentItem(self.uri, "osim", self.version, self.text)
-        self.client.text_document_did_open(types.DidOpenTextDocumentParams(item))
-        return await self.checked()
-
-    async def type(self, old: str, new: str) -> list[types.Diagnostic]:
-        """Replace the first `old` by `new`, as an editor tells it."""
-        start, end = self.place(old), self.place(old, len(old))
-        change = types.TextDocumentContentChangePartial(types.Range(start, end), new)
-        self.text = self.text.replace(old, new, 1)
-        self.version += 1
-        document = types.VersionedTextDocumentIdentifier(self.version, self.uri)
-        self.client.text_document_did_change(types.DidChangeTextDocumentParams(document, [change]))
-        return await self.checked()
-
-    async def checked(self) -> list[types.Diagnostic]:
-        await self.client.wait_for_notification(types.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)
-        return list(self.client.diagnostics[self.uri])
-
-    def after(self, edits: list[types.TextEdit]) -> str:
-        lines = self.text.splitlines(keepends=True)
-
-        def offset(position: types.Position) -> int:
-            return sum(map(len, lines[: position.line])) + position.character
-
-        text = self.text
-        for edit in sorted(edits, key=lambda edit: offset(edit.range.start), reverse=True):
-            text = text[: offset(edit.range.start)] + edit.new_text + text[offset(edit.range.end) :]
-        return text
-
-    def words(self, place: types.Range) -> str:
-        assert place.start.line == place.end.line
-        return self.text.splitlines()[place.start.line][place.start.character : place.end.character]
-
 
 @pytest.fixture
-def walker(client, fixtures: Path, tmp_path: Path) -> File:
+def walker(editor, fixtures: Path, tmp_path: Path):
     text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text()
-    return File(client, tmp_path / "walker.osim", text)
+    return editor(tmp_path / "walker.osim", text)
 
 
 @pytest.mark.asyncio
-async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker: File) -> None:
+async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker) -> None:
     before = await walker.open()
     assert not [found for found in before if found.severity == types.DiagnosticSeverity.Error]
     found = [d for d in await walker.type("RFootContact Platform", "RFotContact Platform") if d.code == "OSIM301"]
@@ -101,7 +29,7 @@ async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker: 
 
 
 @pytest.mark.asyncio
-async def test_a_file_that_is_broken_at_the_moment(client, walker: File) -> None:
+async def test_a_file_that_is_broken_at_the_moment(client, walker) -> None:
     await walker.open()
     found = await walker.type("<mass>1</mass>", "<mass>1</mas")
     assert next(d.code for d in found if d.severity == types.DiagnosticSeverity.Error) == "OSIM001"
@@ -112,7 +40,7 @@ async def test_a_file_that_is_broken_at_the_moment(client, walker: File) -> None
 
 
 @pytest.mark.asyncio
-async def test_what_a_word_means(client, walker: File) -> None:
+async def test_what_a_word_means(client, walker) -> None:
     await walker.open()
 
     async def hover(text: str, within: int) -> str:
@@ -130,7 +58,7 @@ async def test_what_a_word_means(client, walker: File) -> None:
 
 
 @pytest.mark.asyncio
-async def test_where_a_name_leads_and_who_uses_it(client, walker: File) -> None:
+async def test_where_a_name_leads_and_who_uses_it(client, walker) -> None:
     await walker.open()
     here = walker.place("RFootContact Platform", 4)
     found = await client.text_document_definition_async(types.DefinitionParams(walker.document, here))
@@ -144,7 +72,7 @@ async def test_where_a_name_leads_and_who_uses_it(client, walker: File) -> None:
 
 
 @pytest.mark.asyncio
-async def test_a_name_is_changed_everywhere(client, walker: File) -> None:
+async def test_a_name_is_changed_everywhere(client, walker) -> None:
     await walker.open()
     here = walker.place('<ContactSphere name="RFootContact"', 23)
     shown = await client.text_document_prepare_rename_async(types.PrepareRenameParams(walker.document, here))
@@ -158,7 +86,7 @@ async def test_a_name_is_changed_everywhere(client, walker: File) -> None:
 
 
 @pytest.mark.asyncio
-async def test_what_may_be_written_here(client, walker: File) -> None:
+async def test_what_may_be_written_here(client, walker) -> None:
     await walker.open()
 
     async def labels(within: str, offset: int) -> list[str]:
@@ -177,7 +105,7 @@ async def test_what_may_be_written_here(client, walker: File) -> None:
 
 
 @pytest.mark.asyncio
-async def test_outline_folds_and_layout(client, walker: File) -> None:
+async def test_outline_folds_and_layout(client, walker) -> None:
     await walker.open()
     (model,) = await client.text_document_document_symbol_async(types.DocumentSymbolParams(walker.document))
     assert model.name == "DynamicWalkerModel"
@@ -194,9 +122,9 @@ async def test_outline_folds_and_layout(client, walker: File) -> None:
 
 
 @pytest.mark.asyncio
-async def test_layout_of_an_older_format(client, tmp_path: Path) -> None:
+async def test_layout_of_an_older_format(client, editor, tmp_path: Path) -> None:
     text = '<OpenSimDocument Version="20302"><Model name="m"><gravity> 0 -9.810 0\n</gravity></Model></OpenSimDocument>'
-    old = File(client, tmp_path / "old.osim", text)
+    old = editor(tmp_path / "old.osim", text)
     await old.open()
     options = types.FormattingOptions(tab_size=4, insert_spaces=False)
     edits = await client.text_document_formatting_async(types.DocumentFormattingParams(old.document, options))

@@ -1,0 +1,161 @@
+"""The names that may stand at a place: of components, files, columns, states; with what each of them is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from osimlite.lint.beside import documents_of, table_at
+from osimlite.lint.setup import Setup
+from osimlite.lint.suffixes import TABLES
+from osimlite.lsp.analysis import Analysis
+from osimlite.lsp.cursor import Cursor, Element
+from osimlite.schema.base import Component, Object
+from osimlite.schema.fields import Reference
+from osimlite.schema.specs import FieldSpec, lineage
+from osimlite.schema.tree import Tree, Use
+
+_OPAQUE = ("input", "positional", "point-index", "output-file", "input-folder", "output-folder")
+"""Rules of references whose texts are no names of what is there."""
+_NAMED_AFTER = {
+    "Control": Reference("actuator-name", "Actuator"),
+    "MarkerWeight": Reference("marker-name", "Marker"),
+    "CMC_Joint": Reference("coordinate-name", "Coordinate"),
+}
+"""What objects of a class are called after, although nothing says that they must be."""
+_STATES = {
+    "Coordinate": ("value", "speed"),
+    "DeGrooteFregly2016Muscle": ("activation", "normalized_tendon_force"),
+    "Muscle": ("activation", "fiber_length"),
+}
+"""The states of a class and of those derived from it; the first that fits counts."""
+_SUFFIXES = {"Model": (".osim",), "marker data": (".trc", ".sto"), "table": (".sto", ".mot")}
+"""How files of a content are called; others are documents."""
+MEASURED = ("marker_file", "orientations_file", "coordinate_file")
+"""Properties that name the data that a tool compares with its model."""
+
+
+class Name(NamedTuple):
+    """A text that would be right, what it leads to, and whether it is what is looked for more likely than others."""
+
+    text: str
+    detail: str = ""
+    likely: bool = True
+
+
+def reference_of(cls: type[Object] | None) -> Reference | None:
+    """What the names of objects of a class lead to."""
+    if cls is None:
+        return None
+    after = (_NAMED_AFTER[name] for name in lineage(cls) if name in _NAMED_AFTER)
+    return cls.name_reference or next(after, None)
+
+
+def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None) -> Iterator[Name]:
+    """The texts that a reference may take in a place.
+
+    Args:
+        analysis: of the last version of the document that could be read.
+        cursor: the place.
+        reference: that stands there.
+        holder: the element that has it.
+    """
+    setup = analysis.document if isinstance(analysis.document, Setup) else None
+    if reference.rule == "file":
+        yield from _files(os.path.dirname(analysis.file), reference.target.removesuffix(" file"))
+    elif reference.rule == "column":
+        table = None if setup is None else setup.table(getattr(setup.top, "datafile", ""))
+        columns = [] if table is None else table.columns
+        for prefix in dict.fromkeys(column[:-1] for column in columns if column[-1:] in "xyzXYZ"):
+            yield Name(prefix, " ".join(column for column in columns if column.startswith(prefix)))
+    elif analysis.tree is not None and reference.rule not in _OPAQUE:
+        if setup is None:
+            yield from _components(analysis.tree, reference, _owner(analysis, analysis.tree, holder))
+        elif reference.rule == "state-path":
+            within = any(element.tag.startswith("control") for element in cursor.around)
+            yield from _controls(analysis.tree) if within else _states(analysis.tree)
+        else:
+            yield from _in_tool(setup, analysis.tree, reference)
+
+
+def _owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
+    """The component of a model from which names are looked up."""
+    if holder is None:
+        return tree.model
+    item = analysis.objects.get(holder.number)
+    if (item is None or type(item) is not holder.cls) and holder.given:
+        # Elements before it may have come and gone since; its name tells which it is.
+        item = next((c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None)
+    return tree.model if item is None else tree.owner_of(item)
+
+
+def _components(tree: Tree, reference: Reference, owner: Component) -> Iterator[Name]:
+    spec = FieldSpec("", "", reference, None, None, None, type(owner))
+    for text in tree.spellings(Use(owner, owner, spec, "")):
+        target = tree.lookup(reference, text, owner).target
+        yield Name(text, "" if target is None else f"{type(target).tag} {tree.path_of(target)}")
+
+
+def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
+    """Names in the model of the tool and in what the tool adds to it; those that were measured are the likely ones."""
+    if reference.rule == "set-member":
+        known = [Name(text) for text in sorted(setup.names_of(reference.target))]
+    else:
+        known = list(_components(tree, reference, tree.model))
+        added = setup.names_of(reference.target) - {name.text for name in known} if setup.added else set()
+        known += [Name(text, reference.target) for text in sorted(added) if not reference.rule.endswith("path")]
+    table = measured(setup) if reference.target in ("Marker", "PhysicalFrame", "Coordinate") else None
+    for name in known:
+        if table is None or reference.target != "Marker":
+            yield name
+        else:
+            has = name.text in table[1]
+            yield Name(name.text, f"{name.detail}, {'in' if has else 'not in'} {table[0]}", has)
+
+
+def measured(setup: Setup) -> tuple[str, list[str]] | None:
+    """The file of the markers that the tool is given, and their labels; None if there is none."""
+    for item in setup.tool[1].walk() if setup.tool is not None else ():
+        name = str(getattr(item, "marker_file", "")).strip()
+        table = table_at(os.path.join(setup.tool_folder, name)) if name.lower().endswith(TABLES) else None
+        if table is not None:
+            return name, table.columns
+    return None
+
+
+def _controls(tree: Tree) -> Iterator[Name]:
+    for component in tree.of_class("Actuator").values():
+        yield Name(tree.path_of(component) or "", type(component).tag)
+
+
+def _states(tree: Tree) -> Iterator[Name]:
+    for component in tree.components:
+        states = next((_STATES[name] for name in lineage(type(component)) if name in _STATES), ())
+        for state in states:
+            yield Name(f"{tree.path_of(component)}/{state}", type(component).tag)
+
+
+def _files(folder: str, content: str) -> Iterator[Name]:
+    """The files in a folder and in those below it that may hold something."""
+    suffixes = _SUFFIXES.get(content)
+    for place in (folder, *_folders(folder)):
+        found = documents_of(place) or () if suffixes is None else _listed(place, suffixes)
+        for path in found:
+            yield Name(os.path.relpath(path, folder).replace(os.sep, "/"))
+
+
+def _folders(folder: str) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.path for entry in entries if entry.is_dir() and not entry.name.startswith("."))[:50]
+    except OSError:
+        return []
+
+
+def _listed(folder: str, suffixes: tuple[str, ...]) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.path for entry in entries if entry.name.lower().endswith(suffixes))
+    except OSError:
+        return []

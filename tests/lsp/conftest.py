@@ -1,0 +1,91 @@
+"""An editor that talks to the language server over standard input and output."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("pytest_lsp", reason="needs pytest-lsp and pygls (extra 'dev')")
+
+import pytest_lsp
+from lsprotocol import types
+
+
+@pytest.fixture
+def editor(client):
+    """Makes a file, of a path and perhaps a text, in an editor that talks to the server."""
+    return functools.partial(File, client)
+
+
+@pytest_lsp.fixture(
+    config=pytest_lsp.ClientServerConfig(server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"])
+)
+async def client(lsp_client: pytest_lsp.LanguageClient) -> AsyncIterator[None]:
+    capabilities = pytest_lsp.client_capabilities("visual-studio-code")
+    await lsp_client.initialize_session(types.InitializeParams(capabilities=capabilities))
+    yield
+    await lsp_client.shutdown_session()
+
+
+class File:
+    """A file in an editor, and the changes that its user makes."""
+
+    def __init__(self, client, path: Path, text: str | None = None) -> None:
+        self.client, self.uri, self.version = client, path.as_uri(), 1
+        self.text = path.read_text() if text is None else text
+
+    @property
+    def document(self) -> types.TextDocumentIdentifier:
+        return types.TextDocumentIdentifier(self.uri)
+
+    def place(self, text: str, within: int = 0, nth: int = 0) -> types.Position:
+        offset = -1
+        for _ in range(nth + 1):
+            offset = self.text.index(text, offset + 1)
+        offset += within
+        return types.Position(self.text.count("\n", 0, offset), offset - self.text.rfind("\n", 0, offset) - 1)
+
+    async def open(self) -> list[types.Diagnostic]:
+        item = types.TextDocumentItem(self.uri, "osim", self.version, self.text)
+        self.client.text_document_did_open(types.DidOpenTextDocumentParams(item))
+        return await self.checked()
+
+    async def type(self, old: str, new: str) -> list[types.Diagnostic]:
+        """Replace the first `old` by `new`, and wait for the findings."""
+        self.replace(old, new)
+        return await self.checked()
+
+    def replace(self, old: str, new: str) -> None:
+        """Replace the first `old` by `new`, as an editor tells it."""
+        start, end = self.place(old), self.place(old, len(old))
+        change = types.TextDocumentContentChangePartial(types.Range(start, end), new)
+        self.text = self.text.replace(old, new, 1)
+        self.version += 1
+        document = types.VersionedTextDocumentIdentifier(self.version, self.uri)
+        self.client.text_document_did_change(types.DidChangeTextDocumentParams(document, [change]))
+
+    def save(self) -> None:
+        self.client.text_document_did_save(types.DidSaveTextDocumentParams(self.document))
+
+    async def checked(self) -> list[types.Diagnostic]:
+        await self.client.wait_for_notification(types.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)
+        return list(self.client.diagnostics[self.uri])
+
+    def after(self, edits: list[types.TextEdit]) -> str:
+        lines = self.text.splitlines(keepends=True)
+
+        def offset(position: types.Position) -> int:
+            return sum(map(len, lines[: position.line])) + position.character
+
+        text = self.text
+        for edit in sorted(edits, key=lambda edit: offset(edit.range.start), reverse=True):
+            text = text[: offset(edit.range.start)] + edit.new_text + text[offset(edit.range.end) :]
+        return text
+
+    def words(self, place: types.Range) -> str:
+        assert place.start.line == place.end.line
+        return self.text.splitlines()[place.start.line][place.start.character : place.end.character]
