@@ -23,7 +23,7 @@ def faulty(tmp_path):
 def test_a_sound_model_is_exit_0():
     done = run("validate", WALKER, "--format", "concise")
     assert done.code == 0 and done.err == ""
-    assert done.out.endswith(" info in 1 model.\n")
+    assert done.out.endswith(" info in 1 file.\n")
 
 
 def test_an_error_is_exit_1(faulty):
@@ -55,7 +55,7 @@ def test_a_folder_is_every_model_below(faulty):
     assert done.code == 1
     assert "1  OSIM301  unresolved-reference" in done.out
     assert "1  OSIM004  document-version" in done.out
-    assert done.out.endswith("in 2 models.\n")
+    assert done.out.endswith("in 2 files.\n")
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_a_baseline_lets_an_old_repository_begin(faulty):
     baseline = faulty.parent / "baseline.json"
     assert run("validate", faulty, "--write-baseline", baseline).code == 0
     done = run("validate", faulty, "--baseline", baseline)
-    assert done.code == 0 and done.out == "Nothing found in 1 model.\n"
+    assert done.code == 0 and done.out == "Nothing found in 1 file.\n"
 
 
 def test_settings_of_the_project_hold(faulty):

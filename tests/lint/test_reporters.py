@@ -64,7 +64,7 @@ def test_full(report):
           = did you mean 'true'?
           = in /markerset/asis
 
-        Found 2 errors, 1 warning in 1 model.
+        Found 2 errors, 1 warning in 1 file.
         1 is mended by --fix, 1 more by --unsafe-fixes.
         """)
 
@@ -75,7 +75,7 @@ def test_concise(report):
         "PhysicalFrame (did you mean '/ground'?)",
         "m.osim:8:13: error OSIM201 fixed of Marker 'asis' is 'yes', not true or false: OpenSim keeps the default, "
         "false (did you mean 'true'?)",
-        "Found 2 errors, 1 warning in 1 model.",
+        "Found 2 errors, 1 warning in 1 file.",
     ]
 
 

@@ -18,8 +18,9 @@ def render(report: Report, *, colour: bool = False, width: int = 80, everything:
     """The report as text of at most `width` columns (but for places, which are never broken)."""
     blocks: list[str] = []
     every = folded(report.findings, everything=everything)
-    for file, folds in groupby(every, key=lambda fold: fold.first.file):
-        lines = _lines(report, file)
+    for file, found in groupby(every, key=lambda fold: fold.first.file):
+        folds = list(found)
+        lines = _lines(report, file, max(fold.first.line or 0 for fold in folds))
         blocks += [_block(fold, lines, colour, width) for fold in folds]
     closing, length = summary(report, colour), len(summary(report))
     for more in filter(None, (_fixes(report), told(every))):
@@ -39,9 +40,10 @@ def _fixes(report: Report) -> str:
     return f"{', '.join(parts)}." if parts else ""
 
 
-def _lines(report: Report, file: str | None) -> list[str] | None:
+def _lines(report: Report, file: str | None, last: int) -> list[str] | None:
+    """The lines of a file up to one; a table may have a million more."""
     try:
-        return None if file is None else re.split(r"\n|\r\n?", report.texts[file])
+        return None if file is None else re.split(r"\n|\r\n?", report.texts[file], maxsplit=last)
     except KeyError:
         return None
 

@@ -30,10 +30,10 @@ def summary(report: Report, colour: bool = False) -> str:
     parts = [
         painted(f"{count} {_plural(severity.value, count)}", severity, colour) for severity, count in counts if count
     ]
-    models = f"{report.checked} {_plural('model', report.checked)}"
+    files = f"{report.checked} {_plural('file', report.checked)}"
     if not parts:
-        return painted(f"Nothing found in {models}.", "good", colour)
-    return f"Found {', '.join(parts)} in {models}."
+        return painted(f"Nothing found in {files}.", "good", colour)
+    return f"Found {', '.join(parts)} in {files}."
 
 
 def _plural(noun: str, count: int) -> str:

@@ -70,7 +70,8 @@ def unused_ignore(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place. Such a comment speaks
-    of its own line, or alone on a line of the element that follows, or before the root element of the whole file.
+    of its own line, or alone on a line of the element that follows, or before the root element of the whole file. A
+    line `osimlite: ignore CODE` in the header of a table speaks of the whole table.
 
     ## Why is this bad
     The fault was mended and the comment was forgotten; it would hide the next one.
