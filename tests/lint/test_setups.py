@@ -101,3 +101,26 @@ def test_no_damage_makes_the_check_fail(project, name):
             damaged[draw.randrange(len(damaged))] = draw.choice(b' <>/"=.x9\xff-')
         (project / name).write_bytes(bytes(damaged))
         run(subject_of(name))
+
+
+@pytest.mark.parametrize(
+    ("element", "severity"),
+    [
+        ("<use_specified_dt> false </use_specified_dt>", "info"),
+        ("<spring_force_threshold />", "info"),
+        ("<body1_scaling_rise_time_on> 0.000 </body1_scaling_rise_time_on>", "info"),
+        ("<output_joint_file> Unassigned </output_joint_file>", "info"),
+        ("<use_specified_dt>true</use_specified_dt>", "warning"),
+        ("<spring_force_threshold>5</spring_force_threshold>", "warning"),
+        ("<corrective_spring_linear_damping>0 0 1500</corrective_spring_linear_damping>", "warning"),
+        ("<finl_time></finl_time>", "error"),
+        ("<finl_time>2</finl_time>", "error"),
+    ],
+)
+def test_a_tag_of_older_versions_is_as_bad_as_what_is_lost_with_it(tmp_path, element, severity):
+    setup = tmp_path / "forward.xml"
+    setup.write_text(
+        f'<OpenSimDocument Version="40600"><ForwardTool name="run">{element}</ForwardTool></OpenSimDocument>'
+    )
+    (finding,) = validate(setup, select="OSIM101").findings
+    assert str(finding.severity) == severity

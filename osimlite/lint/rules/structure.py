@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from osimlite.document.notes import Note
-from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import renamed, replaced, without_element
 from osimlite.lint.old_tags import Successor, successor
 from osimlite.lint.subject import Subject
@@ -29,7 +29,8 @@ def unknown_tag(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of a contact is 0, and
-    the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces.
+    the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A setup may hold what older versions
+    understood: that is a warning, or an information if the element is empty or switches off what is off anyway.
 
     ## Example
     ```xml
@@ -64,7 +65,17 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         same = suggestion is not None and suggestion.lower() == note.word.lower()
         free = suggestion is not None and suggestion not in _present(owner)
         fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None
-        found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
+        severity = ERROR
+        if suggestion is None and subject.model is None:
+            severity = INFO if _asks_for_nothing(subject, note.number) else WARNING
+        found(message, owner, number=note.number, suggestion=suggestion, fix=fix, severity=severity)
+
+
+def _asks_for_nothing(subject: Subject, number: int) -> bool:
+    """Whether an element is empty, or says no more than that something is off."""
+    assert subject.source is not None
+    span = subject.source.spans[number]
+    return _OFF.fullmatch(subject.source.text[span.tag_end : span.inner_end]) is not None
 
 
 def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: Successor) -> None:
@@ -323,6 +334,7 @@ def missing_wrapper(subject: Subject, found: Found) -> None:
         )
 
 
+_OFF = re.compile(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
 _CDATA = re.compile(r">([^<>]*)<!\[CDATA\[.*?\]\]>([^<]*)(?=<)", re.DOTALL)
 
 
