@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from osimlite.document.reader import read_text
-from osimlite.errors import SimulationError, UnsupportedError
+from osimlite.errors import SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.simulation.elements import Forces, force_elements
@@ -43,10 +43,7 @@ def test_same_accelerations(corpus_model):
     # Those with constraints have a test of their own.
     locks = tuple(item for item in mechanism.constraints if isinstance(item, Lock))
     mechanism = replace(mechanism, constraints=locks)
-    try:
-        bare = CompiledEngine(mechanism, Forces(()))
-    except UnsupportedError as error:
-        pytest.skip(str(error))
+    bare = CompiledEngine(mechanism, Forces(()))
     scale = conditioning(mechanism)
     for seed in range(2):
         q, u = state_near(mechanism, seed)
@@ -58,10 +55,7 @@ def test_same_accelerations(corpus_model):
             return
         assert largest_difference(found, mechanism.acceleration(q, u)) < 1e-9 * scale
     forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
-    try:
-        ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
-    except UnsupportedError as error:
-        pytest.skip(str(error))
+    ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
     with theirs:
         for seed in range(2):
             q, u = (values.tolist() for values in state_near(mechanism, seed))

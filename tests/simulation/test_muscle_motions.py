@@ -1,4 +1,7 @@
-"""Motions of a block that hangs on a muscle, of an arm and of a gait model, against OpenSim's: `motions.json.gz`, of 7 to 9 real decimals."""
+"""Motions of a block that hangs on a muscle, of an arm and of a gait model, against OpenSim's.
+
+These are in `motions.json.gz`, with 7 to 9 real decimals.
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import pytest
 
 import osimlite
 from osimlite.document.reader import read_text
-from osimlite.errors import OsimliteError, UnsupportedError
+from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.base import Unknown
 from osimlite.schema.contact import ContactGeometry
@@ -291,10 +291,7 @@ def test_real_models_are_accounted_for_and_load(corpus_model, capfd):
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
     model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
-    try:
-        urdf = to_urdf(model, folder=corpus_model.path.parent)
-    except UnsupportedError as error:
-        pytest.skip(str(error))
+    urdf = to_urdf(model, folder=corpus_model.path.parent)
     assert unaccounted(model, urdf) == []
     robot = urdf.robot
     q = np.random.default_rng(3).uniform(-1.0, 1.0, len(robot.mechanism.coordinates))

@@ -74,10 +74,7 @@ def test_urdf_and_coordinates_of_real_models_say_where_bodies_are(corpus_model):
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
     model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
-    try:
-        urdf = to_urdf(model)
-    except UnsupportedError as error:
-        pytest.skip(str(error))
+    urdf = to_urdf(model)
     reader, mechanism = Reader(urdf.text, urdf.coordinates), urdf.robot.mechanism
     coordinates = reader.data["coordinates"]
     generator = np.random.default_rng(5)

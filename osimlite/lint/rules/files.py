@@ -9,7 +9,7 @@ from osimlite.document.source import Source
 from osimlite.files import GEOMETRY_VARIABLE
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import called, times
 from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Mesh
@@ -74,7 +74,7 @@ def included_file(subject: Subject, found: Found) -> None:
     ## What it does
     Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, is no
     ordinary file (a pipe, a device) or larger than the settings allow (`largest-file`), and as an error if the element
-    itself holds something.
+    itself holds something, or if another component names the object, which without its file has no name.
 
     ## Why is this bad
     OpenSim reads the object from the other file, and writes that file anew when it saves the model; if it is missing,
@@ -103,12 +103,17 @@ def included_file(subject: Subject, found: Found) -> None:
         state = "is read from" if read else "should be read from"
         why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
         fate = ": OpenSim ignores what stands here" if ignored else ": it stays empty" if note.why else ""
+        # What stays empty has no name either.
+        uses = subject.uses if note.why and subject.model is not None else []
+        wanted = sum(subject.resolution(use).target is note.owner for use in uses)
+        if wanted:
+            fate += f", while {times(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
         found(
             f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,
             number=note.number,
             attribute="file",
-            severity=ERROR if ignored else None if read else WARNING,
+            severity=ERROR if ignored or wanted else None if read else WARNING,
         )
 
 
