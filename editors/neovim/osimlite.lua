@@ -1,4 +1,4 @@
--- OpenSim models in Neovim (0.7 and later): highlighted as XML, with osimlite's language server.
+-- OpenSim in Neovim (0.7 and later): models and setups highlighted as XML, with osimlite's language server; tables too.
 -- Put this file into ~/.config/nvim/plugin/, or run it from your init.lua.
 local roots = { "osimlite.toml", "pyproject.toml", ".git" }
 
@@ -14,10 +14,17 @@ local function attach(buffer)
 end
 
 vim.api.nvim_create_autocmd({ "BufRead", "BufNewFile" }, {
-  pattern = "*.osim",
+  pattern = { "*.osim", "*.omoco", "*.xml", "*.sto", "*.mot", "*.trc" },
   callback = function(event)
-    -- Of the two parts, Neovim takes highlighting, folding and indenting of XML.
-    vim.bo[event.buf].filetype = "xml.osim"
+    local suffix = event.match:match("%.(%a+)$")
+    local head = table.concat(vim.api.nvim_buf_get_lines(event.buf, 0, 40, false), "\n")
+    if suffix == "xml" and not head:find("<OpenSimDocument") then
+      return
+    end
+    if suffix == "osim" or suffix == "omoco" or suffix == "xml" then
+      -- Of the two parts, Neovim takes highlighting, folding and indenting of XML.
+      vim.bo[event.buf].filetype = "xml.osim"
+    end
     attach(event.buf)
   end,
 })

@@ -170,9 +170,12 @@ def _add_files(server: Server) -> None:
         server.check_again([uri for uri, file in files if not (file.is_table and file.is_checked)])
 
     @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
-    async def watched(_: Server, params: object) -> None:
+    async def watched(_: Server, params: types.DidChangeWatchedFilesParams) -> None:
         settings_for.cache_clear()
-        server.check_again([*server.project.open])
+        changed = {change.uri for change in params.changes}
+        is_settings = any(uri.endswith(".toml") for uri in changed)
+        files = server.project.open.items()
+        server.check_again([uri for uri, file in files if is_settings or not file.is_table or uri in changed])
 
 
 def _add_reading(server: Server) -> None:

@@ -18,12 +18,25 @@ TEXT = """\
 <Model name="m"><gravty>0 0 0</gravty><gravity>0 -9.8   0</gravity></Model></OpenSimDocument>
 """
 
+OTHERS = {
+    "ik.xml": '<OpenSimDocument Version="40600">\n<InverseKinematicsTool name="ik"/></OpenSimDocument>\n',
+    "pom.xml": "<project/>\n",
+    "m.mot": "m\nversion=1\nnRows=1\nnColumns=2\ninDegrees=true\nendheader\ntime\ta\n0\t1\n",
+}
+
 NEOVIM = """
 vim.wait(60000, function() return #vim.diagnostic.get(0) > 0 end, 50)
 for _, found in ipairs(vim.diagnostic.get(0)) do print("finding " .. found.code) end
 print("tag " .. vim.fn.synIDattr(vim.fn.synID(2, 3, 1), "name"))
 if vim.lsp.buf.format then vim.lsp.buf.format({ timeout_ms = 60000 }) else vim.lsp.buf.formatting_sync(nil, 60000) end
 vim.cmd("write")
+for _, name in ipairs({ "ik.xml", "m.mot" }) do
+  vim.cmd("edit " .. name)
+  vim.wait(60000, function() return #vim.diagnostic.get(0) > 0 end, 50)
+  print(name .. " finding " .. vim.diagnostic.get(0)[1].code)
+end
+vim.cmd("edit pom.xml")
+print("pom.xml clients " .. vim.tbl_count(vim.lsp.buf_get_clients(0)))
 """
 
 EMACS = """
@@ -42,13 +55,15 @@ EMACS = """
 (message "tag %S" (get-text-property (1- (point)) 'face))
 (eglot-format-buffer)
 (save-buffer)
+(dolist (name '("ik.xml" "m.mot" "pom.xml")) (find-file name) (message "%s is %s" name major-mode))
 """
 
 
 @pytest.fixture
 def edited(tmp_path: Path):
     """What an editor says of a file, and the file afterwards."""
-    (tmp_path / "m.osim").write_text(TEXT)
+    for name, text in {"m.osim": TEXT, **OTHERS}.items():
+        (tmp_path / name).write_text(text)
     # The program that editors start is the one of this environment.
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "osimlite").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m osimlite "$@"\n')
@@ -74,6 +89,7 @@ def test_neovim(edited, repo, tmp_path):
     settings = str(repo / "editors" / "neovim" / "osimlite.lua")
     said, text = edited("nvim", "--headless", "-u", settings, "m.osim", "-c", "luafile ask.lua", "-c", "qa!")
     assert "finding OSIM101" in said and "tag xmlTagName" in said, said
+    assert "ik.xml finding OSIM821" in said and "m.mot finding OSIM8" in said and "pom.xml clients 0" in said, said
     assert "\t\t<gravity>0 -9.8 0</gravity>\n" in text
 
 
@@ -83,4 +99,5 @@ def test_emacs(edited, repo, tmp_path):
     if "no eglot" in said:
         pytest.skip("needs eglot: Emacs 29, or the package eglot")
     assert "OSIM101" in said and "tag (nxml-element-local-name)" in said, said
+    assert "ik.xml is osim-mode" in said and "m.mot is osim-table-mode" in said and "pom.xml is nxml-mode" in said, said
     assert "\t\t<gravity>0 -9.8 0</gravity>\n" in text

@@ -1,4 +1,4 @@
-// Starts `osimlite lsp` for OpenSim model files, and hands everything else to it.
+// Starts `osimlite lsp` for models, setups and tables of OpenSim, and hands everything else to it.
 'use strict';
 
 const vscode = require('vscode');
@@ -15,8 +15,13 @@ function server(settings) {
 async function start() {
   const settings = vscode.workspace.getConfiguration('osimlite');
   const options = {
-    documentSelector: [{language: 'osim'}],
-    synchronize: {fileEvents: vscode.workspace.createFileSystemWatcher('**/{pyproject,osimlite}.toml')},
+    // Of XML that is not OpenSim's the server says nothing.
+    documentSelector: [{language: 'osim'}, {language: 'osim-table'}, {language: 'xml', scheme: 'file'}],
+    synchronize: {
+      fileEvents: vscode.workspace.createFileSystemWatcher(
+        '**/{pyproject.toml,osimlite.toml,*.osim,*.xml,*.omoco,*.sto,*.mot,*.trc}',
+      ),
+    },
   };
   client = new LanguageClient('osimlite', 'osimlite', server(settings), options);
   try {

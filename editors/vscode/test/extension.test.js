@@ -53,7 +53,9 @@ test('the settings say what is started, and a restart starts it again', async ()
   const [client] = noted.started;
   assert.equal(client.server.command, 'python');
   assert.deepEqual(client.server.args, ['-m', 'osimlite', 'lsp']);
-  assert.deepEqual(client.options.documentSelector, [{language: manifest.contributes.languages[0].id}]);
+  const languages = client.options.documentSelector.map((item) => item.language);
+  assert.deepEqual(languages, [...manifest.contributes.languages.map((item) => item.id), 'xml']);
+  assert.deepEqual(manifest.activationEvents, ['onLanguage:xml']);
   await noted.commands['osimlite.restart']();
   assert.deepEqual([noted.started.length, noted.stopped], [2, 1]);
   await extension.deactivate();
