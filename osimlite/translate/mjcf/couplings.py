@@ -11,8 +11,7 @@ from osimlite.robot.lines import Line, as_line
 from osimlite.robot.mimics import couplers
 from osimlite.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.bodies import LEAST_MASS
-from osimlite.translate.mjcf.draft import Draft, Follower, Lead, add
+from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, Lead, add
 from osimlite.translate.mjcf.polynomials import DEGREE, quartic, span
 
 
@@ -69,14 +68,12 @@ def _argument(draft: Draft, place: int) -> Lead:
     """A joint for a coordinate that is nothing but the argument of functions: it turns a speck about its own middle."""
     info = draft.mechanism.coordinates[place]
     name = draft.mechanism.coordinate_names[place].strip("/").replace("/", ".")
-    speck = add(draft.bodies[GROUND], "body", name=f"{name}_argument")
-    add(speck, "inertial", pos="0 0 0", mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
-    add(speck, "joint", name=name, type="hinge", axis="0 0 1")
+    add(draft.speck(name, GROUND, np.eye(4)), "joint", name=name, type="hinge", axis="0 0 1")
     draft.fidelity.add(
         "argument",
         info.path,
         "a coordinate that no axis moves by, but only functions of it",
-        f"a joint of its own, which turns a mass of {LEAST_MASS:g} kg",
+        f"a joint of its own, which turns a mass of {SPECK:g} kg",
         f"joint {name}",
     )
     draft.leads[place] = Lead(name, Line(1.0, 0.0))

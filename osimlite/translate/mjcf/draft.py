@@ -12,7 +12,7 @@ import numpy as np
 from lxml.etree import Element, SubElement, _Element
 
 from osimlite.errors import ModelError, SimulationError
-from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism
+from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, StationPlacement
 from osimlite.multibody.spatial import Array
 from osimlite.robot.lines import Line
 from osimlite.robot.mesh_files import MeshFiles
@@ -27,6 +27,16 @@ Version = Literal[3, 4]
 Contact = Literal["native", "none"]
 Value = str | bool | int | float | Sequence[float] | Array | None
 C = TypeVar("C", bound=Component)
+
+SPECK = 1e-3
+"""Mass (kg) of a body that is there for a constraint alone.
+
+MuJoCo makes a constraint the softer, the lighter the lighter one of its bodies; this is a compromise.
+"""
+
+
+class Unsayable(Exception):
+    """Why a component is left out."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +88,7 @@ class Draft:
         bodies: the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
+        starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
         activations: at the start, of the actuators that have one, by name.
     """
 
@@ -91,6 +102,7 @@ class Draft:
     leads: dict[int, Lead] = field(default_factory=dict)
     followers: dict[str, Follower] = field(default_factory=dict)
     activations: dict[str, float] = field(default_factory=dict)
+    starts: dict[str, float] = field(default_factory=dict)
     _names: dict[str, set[str]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 
@@ -151,7 +163,10 @@ class Draft:
         Raises:
             ModelError: there is no such frame, or it is not fixed to a body.
         """
-        path = self.tree.path_of(self.tree.target(owner, socket, getattr(owner, socket))) or ""
+        value = getattr(owner, socket)
+        if not value:
+            raise ModelError(f"its {socket} names no frame")
+        path = self.tree.path_of(self.tree.target(owner, socket, value)) or ""
         if path not in self.mechanism.frames:
             raise ModelError(f"the frame '{path}' is not fixed to a body")
         return self.mechanism.frames[path]
@@ -172,6 +187,26 @@ class Draft:
         frame = pose(place) if place.shape == (4, 4) else {"pos": tidy(place)}
         add(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
+
+    def speck(self, name: str, body: int, frame: Array) -> _Element:
+        """Add a small body, which nothing weighs down, at a frame (4, 4) of a body (-1: ground)."""
+        speck = add(self.bodies[body], "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame))
+        add(speck, "inertial", pos=np.zeros(3), mass=SPECK, diaginertia=np.full(3, SPECK * SPECK))
+        return speck
+
+    def at_zero(self, station: StationPlacement) -> Array:
+        """Where a station is in ground (3,) when all joints stand at zero, as MuJoCo has it before a pose is set."""
+        body, location = station
+        link, _ = self.robot.link_of["/ground" if body == GROUND else self.mechanism.bodies[body].path]
+        placed: Array = self._at_zero[link.name][:3] @ np.append(location, 1.0)
+        return placed
+
+    @cached_property
+    def _at_zero(self) -> dict[str, Array]:
+        placed = {self.robot.links[0].name: np.eye(4)}
+        for joint in self.robot.joints:
+            placed[joint.child] = placed[joint.parent] @ joint.across(0.0)
+        return placed
 
     def mesh(self, file: str, scale: tuple[float, float, float]) -> str:
         """The asset that is a mesh file at a scale.

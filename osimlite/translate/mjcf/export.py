@@ -22,9 +22,11 @@ from osimlite.schema.model import Model
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
 from osimlite.translate.mjcf.bodies import add_bodies, add_frames
+from osimlite.translate.mjcf.constraints import add_constraints
 from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import Contact, Draft, Lead, Options, Version, add
+from osimlite.translate.mjcf.forces import add_forces
 from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.scenery import add_markers, add_shapes
 from osimlite.translate.survey import account_for_rest
@@ -33,6 +35,8 @@ PASSES: tuple[Callable[[Draft], None], ...] = (
     add_bodies,
     add_couplings,
     add_coordinates,
+    add_constraints,
+    add_forces,
     add_shapes,
     add_markers,
     add_frames,

@@ -15,6 +15,7 @@ def add_keyframe(draft: Draft) -> None:
     rates = dict(zip(values, (draft.robot.joint_jacobian(q) @ qdot).tolist(), strict=True))
     for place, (joint, line) in draft.leads.items():
         values[joint], rates[joint] = line.slope * q[place] + line.start, line.slope * qdot[place]
+    values |= draft.starts
     for joint, follower in draft.followers.items():
         values[joint] = float(polyval(values.get(follower.leader or "", 0.0), follower.polynomial))
     names = [joint.get("name", "") for joint in draft.section("worldbody").iter("joint")]
@@ -24,6 +25,6 @@ def add_keyframe(draft: Draft) -> None:
         "key",
         name="default",
         qpos=[values[name] for name in names],
-        qvel=[rates[name] for name in names],
+        qvel=[rates.get(name, 0.0) for name in names],
         act=[draft.activations[name] for name in actuators if name in draft.activations] or None,
     )

@@ -1,0 +1,89 @@
+"""Constraints between bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from osimlite.multibody import body_constraints as b
+from osimlite.multibody.mechanism import FramePlacement, StationPlacement
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf.draft import SPECK, Draft, add
+
+
+def add_constraints(draft: Draft) -> None:
+    """Add every constraint that is not about coordinates alone."""
+    for constraint in draft.mechanism.constraints:
+        if constraint.bodies:
+            make = _MAKERS.get(type(constraint))
+            if make is None:
+                what = f"a {type(constraint).__name__}"
+                draft.fidelity.add("constraint", constraint.name, what, f"{LEFT_OUT}: MuJoCo has none")
+            else:
+                draft.fidelity.translated[constraint.name] = make(draft, constraint)
+
+
+def _weld(draft: Draft, item: b.WeldConstraint) -> str:
+    return _equality(draft, "weld", item.name, item.first, item.second)
+
+
+def _connect(draft: Draft, item: b.PointConstraint) -> str:
+    return _equality(draft, "connect", item.name, item.first, item.second)
+
+
+def _distance(draft: Draft, item: b.DistanceConstraint) -> str:
+    """A tendon of constant length; MuJoCo counts from its length where all joints stand at zero."""
+    name = draft.name("tendon", item.name)
+    tendon = add(draft.section("tendon"), "spatial", name=name)
+    for end in (item.first, item.second):
+        add(tendon, "site", site=draft.site(item.name, *end))
+    length = float(np.linalg.norm(draft.at_zero(item.first) - draft.at_zero(item.second)))
+    add(draft.section("equality"), "tendon", name=name, tendon1=name, polycoef=[item.distance - length, 0, 0, 0, 0])
+    return f"equality {name}"
+
+
+def _on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
+    """A speck that slides along the line, and is connected to the follower."""
+    name = draft.name("joint", item.name)
+    frame = np.eye(4)
+    frame[:3, 3] = item.line.location
+    speck = draft.speck(name, item.line.body, frame)
+    add(speck, "joint", name=name, type="slide", axis=item.along)
+    state = draft.mechanism.at(draft.default_state[0])
+    arm = state.point(*item.follower) - state.point(*item.line)
+    draft.starts[name] = float(arm @ state.transform(item.line.body)[:3, :3] @ item.along)
+    draft.fidelity.add(
+        "constraint",
+        item.name,
+        "a point that stays on a line",
+        f"connected to a body of {SPECK:g} kg that slides along the line",
+        f"joint {name}",
+    )
+    equality = draft.name("equality", item.name)
+    site = draft.site(item.name, *item.follower)
+    add(speck, "site", name=draft.name("site", f"{item.name}_speck"))
+    add(draft.section("equality"), "connect", name=equality, site1=site, site2=speck[-1].get("name"))
+    return f"equality {equality}"
+
+
+def _equality(
+    draft: Draft,
+    kind: str,
+    path: str,
+    first: FramePlacement | StationPlacement,
+    second: FramePlacement | StationPlacement,
+) -> str:
+    name = draft.name("equality", path)
+    sites = [draft.site(path, *end) for end in (first, second)]
+    add(draft.section("equality"), kind, name=name, site1=sites[0], site2=sites[1])
+    return f"equality {name}"
+
+
+_MAKERS: Mapping[type, Callable[[Draft, Any], str]] = {
+    b.WeldConstraint: _weld,
+    b.PointConstraint: _connect,
+    b.DistanceConstraint: _distance,
+    b.PointOnLineConstraint: _on_line,
+}

@@ -1,0 +1,40 @@
+"""Forces and actuators other than muscles and paths: what each class becomes, if MuJoCo has its law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from osimlite.errors import ModelError
+from osimlite.schema.forces import Force
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf import coordinate_forces as on_coordinates
+from osimlite.translate.mjcf import frame_forces as on_frames
+from osimlite.translate.mjcf.draft import Draft, Unsayable
+
+MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
+    "CoordinateActuator": on_coordinates.actuator,
+    "ActivationCoordinateActuator": on_coordinates.lagging_actuator,
+    "SpringGeneralizedForce": on_coordinates.spring,
+    "CoordinateLimitForce": on_coordinates.limit,
+    "PointToPointSpring": on_frames.point_spring,
+    "PointToPointActuator": on_frames.point_to_point_actuator,
+    "TorqueActuator": on_frames.torque_actuator,
+    "PointActuator": on_frames.point_actuator,
+    "BodyActuator": on_frames.body_actuator,
+    "BushingForce": on_frames.bushing,
+}
+"""By class, what adds a force to a draft and tells what it became; it raises `Unsayable` where that cannot be."""
+
+
+def add_forces(draft: Draft) -> None:
+    """Add every force of a class in `MAKERS` that acts."""
+    for force, path in draft.components(Force):
+        what = type(force).__name__
+        try:
+            if not force.appliesForce:
+                raise Unsayable("its appliesForce is false")
+            if what in MAKERS:
+                draft.fidelity.translated[path] = MAKERS[what](draft, force, path)
+        except (ModelError, Unsayable) as error:
+            draft.fidelity.add("force", path, f"a {what}", f"{LEFT_OUT}: {error}")

@@ -1,0 +1,129 @@
+"""Forces on bodies: between two points, on one point, about an axis, between two frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.multibody.mechanism import GROUND, FramePlacement
+from osimlite.multibody.spatial import Array, angles_xyz, inverse
+from osimlite.schema.actuators import BodyActuator, PointActuator, PointToPointActuator, TorqueActuator
+from osimlite.schema.base import Component
+from osimlite.schema.fields import Vec3
+from osimlite.schema.springs import BushingForce, PointToPointSpring
+from osimlite.translate.mjcf.draft import SPECK, Draft, Unsayable, add
+
+GROUND_FRAME = FramePlacement(GROUND, np.eye(4))
+SIX = ("rx", "ry", "rz", "tx", "ty", "tz")
+
+
+def point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
+    """A tendon with a spring."""
+    ends = [
+        _point(draft, force, path, "socket_body1", force.point1),
+        _point(draft, force, path, "socket_body2", force.point2),
+    ]
+    return straight(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)
+
+
+def point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str) -> str:
+    """An actuator on a tendon: MuJoCo's positive force lengthens it, too."""
+    if force.points_are_global:
+        raise Unsayable("its points are given in ground, so that they wander through the bodies")
+    ends = [_point(draft, force, path, "bodyA", force.pointA), _point(draft, force, path, "bodyB", force.pointB)]
+    tendon = straight(draft, path, ends).removeprefix("tendon ")
+    name = draft.name("actuator", path)
+    add(draft.section("actuator"), "motor", name=name, tendon=tendon, gear=force.optimal_force)
+    return f"actuator {name}"
+
+
+def torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
+    """A torque on a site, in the axes of a second one, whose body takes the reaction."""
+    first = draft.placement(force, "bodyA")
+    second = draft.placement(force, "bodyB") if force.bodyB else GROUND_FRAME
+    gear = np.append(np.zeros(3), _unit(force.axis) * force.optimal_force)
+    one = draft.site(path, *first)
+    if not force.torque_is_global:
+        return _push(draft, path, -gear, draft.site(path, *second), one)
+    if second.body != GROUND:
+        raise Unsayable("its axis is fixed in ground while both its bodies move")
+    return _push(draft, path, gear, one, draft.site(path, *GROUND_FRAME))
+
+
+def point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
+    """A force on a site, in the axes of its body or of a site in ground."""
+    if force.point_is_global:
+        raise Unsayable("its point is given in ground, so that it wanders through the body")
+    gear = np.append(_unit(force.direction) * force.optimal_force, np.zeros(3))
+    site = _point(draft, force, path, "body", force.point)
+    return _push(draft, path, gear, site, draft.site(path, *GROUND_FRAME) if force.force_is_global else None)
+
+
+def straight(draft: Draft, path: str, sites: list[str], **law: float) -> str:
+    """A tendon through sites."""
+    name = draft.name("tendon", path)
+    tendon = add(draft.section("tendon"), "spatial", name=name, **law)
+    for site in sites:
+        add(tendon, "site", site=site)
+    return f"tendon {name}"
+
+
+def _push(draft: Draft, path: str, gear: Array, site: str, axes: str | None = None) -> str:
+    name = draft.name("actuator", path)
+    add(draft.section("actuator"), "motor", name=name, site=site, refsite=axes, gear=gear)
+    return f"actuator {name}"
+
+
+def _point(draft: Draft, owner: Component, path: str, socket: str, point: Vec3) -> str:
+    """A site at a point, which OpenSim takes for one of the body itself even where the socket names a frame on it."""
+    return draft.site(path, draft.placement(owner, socket).body, np.array(point))
+
+
+def _unit(axis: tuple[float, float, float]) -> Array:
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise Unsayable("its direction is zero")
+    return np.array(axis) / length
+
+
+def body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
+    """Six actuators, in the order of the controls: torque, then force."""
+    if force.point_is_global:
+        raise Unsayable("its point is given in ground, so that it wanders through the body")
+    site = _point(draft, force, path, "socket_body", force.point)
+    axes = draft.site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
+    units = np.eye(6)[[3, 4, 5, 0, 1, 2]]
+    made = [_push(draft, f"{path}_{word}", unit, site, axes) for word, unit in zip(SIX, units, strict=True)]
+    return " ".join(made)
+
+
+def bushing(draft: Draft, force: BushingForce, path: str) -> str:
+    """A speck on six joints with springs and dampers in the first frame, welded to the second.
+
+    The joints are the six deviations themselves, so that the law is OpenSim's; only the weld gives way a little.
+    """
+    (one, inner), second = draft.placement(force, "socket_frame1"), draft.placement(force, "socket_frame2")
+    name = draft.name("bushing", path)
+    speck = draft.speck(name, one, inner)
+    state = draft.mechanism.at(draft.default_state[0])
+    apart = inverse(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
+    starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])
+    stiffness = (*force.rotational_stiffness, *force.translational_stiffness)
+    damping = (*force.rotational_damping, *force.translational_damping)
+    # The translations are along the first frame, so they come first.
+    for k in (3, 4, 5, 0, 1, 2):
+        joint = draft.name("joint", f"{name}_{SIX[k]}")
+        draft.starts[joint] = starts[k]
+        kind, axis = ("hinge", "slide")[k // 3], np.eye(3)[k % 3]
+        add(speck, "joint", name=joint, type=kind, axis=axis, stiffness=stiffness[k], damping=damping[k])
+    add(speck, "site", name=draft.name("site", f"{name}_speck"))
+    weld = draft.name("equality", path)
+    ends = {"site1": f"{name}_speck", "site2": draft.site(path, *second)}
+    add(draft.section("equality"), "weld", name=weld, **ends)
+    draft.fidelity.add(
+        "bushing",
+        path,
+        "a spring and damper between two frames",
+        f"a body of {SPECK:g} kg on six springs, welded to the second frame",
+        f"equality {weld}",
+    )
+    return f"equality {weld}"
