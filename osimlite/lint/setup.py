@@ -27,6 +27,8 @@ from osimlite.schema.tree import Tree, Use
 
 NOTHING = ("", "unassigned")
 """What stands for no file, in small letters."""
+UNGIVEN = "OpenSim refuses it, unless a program or the GUI gives one"
+"""What becomes of a tool that names no file where it needs one."""
 _NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
 _MOST_NEIGHBOURS = 200
 _OF_MODELS = frozenset(("OSIM110", "OSIM111", "OSIM209"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import NOTHING, Naming, Setup, is_of
+from osimlite.lint.setup import NOTHING, UNGIVEN, Naming, Setup, is_of
 from osimlite.lint.words import called
 from osimlite.schema.fields import Reference
 
@@ -32,7 +32,8 @@ def missing_input(setup: Setup, found: Found) -> None:
 
     ## Why is this bad
     OpenSim refuses the setup; where the model is missing, inverse kinematics crashes. A missing file of controls is
-    told in the log only, and the tool runs without controls.
+    told in the log only, and the tool runs without controls. A setup that names no file is a warning: it may be meant
+    for a program that gives it one.
 
     ## Example
     ```setup
@@ -71,12 +72,14 @@ def missing_input(setup: Setup, found: Found) -> None:
     for item in setup.items:
         for tag in _NEEDED.get(type(item).__name__, ()):
             if str(getattr(item, tag)).strip().lower() in NOTHING:
-                found(f"{called(item)} names no {tag}: OpenSim refuses it", item, tag=tag)
+                found(f"{called(item)} names no {tag}: {UNGIVEN}", item, tag=tag, severity=WARNING)
         if is_of(item, "AnalyzeTool"):
             given = [tag for tag in ("states_file", "coordinates_file") if getattr(item, tag).lower() not in NOTHING]
             if len(given) != 1:
                 what = "both a states_file and a coordinates_file" if given else "neither states nor coordinates"
-                found(f"{called(item)} names {what}: OpenSim refuses it", item, tag="coordinates_file")
+                severity = ERROR if given else WARNING
+                fate = "OpenSim refuses it" if given else UNGIVEN
+                found(f"{called(item)} names {what}: {fate}", item, tag="coordinates_file", severity=severity)
 
 
 def _in_other_case(naming: Naming) -> str | None:

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import NOTHING, Setup, is_of
+from osimlite.lint.setup import NOTHING, UNGIVEN, Setup, is_of
 from osimlite.lint.words import called, nearest_name
 
 
@@ -248,7 +248,10 @@ def scale_setting(setup: Setup, found: Found) -> None:
                 severity=WARNING,
             )  # fmt: skip
         if measures and scaler.measurement_set.objects and scaler.marker_file.strip().lower() in NOTHING:
-            found(f"{called(scaler)} measures, and names no marker_file: OpenSim refuses it", scaler, tag="marker_file")
+            found(
+                f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}", scaler, tag="marker_file",
+                severity=WARNING,
+            )  # fmt: skip
     for measurement in setup.named("Measurement"):
         if not measurement.apply:
             continue

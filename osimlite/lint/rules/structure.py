@@ -66,7 +66,7 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         free = suggestion is not None and suggestion not in _present(owner)
         fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None
         severity = ERROR
-        if suggestion is None and subject.model is None:
+        if not free and subject.model is None:
             severity = INFO if _asks_for_nothing(subject, note.number) else WARNING
         found(message, owner, number=note.number, suggestion=suggestion, fix=fix, severity=severity)
 
