@@ -1,48 +1,32 @@
-"""The rows of a table: what is no number, what is missing, and the times, at the speed of a few passes over the bytes.
+"""The rows of a table: what is no number, what is missing, and the times.
 
-Rows are looked at by the megabyte. Without its digits, signs and points a block of good rows is the same few tabs over
-and over; without its digits alone only a few forms are left of all its numbers. Where a block is not so, its rows are
-looked at one by one.
+Rows are looked at by the block. Those that look as rows of numbers do are known by that alone; others are looked at
+cell by cell.
 """
 
 from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import islice, pairwise, product
+from functools import lru_cache
+from itertools import groupby, islice, pairwise
 from math import inf, nan, nextafter
 from operator import lt
 from typing import NamedTuple
 
-BLOCK = 1_000_000
-"""Bytes that are looked at together."""
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
 
-_DIGITS = b"0123456789"
-_REST = b"+-.eE"
-_AS_ZERO = bytes.maketrans(_DIGITS + _REST, b"0" * 15)
-_COMMA_AS_TAB = bytes.maketrans(b",", b"\t")
-_FORMS = {
-    (sign + point + exponent).encode()
-    for sign, point, exponent in product(
-        ("", "-", "+"), ("", "."), ("", *(mark + sign for mark in "eE" for sign in ("", "-", "+")))
-    )
-}
-"""What is left of a number without its digits."""
-_JOINTS = {last + b"\n" + first for last in _FORMS for first in _FORMS}
-_KNOWN = frozenset(_FORMS | _JOINTS)
-_EMPTY = frozenset(form for form in _KNOWN if b"" in form.split(b"\n"))
-_SIGNED = frozenset(form for form in _KNOWN if {b"-", b"+"} & {*form.split(b"\n")})
-_POWERS = frozenset(form for form in _KNOWN if b"e" in form or b"E" in form)
-_WHOLE_POWERS = frozenset(
-    form for form in _POWERS if any(part.lstrip(b"+-")[:1] in (b"e", b"E") for part in form.split(b"\n"))
-)
-_KINDS = bytes.maketrans(_DIGITS + b".+-eE\n,", b"0" * 11 + b"--ee\t\t")
+BLOCK = 16_000
+"""Bytes that are looked at together: few enough for the fastest memory of a processor."""
+
+_LONGEST = 4_000_000
+"""Bytes of a line whose look would take too much memory."""
+_SAMPLES = 64
+"""Rows of which all are samples; of further ones fewer and fewer are."""
 _PLAIN = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
-_CELL = re.compile(rb"[^\t]*")
-_BLANKS_AT_TAB = re.compile(rb" *\t *")
 
 
 class Fault(NamedTuple):
@@ -100,8 +84,6 @@ class Scan:
     parts: int = 1
     markers: bool = False
     rows: Rows = field(default_factory=Rows)
-    _ends_in_tab: bool = False
-    _holes: bool = False
     _frame: int = 0
 
     def run(self, data: bytes, start: int, line: int) -> Rows:
@@ -111,95 +93,147 @@ class Scan:
             while start < len(data) and data[start : start + 1] in b"\t\r\n ":
                 # Before the first frame OpenSim passes over lines that have no number of one.
                 start, line = data.find(b"\n", start) + 1 or len(data), line + 1
+        layout = MARKERS if self.markers else VECTORS if self.parts > 1 else ROWS
+        whole = (b"\t" if self.markers else b"").join([b",".join([b"0"] * self.parts)] * self.cells)
         for block in _blocks(data, start):
-            good = self._clean(block)
-            if good is not None and (taken := self._take(good, line)):
-                line += taken
-                continue
-            for text in block.split(b"\n")[:-1]:
-                good = self._clean(text + b"\n")
-                if good is None or not self._take(good, line):
-                    self._odd(text, line)
-                line += 1
+            lines = block.split(b"\n")
+            lines.pop()
+            looks, zeros = _looks(block, layout) if len(block) < _LONGEST else (b"!\n" * len(lines), False)
+            if looks == (whole + b"\n") * len(lines):
+                self._take(lines, [whole] * len(lines), line, zeros)
+            else:
+                forms = looks.split(b"\n")
+                good = [form == whole or (self.markers and _seen(form, self.cells) is not None) for form in forms]
+                for is_good, group in groupby(range(len(lines)), good.__getitem__):
+                    places = list(group)
+                    if is_good:
+                        part = slice(places[0], places[-1] + 1)
+                        self._take(lines[part], forms[part], line + places[0], zeros)
+                    else:
+                        for place in places:
+                            self._odd(lines[place], line + place)
+            line += len(lines)
         if not self.rows.count:
             self.rows.unseen.clear()
         return self.rows
 
-    def _clean(self, block: bytes) -> bytes | None:
-        """The block with nothing but tabs between its numbers, None if it has anything but whole rows of numbers."""
-        if b"\r" in block:
-            block = block.replace(b"\r\n", b"\n")
-        if b" " in block:
-            # From behind, CPython finds this pair three times as fast.
-            if block.translate(_AS_ZERO).rfind(b"0 ") < 0:
-                # Blanks before numbers make columns of one width; others separate.
-                block = block.translate(None, b" ")
-            elif self.markers:
-                block = _BLANKS_AT_TAB.sub(b"\t", block)
-            else:
-                block = b"\n".join([b"\t".join(row.split()) for row in block.split(b"\n")])
-        if self.markers and b"N" in block:
-            block = block.replace(b"\tNaN", b"\t")
-        bones = block.translate(None if self.parts == 1 else _COMMA_AS_TAB, _DIGITS)
-        if not self._is_pattern(bones.translate(None, _REST)):
-            return None
-        forms = set(bones.split(b"\t"))
-        if self._ends_in_tab and block.count(b"\t\n") != block.count(b"\n"):
-            return None
-        # Without its digits a number may look like what is none; the few passes that tell are made where it matters.
-        if not forms <= _KNOWN or (b"\t." in block and (b"\t.\t" in block or b"\t.\n" in block)):
-            return None
-        doubts = [
-            *((b"0-", b"-\t") if not forms.isdisjoint(_SIGNED) else ()),
-            *((b"e\t", b"-\t") if not forms.isdisjoint(_POWERS) else ()),
-            *((b"\te", b"-e") if not forms.isdisjoint(_WHOLE_POWERS) else ()),
-        ]
-        if doubts:
-            kinds = block.translate(_KINDS)
-            if any(doubt in kinds for doubt in doubts):
-                return None
-        self._holes = not forms.isdisjoint(_EMPTY) and (
-            b"\t\t" in block or b"\n\t" in block or (not self._ends_in_tab and b"\t\n" in block)
-        )
-        return None if self._holes and not self.markers else block
-
-    def _is_pattern(self, between: bytes) -> bool:
-        """Whether what stands between the numbers of a block is that of whole rows; a tab may end all of them."""
-        row = b"\t" * (self.cells * self.parts - 1)
-        self._ends_in_tab = between.startswith(row + b"\t")
-        pattern = row + (b"\t\n" if self._ends_in_tab else b"\n")
-        count, rest = divmod(len(between), len(pattern))
-        return not rest and between == pattern * count
-
-    def _take(self, block: bytes, line: int) -> int:
-        """Note times and samples of good rows; how many there are, 0 if a time is no number after all."""
-        lines = block.split(b"\n")
-        lines.pop()
+    def _take(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
+        """Note times and samples of good rows."""
         rows = self.rows
-        heads = [text.split(b"\t", 2) for text in lines] if self.markers else []
-        try:
-            times = [float(head[1] or b"nan") for head in heads] or [float(text.split(b"\t", 1)[0]) for text in lines]
-        except ValueError:
-            return 0
         self._begin(line)
         if self.markers:
-            for number, (frame, time, *_) in enumerate(heads):
-                self._expect_frame(frame, line + number)
-                if not time:
-                    self._note("time", 1, line + number, len(frame) + 2, 1, "")
-                    times[number] = nextafter(times[number - 1] if number else self._last(), inf)
-            if rows.unseen or self._holes or b"\t\t\t" in block.translate(None, b"0.-+"):
-                for number, text in enumerate(lines):
-                    self._markers(text, line + number)
+            times = self._marker_times(lines, line)
+            looks = set(forms)
+            rows.unseen.difference_update(*(_seen(form, self.cells) or () for form in looks if rows.unseen))
+            if zeros or any(b"\t\t" in form for form in looks):
+                for number, (text, form) in enumerate(zip(lines, forms, strict=True)):
+                    if b"\t\t" in form or b"\t\t\t" in text.translate(None, b"0.-+"):
+                        self._look_at_markers(text, line + number)
+        else:
+            times = [float(text.split(None, 1)[0]) for text in lines]
         if not times[0] > self._last() or not all(map(lt, times, islice(times, 1, None))):
             for number, (before, now) in enumerate(pairwise([self._last(), *times])):
                 if not now > before:
-                    self._order(line + number, now, before)
+                    self._order(lines[number], line + number, now, before)
         rows.times.extend(times)
         rows.count += len(lines)
-        for text in lines[:: max(1, len(lines) // 4)] if len(lines) > 4 or len(rows.samples) < 64 else ():
-            rows.samples.append([_number(word) for word in text.translate(_COMMA_AS_TAB).split(b"\t")])
-        return len(lines)
+        if len(rows.samples) < _SAMPLES:
+            rows.samples += [self._numbers(text, float) for text in lines]
+        elif len(rows.samples) ** 2 < 2 * rows.count:
+            rows.samples.append(self._numbers(lines[0], float))
+
+    def _marker_times(self, lines: list[bytes], line: int) -> list[float]:
+        """The times of frames, which are looked at; of one without a time the next number after that before."""
+        heads = [text.split(b"\t", 2)[:2] for text in lines]
+        if [frame for frame, _ in heads] != [b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)]:
+            for number, (frame, _) in enumerate(heads, line):
+                self._expect_frame(frame.strip(), number)
+        else:
+            self._frame += len(heads)
+        times = [float(moment.strip() or b"nan") for _, moment in heads]
+        for number, time in enumerate(times):
+            if time != time:
+                self._note("time", 1, line + number, len(heads[number][0]) + 1, heads[number][1])
+                times[number] = nextafter(times[number - 1] if number else self._last(), inf)
+        return times
+
+    def _look_at_markers(self, text: bytes, line: int) -> None:
+        """Look for markers at the origin, and for parts of markers."""
+        cells = text.split(b"\t")
+        start = 0
+        for number, cell in enumerate(cells[: self.cells]):
+            if number > 1 and number % 3 == 2:
+                place = [part.strip() for part in cells[number : number + 3]]
+                seen = [part.lower() not in (b"", b"nan") for part in place]
+                if any(seen) and not all(seen):
+                    self._note("part", number, line, start, cell)
+                elif all(seen) and not b"".join(place).strip(b"0.-+"):
+                    self._note("zero", number, line, start, cell)
+            start += len(cell) + 1
+
+    def _numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
+        """The numbers of a row, NaN where there is none."""
+        if not self.markers:
+            return list(map(read, text.replace(b",", b" ").split()))
+        return [read(cell.strip() or b"nan") for cell in text.split(b"\t")]
+
+    def _odd(self, text: bytes, line: int) -> None:
+        """Look at one row that is not good."""
+        # A byte for each character, so that places are those of characters.
+        text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
+        if not text.strip():
+            if self.rows.count:
+                self._note("blank", 0, line, 0, b"")
+            return
+        rows = self.rows
+        cells, count = self._cells_of(text)
+        if count != self.cells:
+            comment = text.lstrip()[:1] in (b"#", b"/", b"%", b";")
+            if comment:
+                self._note("comment", 0, line, 0, b"")
+                return
+            end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
+            self._note("row", count, line, end, b"", str(count))
+        time = 1 if self.markers else 0
+        for number, (start, cell) in enumerate(cells[: self.cells]):
+            if self.markers and number == 0:
+                self._expect_frame(cell, line)
+            elif number == time:
+                value = _number(cell)
+                if value != value:
+                    self._note("time", time, line, start, cell)
+                elif not value > self._last():
+                    self._order(text, line, value, self._last())
+            elif not (self.markers and cell.lower() in (b"", b"nan")):
+                parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
+                if len(parts) != self.parts or any(_number(part) != _number(part) for part in parts):
+                    self._note("cell", number, line, start, cell)
+        if count == self.cells > time:
+            self._begin(line)
+            value = _number(cells[time][1])
+            rows.times.append(value if value == value else nextafter(self._last(), inf))
+            rows.count += 1
+            if self.markers:
+                form = b"\t".join(b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells)
+                rows.unseen -= _seen(form, self.cells) or set()
+                self._look_at_markers(text, line)
+            if len(rows.samples) < _SAMPLES:
+                rows.samples.append(self._numbers(text, _number))
+
+    def _cells_of(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
+        """The cells of a row with their places, of too many one more than there should be; and how many there are."""
+        if not self.markers:
+            words = _WORD.finditer(text)
+            cells = [(match.start(), match[0]) for match in islice(words, self.cells + 1)]
+            return cells, len(cells) + sum(1 for _ in words)
+        cells, start = [], 0
+        for cell in text.split(b"\t", self.cells + 1)[: self.cells + 1]:
+            cells.append((start + len(cell) - len(cell.lstrip()), cell.strip()))
+            start += len(cell) + 1
+        count = text.count(b"\t") + 1
+        # A tab may end the last cell, too.
+        ends = count == self.cells + 1 and not cells[-1][1]
+        return cells[: len(cells) - ends], count - ends
 
     def _last(self) -> float:
         """The time of the last row."""
@@ -210,75 +244,44 @@ class Scan:
         if line != self.rows.line_of(self.rows.count):
             self.rows.lines.append((self.rows.count, line))
 
-    def _markers(self, text: bytes, line: int) -> None:
-        """Look for markers at the origin, for parts of markers, and for those that were not seen so far."""
-        cells = text.split(b"\t")
-        for marker, start in enumerate(range(2, self.cells, 3)):
-            x, y, z = cells[start : start + 3]
-            if x and y and z:
-                self.rows.unseen.discard(marker)
-                if not (x + y + z).strip(b"0.-+"):
-                    self._note("zero", start, line, sum(map(len, cells[:start])) + start + 1, len(x), "")
-            elif x or y or z:
-                self._note("part", start, line, sum(map(len, cells[:start])) + start + 1, max(1, len(x)), "")
-
-    def _odd(self, text: bytes, line: int) -> None:
-        """Look at one row that is not good."""
-        if not text.strip():
-            if self.rows.count:
-                self._note("blank", 0, line, 1, 1, "")
-            return
-        finds = _CELL.finditer(text.rstrip(b"\r\n")) if self.markers else _WORD.finditer(text)
-        cells = [(match.start() + 1, match.group().strip()) for match in finds if not self.markers or _starts(match)]
-        if self.markers and cells and not cells[-1][1] and len(cells) == self.cells + 1:
-            cells.pop()
-        rows = self.rows
-        time = 1 if self.markers else 0
-        if len(cells) != self.cells:
-            comment = text.lstrip()[:1] in (b"#", b"/", b"%", b";")
-            kind = "comment" if comment else "row"
-            column = cells[self.cells][0] if len(cells) > self.cells else len(text.rstrip()) + 1
-            self._note(kind, 0 if comment else len(cells), line, 1 if comment else column, 1, str(len(cells)))
-            if comment:
-                return
-        numbers = [_number(part) for _, cell in cells for part in cell.split(b",", self.parts - 1)]
-        for number, (column, cell) in enumerate(cells):
-            if self.markers and number == 0:
-                self._expect_frame(cell, line)
-            elif number == time:
-                value = _number(cell)
-                if value != value:
-                    self._note("time", time, line, column, len(cell), _shown(cell))
-                elif not value > self._last():
-                    self._order(line, value, self._last())
-            elif not (self.markers and cell.lower() in (b"", b"nan")):
-                parts = cell.split(b",") if self.parts > 1 else [cell]
-                if len(parts) != self.parts or any(_number(part) != _number(part) for part in parts):
-                    self._note("cell", number, line, column, max(1, len(cell)), _shown(cell))
-        if len(cells) > time and len(cells) == self.cells:
-            self._begin(line)
-            value = _number(cells[time][1])
-            rows.times.append(value if value == value else nextafter(self._last(), inf))
-            rows.count += 1
-            if self.markers:
-                self._markers(b"\t".join(b"" if cell.lower() == b"nan" else cell for _, cell in cells), line)
-            if len(rows.samples) < 64:
-                rows.samples.append(numbers)
-
     def _expect_frame(self, cell: bytes, line: int) -> None:
-        number = int(cell) if cell.isdigit() else None
+        number = int(cell) if cell.isdigit() and len(cell) < 20 else None
         if number is None or (self._frame and number != self._frame + 1):
-            self._note("frame", 0, line, 1, max(1, len(cell)), _shown(cell))
+            self._note("frame", 0, line, 0, cell)
         self._frame = number if number is not None else self._frame + 1
 
-    def _order(self, line: int, time: float, before: float) -> None:
-        self._note("order", int(time < before), line, 1, 1, f"{time:.9g} {before:.9g}")
+    def _order(self, text: bytes, line: int, time: float, before: float) -> None:
+        place = _WORD.search(text, text.find(b"\t") if self.markers else 0)
+        start, word = (place.start(), place[0]) if place else (0, b"")
+        self._note("order", int(time < before), line, start, word, f"{time:.9g} {before:.9g}")
 
-    def _note(self, kind: str, number: int, line: int, column: int, length: int, text: str) -> None:
+    def _note(self, kind: str, number: int, line: int, start: int, cell: bytes, text: str | None = None) -> None:
         faults = self.rows.faults
         known = faults.get((kind, number))
-        new = Fault(kind, number, line, column, length, text)
+        told = cell.decode("latin-1") if text is None else text
+        new = Fault(kind, number, line, start + 1, max(1, len(cell)), told)
         faults[kind, number] = new if known is None else known._replace(times=known.times + 1)
+
+
+def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:
+    """What lines look like, those of markers without NaN, which stands for one that was not seen."""
+    if b"\r" in block:
+        block = block.replace(b"\r\n", b"\n")
+    if layout is MARKERS and b"N" in block:
+        # Twice, since one of two that follow on each other takes the tab from the other.
+        block = block.replace(b"\tNaN\t", b"\t\t").replace(b"\tNaN\t", b"\t\t").replace(b"\tNaN\n", b"\t\n")
+    return shapes(block, layout)
+
+
+@lru_cache(maxsize=256)
+def _seen(form: bytes, cells: int) -> frozenset[int] | None:
+    """The markers that are in a row of markers, by what the row looks like; None if that is no row of markers."""
+    numbers = form.split(b"\t")
+    if len(numbers) == cells + 1 and not numbers[-1]:
+        numbers.pop()
+    if len(numbers) != cells or set(numbers) - {b"", b"0"}:
+        return None
+    return frozenset(marker for marker in range((cells - 2) // 3) if all(numbers[3 * marker + 2 : 3 * marker + 5]))
 
 
 def _blocks(data: bytes, start: int) -> Iterator[bytes]:
@@ -293,15 +296,6 @@ def _blocks(data: bytes, start: int) -> Iterator[bytes]:
         start = end
 
 
-def _starts(match: re.Match[bytes]) -> bool:
-    """Whether a match is that of a cell, and not of the nothing at the end of one."""
-    return match.start() == 0 or match.string[match.start() - 1 : match.start()] == b"\t"
-
-
 def _number(cell: bytes) -> float:
     """A number; NaN for a text that is none as C++ reads numbers, which knows neither NaN nor infinity."""
     return float(cell) if _PLAIN.fullmatch(cell) else nan
-
-
-def _shown(cell: bytes) -> str:
-    return cell.decode("utf-8", "replace")

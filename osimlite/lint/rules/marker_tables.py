@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 from osimlite.document.source import Position
 from osimlite.lint.engine import INFO, WARNING, Found, rule
 from osimlite.lint.table import METRES, Table
@@ -65,7 +67,7 @@ def _spread(sample: list[float]) -> float | None:
     axes = [[number for number in sample[2 + axis :: 3] if number == number] for axis in range(3)]
     if any(len(numbers) < 2 for numbers in axes):
         return None
-    return float(sum((max(numbers) - min(numbers)) ** 2 for numbers in axes) ** 0.5)
+    return hypot(*(max(numbers) - min(numbers) for numbers in axes))
 
 
 @rule("OSIM812", "marker-gap", severity=WARNING, about="table")

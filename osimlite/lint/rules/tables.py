@@ -48,7 +48,7 @@ def table_header(table: Table, found: Found) -> None:
     ```
     """
     start = Position(1, 1)
-    if not table.data.strip():
+    if not table.data or table.data.isspace():
         found("the file is empty: OpenSim refuses it", at=start)
     elif table.is_markers:
         _marker_header(table, found)

@@ -1,0 +1,63 @@
+"""What lines look like: every short text is told as a regular expression tells it."""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
+
+NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+def told(cell: bytes) -> bytes:
+    return b"".join(b"0" if NUMBER.fullmatch(word) else b"!" for word in cell.split(b" ") if word)
+
+
+def expected(line: bytes, layout: Layout) -> bytes:
+    if layout is MARKERS:
+        return b"\t".join(map(told, line.split(b"\t")))
+    words = line.replace(b"\t", b" ").split(b" ")
+    if layout is VECTORS:
+        return b"".join(b",".join(told(part) or b"!" for part in word.split(b",")) for word in words if word)
+    return b"".join(map(told, words))
+
+
+LONGER = {ROWS: r"^\.", VECTORS: r"^\.", MARKERS: r"^[. ]| \.|\d[eE]"}
+"""Good lines that are looked at longer."""
+
+
+def check(line: bytes, look: bytes, layout: Layout) -> None:
+    wanted = expected(line, layout)
+    if b"!" in wanted:
+        assert b"!" in look or look != wanted
+    else:
+        assert look == wanted or (b"!" in look and re.search(LONGER[layout].encode(), line))
+
+
+@pytest.mark.parametrize("layout", [ROWS, VECTORS, MARKERS], ids=["rows", "vectors", "markers"])
+def test_every_short_line_is_told_right(layout):
+    for size in range(1, 5):
+        lines = [bytes(characters) for characters in product(b"05.-e \t,x", repeat=size)]
+        looks = shapes(b"\n".join([b"", *lines, b""]), layout)[0].split(b"\n")
+        for line, look in zip(lines, looks[1:-1], strict=True):
+            check(line, look, layout)
+
+
+@given(st.lists(st.text("0579.+-eE \t,xN\xff", max_size=12), min_size=1, max_size=8))
+def test_lines_are_told_each_for_itself(lines):
+    block = [line.encode("latin-1") for line in lines]
+    for layout in (ROWS, VECTORS, MARKERS):
+        looks = shapes(b"\n".join([b"", *block, b""]), layout)[0].split(b"\n")
+        for line, look in zip(block, looks[1:-1], strict=True):
+            check(line, look, layout)
+
+
+@given(st.lists(st.sampled_from(["0", "-0.0", "00.", "1", "-20.5", "0.001", ""]), min_size=1, max_size=9))
+def test_a_zero_among_markers_is_not_missed(cells):
+    zeros = any(cell and not cell.strip("-0.") for cell in cells)
+    assert shapes("\t".join([*cells, "\n"]).encode(), MARKERS)[1] == zeros
