@@ -126,6 +126,6 @@ def _table(fidelity: Fidelity, target: str) -> Any:
         names = dict.fromkeys(path.rsplit("/", 1)[1] or "the model" for path in group.components)
         worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
         add_row(
-            table, group.cannot_say, group.done, listed(list(names), most=3), *(["\n".join(worst)] if measured else [])
+            table, group.cannot_say, group.done, listed(list(names), most=3), *([", ".join(worst)] if measured else [])
         )
     return table

@@ -77,8 +77,9 @@ def _add_chain(parent: _Element, chain: list[RobotJoint], name: str) -> _Element
         rest = joint.origin @ rest
     element = add(parent, "body", name=name, **pose(rest))
     for joint, axis, anchor in reversed(joints):
-        kind, place = ("hinge", tidy(anchor)) if joint.kind == "revolute" else ("slide", None)
-        add(element, "joint", name=joint.name, type=kind, axis=tidy(axis), pos=place)
+        turns, place = joint.kind == "revolute", tidy(anchor)
+        anchored = place if turns and place.any() else None
+        add(element, "joint", name=joint.name, type="hinge" if turns else "slide", axis=tidy(axis), pos=anchored)
     return element
 
 

@@ -231,8 +231,9 @@ class Draft:
 
 
 def pose(matrix: Array) -> dict[str, Value]:
-    """The attributes that place a frame (4, 4) in that of its parent."""
-    return {"pos": tidy(matrix[:3, 3]), "quat": tidy(quaternion(matrix[:3, :3]))}
+    """The attributes that place a frame (4, 4) in that of its parent; None where it is not moved, or not turned."""
+    place, turned = tidy(matrix[:3, 3]), tidy(quaternion(matrix[:3, :3]))
+    return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
 
 
 def quaternion(rotation: Array) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lxml.etree import Comment, tostring
+from lxml.etree import Comment, _Comment, tostring
 
 from osimlite import __version__
 from osimlite.errors import SettingError
@@ -23,6 +23,7 @@ from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
 from osimlite.translate.mjcf.bodies import add_bodies, add_frames
 from osimlite.translate.mjcf.constraints import add_constraints
+from osimlite.translate.mjcf.contacts import add_contacts
 from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import Contact, Draft, Lead, Options, Version, add
@@ -36,6 +37,7 @@ PASSES: tuple[Callable[[Draft], None], ...] = (
     add_couplings,
     add_coordinates,
     add_constraints,
+    add_contacts,
     add_forces,
     add_shapes,
     add_markers,
@@ -129,6 +131,9 @@ def to_mjcf(
     for make in PASSES:
         make(draft)
     account_for_rest(draft.tree, fidelity)
+    for section in list(draft.root):
+        if not section.attrib and not len(section) and not isinstance(section, _Comment):
+            draft.root.remove(section)
     text = tostring(draft.root, pretty_print=True, xml_declaration=True, encoding="utf-8").decode()
     return Mjcf(
         legal(model.name or "model") if name is None else name, text, fidelity, robot, mesh_files.files, draft.leads

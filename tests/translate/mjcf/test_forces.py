@@ -52,7 +52,8 @@ def chain(*forces) -> Model:
     model.add(
         PhysicalOffsetFrame(name="hook", socket_parent=B, translation=(0.1, 0.0, 0.02), orientation=(0.1, 0.5, 0))
     )
-    model.add(*forces)
+    if forces:
+        model.add(*forces)
     return model
 
 

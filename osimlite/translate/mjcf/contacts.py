@@ -1,0 +1,120 @@
+"""Contact: surfaces as geoms that touch only whom a contact force of the model lets them, by MuJoCo's own law."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from osimlite.errors import ModelError
+from osimlite.multibody.spatial import Array, offset
+from osimlite.robot.visuals import mesh_shape
+from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactMesh, ContactSphere
+from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
+from osimlite.schema.forces import Force, HuntCrossleyForce
+from osimlite.schema.tree import Use
+from osimlite.translate.collisions import SLAB
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf.draft import Draft, Unsayable, Value, add, pose
+from osimlite.translate.mjcf.scenery import TOUCHES
+
+_PLANE = np.array(((0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+"""The frame (4, 4) of a plane, which faces its Z axis, in that of a half space, which faces its negative X axis."""
+
+ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpaceForce
+
+
+def add_contacts(draft: Draft) -> None:
+    """Add contact surfaces, and the pairs of them that touch."""
+    if draft.options.contact == "none":
+        return
+    touches = add(draft.section("default"), "default", class_="touches")
+    add(touches, "geom", contype=0, conaffinity=0, group=TOUCHES, mass=0, rgba=(0.4, 0.7, 0.7, 0.4))
+    for geometry, path in draft.components(ContactGeometry):
+        try:
+            _add_surface(draft, geometry, path)
+        except (ModelError, Unsayable) as error:
+            what = f"a {type(geometry).__name__}"
+            draft.fidelity.add("contact-geometry", path, what, f"{LEFT_OUT}: {error}")
+    for force, path in draft.components(Force):
+        if not isinstance(force, ContactForce) or not force.appliesForce:
+            continue
+        what = f"contact by the law of a {type(force).__name__}"
+        try:
+            pairs = " ".join(_add_pairs(draft, force))
+        except ModelError as error:
+            draft.fidelity.add("contact", path, what, f"{LEFT_OUT}: {error}")
+            continue
+        done = "contact by MuJoCo's law, which is another: what touches is held, but forces and motions differ"
+        draft.fidelity.add("contact", path, what, done, f"pairs {pairs}")
+
+
+def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
+    body, placed = draft.placement(geometry, "socket_frame")
+    made = _form(draft, geometry, path, still=not draft.bodies[body].xpath("ancestor-or-self::body/joint"))
+    if made is None:
+        return
+    form, own = made
+    name = draft.name("geom", path)
+    frame = placed @ offset(geometry.location, geometry.orientation) @ own
+    add(draft.bodies[body], "geom", class_="touches", name=name, **form, **pose(frame))
+    draft.fidelity.translated[path] = f"geom {name}"
+
+
+def _form(draft: Draft, geometry: ContactGeometry, path: str, *, still: bool) -> tuple[dict[str, Value], Array] | None:
+    """The attributes of the geom, and its frame (4, 4) in that of the geometry; None for a mesh without a file."""
+    match geometry:
+        case ContactSphere() if geometry.radius > 0.0:
+            return {"type": "sphere", "size": [geometry.radius]}, np.eye(4)
+        case ContactEllipsoid() if min(geometry.radii) > 0.0:
+            return {"type": "ellipsoid", "size": geometry.radii}, np.eye(4)
+        case ContactHalfSpace() if still:
+            return {"type": "plane", "size": (0.0, 0.0, 1.0)}, _PLANE
+        case ContactHalfSpace():
+            middle = offset((SLAB[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            size = " x ".join(f"{edge:g}" for edge in SLAB)
+            done = f"a box of {size} m whose face is its surface"
+            draft.fidelity.add("contact-geometry", path, "a half space on a body that moves", done)
+            return {"type": "box", "size": [edge / 2.0 for edge in SLAB]}, middle
+        case ContactMesh():
+            shape = mesh_shape(geometry.filename, path, draft.mesh_files, draft.fidelity.add)
+            if shape is None:
+                return None
+            draft.fidelity.add("contact-geometry", path, "a contact mesh", "its convex hull", shape.file)
+            return {"type": "mesh", "mesh": draft.mesh(shape.file, shape.scale)}, np.eye(4)
+    raise Unsayable("MuJoCo has no such surface")
+
+
+def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
+    """Add a pair for any two surfaces of a force that are on different bodies; their names."""
+    for (one, first), (two, second) in combinations(_surfaces(draft, force), 2):
+        became = [draft.fidelity.translated.get(draft.tree.path_of(item) or "") for item in (one, two)]
+        bodies = [draft.placement(item, "socket_frame").body for item in (one, two)]
+        flat = isinstance(one, ContactHalfSpace) and isinstance(two, ContactHalfSpace)
+        if flat or bodies[0] == bodies[1] or None in became:
+            continue
+        geoms = [str(what).removeprefix("geom ") for what in became]
+        name = draft.name("pair", ".".join(geoms))
+        # Simbody's rule for two materials.
+        slide = 2.0 * first * second / (first + second) if first + second else 0.0
+        friction = (slide, slide, 0.0, 0.0, 0.0)
+        add(draft.section("contact"), "pair", name=name, geom1=geoms[0], geom2=geoms[1], friction=friction)
+        yield name
+
+
+def _surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeometry, float]]:
+    """The surfaces of a force, with the dynamic friction of each."""
+    if isinstance(force, SmoothSphereHalfSpaceForce):
+        for socket in ("socket_sphere", "socket_half_space"):
+            surface = draft.tree.target(force, socket, getattr(force, socket))
+            if isinstance(surface, ContactGeometry):
+                yield surface, force.dynamic_friction
+        return
+    for parameters in force.contact_parameters.objects:
+        spec = type(parameters).field_specs()["geometry"]
+        for position, word in enumerate(parameters.geometry):
+            found = draft.tree.resolve(Use(parameters, force, spec, word, position)).target
+            if not isinstance(found, ContactGeometry):
+                raise ModelError(f"it names the contact geometry '{word}', which the model does not have")
+            yield found, parameters.dynamic_friction
