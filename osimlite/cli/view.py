@@ -41,6 +41,10 @@ def view(
             "--html", metavar="FILE", help="Write one page that needs no server and no network.", show_default=False
         ),
     ] = None,
+    glb: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a file for Blender, slides and web pages (glTF).", show_default=False),
+    ] = None,
     screenshot: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write a picture (.png); needs no display.", show_default=False),
@@ -54,8 +58,8 @@ def view(
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
 
-    Opens a page in the browser and serves it until you press Ctrl-C; with --html or --screenshot it writes files
-    instead.
+    Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb or --screenshot it writes
+    files instead.
 
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
@@ -73,9 +77,11 @@ def view(
         say(remark)
     if page is not None:
         say(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
+    if glb is not None:
+        say(f"wrote {shown.write_glb(glb)} ({glb.stat().st_size / 1e6:.1f} MB)")
     if screenshot is not None:
         say(f"wrote {shown.write_picture(screenshot, SIZE, at)}")
-    if page is None and screenshot is None:
+    if page is None and glb is None and screenshot is None:
         _serve(shown, port, browser=browser)
 
 

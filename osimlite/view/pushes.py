@@ -11,6 +11,9 @@ from osimlite.multibody.spatial import Array
 from osimlite.view.motion import Motion, at_times, contact_forces
 from osimlite.view.scene import Bodies, Pushed, Scene
 
+LONGEST_ARROW = 0.4
+"""Length of the largest force's arrow as a part of the model's size."""
+
 
 @dataclass(frozen=True, eq=False)
 class Push:

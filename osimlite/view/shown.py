@@ -19,19 +19,17 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.text import listed
 from osimlite.view.collect import build_scene
+from osimlite.view.glb import write_glb
 from osimlite.view.motion import Motion, at_times, in_mechanism_order
 from osimlite.view.page import page_data, page_text
 from osimlite.view.picture import Arrow, Camera, Style, draw
-from osimlite.view.pushes import Pushes
+from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.recording import Recording, read_recording
 from osimlite.view.scene import Scene
 from osimlite.view.server import PageServer
 
 HOME = (1.0, 0.35, 1.3)
 """From where a picture is taken: so much to the front, up, and to the model's right."""
-
-_LONGEST_ARROW = 0.4
-"""Length of the largest force's arrow as a part of the model's size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +100,10 @@ class Shown:
         write_atomically(path, page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q)))
         return Path(path)
 
+    def write_glb(self, path: str | Path) -> Path:
+        """Write a file of glTF 2.0 (.glb), with the motion if there is one."""
+        return write_glb(self.scene, self.q, self.motion, path)
+
     def server(self, port: int = 0) -> PageServer:
         """Serve the page at a port of this machine; 0 takes any that is free."""
         data = page_data(self.model, self.scene, self.motion, self.findings, self.q, server=True)
@@ -152,7 +154,7 @@ class Shown:
         q = at_times(motion, values, moment)[0]
         largest = Pushes.of(self.scene, motion, np.asarray(motion.times, dtype=float)).largest
         low, high = self.scene.box(q)
-        scale = _LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
+        scale = LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
         pushes = Pushes.of(self.scene, motion, moment).at(0, self.scene.at(q))
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
         return q, [Arrow(point, scale * force) for _, point, force in pushes], loaded

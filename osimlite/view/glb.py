@@ -1,0 +1,255 @@
+"""A model, and how it moves, as one file of glTF 2.0 (.glb): for Blender, slides and pages.
+
+Every body is a node with its shapes below it; a path and the arrow of a contact force are tubes of their own. Lengths
+are in metres, Y is up, and times are those of the motion, from 0.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite import __version__
+from osimlite.files import write_atomically
+from osimlite.multibody.spatial import Array
+from osimlite.view.motion import Motion, at_times, in_mechanism_order
+from osimlite.view.picture import FORCE
+from osimlite.view.pushes import LONGEST_ARROW, Pushes
+from osimlite.view.scene import Bodies, Color, Scene
+from osimlite.view.surfaces import normals_of, tube
+
+RATE = 60.0
+"""Moments a second at most: between them players go straight."""
+
+_FLOAT, _UINT32 = 5126, 5125
+_VERTICES, _CORNERS = 34962, 34963
+_KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+_ROUND = tube(8)
+
+
+def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -> Path:
+    """Write what is shown of a model.
+
+    Args:
+        scene: what there is to see.
+        q: coordinate values (n,), the pose of a model without motion.
+        motion: how it moves, or None.
+        path: the file to write.
+    """
+    times, rows = np.zeros(1), q[None, :]
+    if motion is not None:
+        recorded = np.asarray(motion.times, dtype=float)
+        usual = round((recorded[-1] - recorded[0]) * RATE) + 1
+        times = recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
+        values = in_mechanism_order(motion, scene.mechanism, np.asarray(motion.values, dtype=float))
+        rows = at_times(motion, values, times)
+    poses = [scene.at(row) for row in rows]
+    written = _Writer(times - times[0], _turning(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1]))
+    names = [*(body.name for body in scene.mechanism.bodies), "ground"]
+    bodies = [
+        written.node(
+            name, _Track([p.origins[k] for p in poses], _quaternions(np.array([p.rotations[k] for p in poses])))
+        )
+        for k, name in enumerate(names)
+    ]
+    for item in scene.drawn():
+        if item.layer != "frames":
+            surface = scene.surfaces[item.surface]
+            mesh = written.mesh(surface, item.color, item.opacity)
+            written.shape(bodies[item.body], item.path, mesh, item.matrix)
+    for name, color, radius, ends in _segments(scene, motion, times, rows, poses):
+        written.node(name, _along(ends, radius), written.mesh(_ROUND, color, 1.0))
+    write_atomically(path, written.data(scene.mechanism.name))
+    return Path(path)
+
+
+class _Track(NamedTuple):
+    """How a node goes through n moments: translations (n, 3), rotations x y z w (n, 4), scales (n, 3) or None."""
+
+    translation: Any
+    rotation: Array
+    scale: Array | None = None
+
+
+def _segments(
+    scene: Scene, motion: Motion | None, times: Array, rows: Array, poses: Sequence[Bodies]
+) -> Iterator[tuple[str, Color, float, Array]]:
+    """Straight pieces of paths, and forces: path of the component, colour, radius, ends (n, 2, 3) in ground.
+
+    Of a path that has fewer corners at a moment the last pieces have no length.
+    """
+    for line in scene.lines:
+        if line.visible and line.layer in scene.shown:
+            corners = [line.corners(q, bodies) for q, bodies in zip(rows, poses, strict=True)]
+            most = len(line.points)
+            full = [found[np.minimum(np.arange(most), len(found) - 1)] for found in corners if len(found)]
+            if len(full) == len(poses):
+                for k in range(most - 1):
+                    yield line.path, line.color, line.radius, np.array(full)[:, k : k + 2]
+    pushes = Pushes(()) if motion is None else Pushes.of(scene, motion, times)
+    low, high = scene.box(rows[0])
+    size = float(np.linalg.norm(high - low))
+    for push in pushes.pushes:
+        starts = np.array([push.point(number, bodies) for number, bodies in enumerate(poses)])
+        arrows = push.forces * (LONGEST_ARROW * size / max(pushes.largest, 1e-300))
+        yield push.on.path, FORCE, 0.006 * size, np.stack((starts, starts + arrows), axis=1)
+
+
+def _along(ends: Array, radius: float) -> _Track:
+    """A tube of length 1 along Z, laid from one end to the other (n, 2, 3)."""
+    ways = ends[:, 1] - ends[:, 0]
+    lengths = np.linalg.norm(ways, axis=1)
+    ways = ways / np.maximum(lengths, 1e-300)[:, None]
+    turns = np.array([_turning(np.array((-y, x, 0.0)), z) for x, y, z in ways])
+    thick = np.where(lengths > 0.0, radius, 0.0)
+    return _Track(ends.mean(axis=1), _continuous(turns), np.column_stack((thick, thick, lengths)))
+
+
+def _turning(axis: Array, cosine: float) -> Array:
+    """The quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
+    found = np.array((*axis, 1.0 + cosine))
+    size = float(np.linalg.norm(found))
+    return found / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
+
+
+def _quaternions(rotations: Array) -> Array:
+    """Quaternions x y z w (n, 4) of rotation matrices (n, 3, 3)."""
+    r = rotations
+    trace = np.trace(r, axis1=1, axis2=2)
+    products = np.empty((len(r), 4, 4))
+    products[:, :3, :3] = r + r.transpose(0, 2, 1) + (1.0 - trace)[:, None, None] * np.eye(3)
+    for k in range(3):
+        products[:, k, 3] = products[:, 3, k] = r[:, k - 1, k - 2] - r[:, k - 2, k - 1]
+    products[:, 3, 3] = 1.0 + trace
+    # Every row is the quaternion times one of its parts; the longest has the most digits.
+    best = np.argmax(np.diagonal(products, axis1=1, axis2=2), axis=1)
+    rows = products[np.arange(len(r)), best]
+    return _continuous(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+
+
+def _continuous(quaternions: Array) -> Array:
+    """The same turns, each with the sign that is nearer to the one before: players go the straight way between them."""
+    turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
+    signs = np.where(np.cumsum(np.concatenate(((False,), turned))) % 2 == 1, -1.0, 1.0)
+    found: Array = quaternions * signs[:, None]
+    return found
+
+
+class _Writer:
+    """Puts the parts of a file together: its JSON and its one buffer."""
+
+    def __init__(self, times: Array, upright: Array) -> None:
+        self.buffer = bytearray()
+        self.views: list[dict[str, int]] = []
+        self.accessors: list[dict[str, Any]] = []
+        self.nodes: list[dict[str, Any]] = [{"rotation": upright.tolist(), "children": []}]
+        self.meshes: list[dict[str, Any]] = []
+        self.materials: list[dict[str, Any]] = []
+        self.channels: list[dict[str, Any]] = []
+        self.samplers: list[dict[str, Any]] = []
+        self._known: dict[Any, int] = {}
+        self._moves = len(times) > 1
+        self._times = self._accessor(times[:, None], bounds=True) if self._moves else 0
+
+    def _accessor(self, array: Array, kind: int = _FLOAT, *, bounds: bool = False, target: int | None = None) -> int:
+        data = np.ascontiguousarray(array, dtype="<f4" if kind == _FLOAT else "<u4")
+        view = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": data.nbytes}
+        self.views.append(view if target is None else view | {"target": target})
+        self.buffer += data.tobytes()
+        entry = {
+            "bufferView": len(self.views) - 1,
+            "componentType": kind,
+            "count": len(data),
+            "type": _KINDS[data.shape[1]],
+        }
+        if bounds:
+            entry |= {"min": data.min(axis=0).tolist(), "max": data.max(axis=0).tolist()}
+        self.accessors.append(entry)
+        return len(self.accessors) - 1
+
+    def _once(self, key: Any, into: list[dict[str, Any]], entry: dict[str, Any]) -> int:
+        """The place of an entry, which is written the first time."""
+        if key not in self._known:
+            self._known[key] = len(into)
+            into.append(entry)
+        return self._known[key]
+
+    def mesh(self, surface: Any, color: Color, opacity: float) -> int:
+        """The place of a surface in a colour (sRGB)."""
+        key = (id(surface), color, opacity)
+        if key in self._known:
+            return self._known[key]
+        # glTF has colours as amounts of light.
+        light = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color]
+        material = {
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [*light, opacity],
+                "metallicFactor": 0.0,
+                "roughnessFactor": 0.7,
+            },
+            "alphaMode": "OPAQUE" if opacity >= 1.0 else "BLEND",
+            "doubleSided": True,
+        }
+        geometry = ("geometry", id(surface))
+        if geometry not in self._known:
+            self._known[geometry] = self._accessor(surface.points, bounds=True, target=_VERTICES)
+            self._accessor(normals_of(surface), target=_VERTICES)
+            self._accessor(surface.triangles.reshape(-1, 1), _UINT32, target=_CORNERS)
+        first = self._known[geometry]
+        primitive = {
+            "attributes": {"POSITION": first, "NORMAL": first + 1},
+            "indices": first + 2,
+            "material": self._once((color, opacity), self.materials, material),
+        }
+        return self._once(key, self.meshes, {"primitives": [primitive]})
+
+    def node(self, name: str, track: _Track, mesh: int | None = None) -> int:
+        """A node in ground, which moves if it is not the same all the time."""
+        place = len(self.nodes)
+        node: dict[str, Any] = {"name": name} | ({} if mesh is None else {"mesh": mesh})
+        for what, values in track._asdict().items():
+            if values is None:
+                continue
+            array = np.asarray(values)
+            node[what] = array[0].tolist()
+            if self._moves and np.ptp(array, axis=0).max() > 0.0:
+                self.samplers.append({"input": self._times, "output": self._accessor(array)})
+                target = {"node": place, "path": what}
+                self.channels.append({"sampler": len(self.samplers) - 1, "target": target})
+        self.nodes.append(node)
+        self.nodes[0]["children"].append(place)
+        return place
+
+    def shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
+        """A node fixed to another: `matrix` (4, 4) in its frame."""
+        self.nodes[parent].setdefault("children", []).append(len(self.nodes))
+        self.nodes.append({"name": name, "mesh": mesh, "matrix": matrix.T.ravel().tolist()})
+
+    def data(self, name: str) -> bytes:
+        """The file."""
+        self.nodes[0]["name"] = name
+        parts = {
+            "asset": {"version": "2.0", "generator": f"osimlite {__version__}"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": self.materials,
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": len(self.buffer)}] if self.buffer else [],
+            "animations": [{"channels": self.channels, "samplers": self.samplers}] if self.channels else [],
+        }
+        # glTF allows no empty lists.
+        text = json.dumps({key: part for key, part in parts.items() if part != []}, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        body = bytes(self.buffer) + bytes(-len(self.buffer) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        if body:
+            chunks += struct.pack("<I4s", len(body), b"BIN\0") + body
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
