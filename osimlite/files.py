@@ -6,7 +6,7 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -27,28 +27,6 @@ unsaved: dict[str, bytes] = {}
 """What is read in place of files: their texts in an editor, not written yet, by real path."""
 
 _SPECIAL = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
-
-
-def model_files(paths: Iterable[Path], suffixes: tuple[str, ...] = (".osim",)) -> list[Path]:
-    """The files named, and every file with one of some suffixes below the folders named, sorted within each folder.
-
-    Raises:
-        MissingFileError: a path is not there.
-        OsimliteError: a folder has no such file.
-    """
-    found: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            named = (file for file in path.rglob("*.*") if file.suffix.lower() in suffixes)
-            below = sorted(file for file in named if not file.is_dir())
-            if not below:
-                raise OsimliteError(f"there is no {' or '.join(suffixes)} file in this folder", file=str(path))
-            found.extend(below)
-        elif path.exists():
-            found.append(path)
-        else:
-            raise MissingFileError("cannot read the file: no such file or folder", file=str(path))
-    return found
 
 
 def open_file(path: str | Path) -> BinaryIO:

@@ -93,6 +93,8 @@ def _plainly(words: list[str]) -> dict[str, Any] | None:
             asked["cached"] = False
         elif word == "--all":
             asked["everything"] = True
+        elif word == "--skip-other-xml":
+            asked["only_ours"] = True
         elif word in ("--format", "--fail-on"):
             value = next(rest, None)
             if value is None:

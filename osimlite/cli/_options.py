@@ -68,6 +68,9 @@ Controls = Annotated[
     ),
 ]
 Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
+OnlyOurs = Annotated[
+    bool, typer.Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named.")
+]
 Folder = Annotated[
     Path | None,
     typer.Option(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
-from osimlite.files import read_standard_input
+from osimlite.files import read_standard_input, unsaved
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
@@ -19,7 +19,7 @@ from osimlite.lint.suffixes import is_table, project_files
 from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from osimlite.document.source import Source
 
@@ -40,6 +40,8 @@ def run(
     statistics: bool = False,
     cached: bool = True,
     everything: bool = False,
+    stdin_filename: str | None = None,
+    only_ours: bool = False,
 ) -> int:
     """Check files and folders, write the report to standard output, and return the exit code."""
     if fail_on is not None and fail_on not in tuple(Severity):
@@ -49,7 +51,13 @@ def run(
     given = Config(
         checked_words(select), checked_words(ignore), mesh_paths=tuple(str(path.resolve()) for path in geometry)
     )
-    files = list(_files(paths))
+    if "-" in paths and (fix or unsafe_fixes) and not diff:
+        raise OsimliteError("standard input cannot be mended in place; use --diff")
+    if "-" in paths and stdin_filename is not None:
+        # It is what this file would be, were it written now.
+        unsaved[os.path.realpath(stdin_filename)] = read_standard_input()
+        paths = [stdin_filename if path == "-" else path for path in paths]
+    files = project_files(paths, only_ours=only_ours)
     failed = False
     if diff:
         changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
@@ -78,15 +86,6 @@ def run(
         (show if format in FOR_PEOPLE else hand_over)(text)
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
     return 2 if failed else int(bool(report.at_least(worst)))
-
-
-def _files(paths: list[str]) -> Iterator[str]:
-    """Every file to check, folders opened up."""
-    for text in paths:
-        if text != "-" and os.path.isdir(text):
-            yield from project_files(text)
-        else:
-            yield text
 
 
 def _source(path: str) -> Source:
@@ -137,8 +136,6 @@ def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int,
 
 def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, bool]:
     """Mend files; how many mends that took, how many guesses are left, and whether it could not be done to some."""
-    if "-" in files:
-        raise OsimliteError("standard input cannot be mended in place; use --diff")
     total = guesses = 0
     failed = False
     for path in files:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from osimlite.cli import _options as options
+
 
 def format(
     paths: Annotated[
@@ -14,6 +16,7 @@ def format(
     ],
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
     show_diff: Annotated[bool, typer.Option("--diff", help="Change nothing; print what would change.")] = False,
+    only_ours: options.OnlyOurs = False,
 ) -> None:
     """Write files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
 
@@ -26,12 +29,11 @@ def format(
     from osimlite.document.formatting import formatted
     from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
-    from osimlite.files import model_files, write_atomically
-    from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours
+    from osimlite.files import write_atomically
+    from osimlite.lint.suffixes import DOCUMENTS, project_files
 
     changed, same, worst = 0, 0, 0
-    found = model_files(paths, (".osim", *DOCUMENTS))
-    for path in (path for path in found if path in paths or begins_as_ours(str(path))):
+    for path in project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):
         try:
             source = Source.of_file(path)
             after = formatted(source)
@@ -45,7 +47,7 @@ def format(
             continue
         changed += 1
         if show_diff:
-            print_diff(before, after, str(path), f"{path} (formatted)")
+            print_diff(before, after, path, f"{path} (formatted)")
         elif check:
             say(f"would reformat {path}")
         else:

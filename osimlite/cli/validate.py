@@ -53,6 +53,15 @@ def validate(
         bool, typer.Option("--all", help="Print every finding; else the first stands for those that are like it.")
     ] = False,
     statistics: Annotated[bool, typer.Option("--statistics", help="Count findings by rule instead.")] = False,
+    stdin_filename: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Take standard input for what this file will be, and check it there.",
+            show_default=False,
+        ),
+    ] = None,
+    only_ours: options.OnlyOurs = False,
     no_cache: Annotated[
         bool, typer.Option("--no-cache", help="Check every file, also those that have not changed since.")
     ] = False,
@@ -81,5 +90,7 @@ def validate(
             statistics=statistics,
             cached=not no_cache,
             everything=everything,
+            stdin_filename=stdin_filename,
+            only_ours=only_ours,
         )
     )

@@ -52,7 +52,7 @@ def validate(
     if not isinstance(model, Source) and os.path.isdir(model):
         from osimlite.lint.many import check_files
 
-        return check_files(project_files(model), config, cached=False)
+        return check_files(project_files([model]), config, cached=False)
     return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
 
 

@@ -41,7 +41,7 @@ def check_files(
     """Check files, each by the settings of its folder and what `given` says besides.
 
     Args:
-        files: paths of models, ``-`` for standard input.
+        files: paths, ``-`` for standard input.
         given: what comes before the settings of the project.
         cached: whether findings of files that have not changed are taken from the cache, and new ones kept there.
         processes: how many processes to use; if not given, as many as there is work for.

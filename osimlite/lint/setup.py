@@ -239,7 +239,7 @@ class Setup(Subject):
         wanted = os.path.realpath(path)
         around = self._tools_in(list(Path(wanted).parents)[:3])
         for file, top in dict(self.neighbours + around).items():
-            if self.file is not None and os.path.samefile(file, self.file):
+            if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
                 continue
             folder = os.path.dirname(file)
             results = getattr(top, "results_directory", "") or "."

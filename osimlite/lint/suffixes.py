@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
-from osimlite.files import model_files
+from osimlite.errors import OsimliteError
 
 TABLES = (".sto", ".mot", ".trc")
 """Tables over time."""
@@ -23,17 +25,38 @@ def is_table(file: str | None) -> bool:
 
 
 def is_document(file: str | None) -> bool:
-    """Whether a file is a document other than a model, by its name."""
-    return file is not None and file.lower().endswith(DOCUMENTS)
+    """Whether a file may be a document other than a model, by its name; standard input has none."""
+    return file is not None and (file == "<stdin>" or file.lower().endswith(DOCUMENTS))
 
 
-def project_files(folder: str | Path) -> list[str]:
-    """Every file below a folder that is checked; OsimliteError if there is none."""
-    return list(filter(begins_as_ours, map(str, model_files([Path(folder)], PROJECT))))
+def project_files(
+    paths: Iterable[str | Path], suffixes: tuple[str, ...] = PROJECT, *, only_ours: bool = False
+) -> list[str]:
+    """The files that are named, and OpenSim's files with some suffixes below the folders that are named.
+
+    With `only_ours`, XML of other programs is passed over even where it is named.
+
+    Raises:
+        OsimliteError: there is none in a folder.
+    """
+    found: list[str] = []
+    for path in paths:
+        if os.path.isdir(path):
+            named = (file for file in Path(path).rglob("*.*") if file.suffix.lower() in suffixes)
+            below = sorted(file for file in named if not file.is_dir() and begins_as_ours(str(file)))
+            if not below:
+                raise OsimliteError(
+                    f"there is no file of OpenSim in this folder: no {', '.join(suffixes[:-1])} or {suffixes[-1]}",
+                    file=str(path),
+                )
+            found += map(str, below)
+        elif not only_ours or begins_as_ours(str(path)):
+            found.append(str(path))
+    return found
 
 
 def begins_as_ours(file: str) -> bool:
-    """Whether a file that was not named but found is OpenSim's: other programs write XML too."""
+    """Whether a file is OpenSim's, as far as its name and its beginning tell: other programs write XML too."""
     if not file.lower().endswith(".xml"):
         return True
     try:

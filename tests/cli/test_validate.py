@@ -48,6 +48,31 @@ def test_json_from_standard_input(faulty):
     assert {finding["file"] for finding in findings} == {"<stdin>"}
 
 
+def test_standard_input_may_be_a_setup_or_a_table_of_a_project(fixtures, tmp_path):
+    for file in (fixtures / "setups").glob("*.*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    ik, motion = (tmp_path / "ik.xml").read_text(), (tmp_path / "coords.mot").read_text()
+    text = ik.replace("walk.trc", "wolk.trc")
+    assert "'wolk.trc'" in run("validate", "-", "--stdin-filename", tmp_path / "ik.xml", text=text).out
+    assert "'walk.trc'" not in run("validate", "-", "--stdin-filename", tmp_path / "ik.xml", text=ik).out
+    wrong = motion.replace("=yes", "=true")
+    done = run("validate", "-", "--stdin-filename", "a.mot", text=wrong, folder=tmp_path)
+    assert done.out.startswith("a.mot:5:11: error OSIM803")
+    # Without a name it is in no folder, and still no model.
+    assert run("validate", "-", "--select", "OSIM003", text=ik).code == 0
+    done = run("validate", "-", "--fix", "--stdin-filename", tmp_path / "ik.xml", text=text)
+    assert done.code == 2 and (tmp_path / "ik.xml").read_text() == ik
+
+
+def test_xml_of_others_is_passed_over_where_that_is_asked_for(tmp_path):
+    (tmp_path / "pom.xml").write_text("<project/>")
+    assert run("validate", tmp_path / "pom.xml").code == 1
+    assert run("validate", tmp_path / "pom.xml", "--skip-other-xml").code == 0
+    for command in ("validate", "format"):
+        done = run(command, tmp_path)
+        assert done.code == 2 and "there is no file of OpenSim in this folder: no .osim, .xml" in done.err
+
+
 def test_a_folder_is_every_model_below(faulty):
     (faulty.parent / "sub").mkdir()
     (faulty.parent / "sub" / "other.osim").write_text("<OpenSimDocument/>")

@@ -33,7 +33,12 @@ def test_hooks_call_commands_that_exist(repo: Path) -> None:
     for hook in hooks:
         program, command, *_ = hook["entry"].split()
         assert program == "osimlite" and command in COMMANDS
-        assert re.search(hook["files"], "models/walker.osim") and not re.search(hook["files"], "walker.osim.bak")
+        files = [
+            name
+            for name in ("models/walker.osim", "ik.xml", "walk.mot", "a.osim.bak")
+            if re.search(hook["files"], name)
+        ]
+        assert files == ["models/walker.osim", "ik.xml", "walk.mot"][: 3 if command == "validate" else 2]
     assert [hook["id"] for hook in hooks] == ["osimlite-validate", "osimlite-format"]
 
 
@@ -44,6 +49,21 @@ def test_the_guide_names_hooks_and_inputs_that_exist(repo: Path, guide: str) -> 
     assert {hook["id"] for hook in parsed[0]["repos"][0]["hooks"]} == hooks
     (step,) = [step for step in parsed[1]["jobs"]["validate"]["steps"] if "osimlite@" in step["uses"]]
     assert step["with"].keys() <= inputs
+
+
+def test_hooks_pass_over_xml_of_others(repo: Path, tmp_path: Path) -> None:
+    (tmp_path / "pom.xml").write_text("<project>\n<a/></project>")
+    (tmp_path / "a.sto").write_text("a\ninDegrees=true\nendheader\ntime\ta\n0\t0\n")
+    (tmp_path / "id.xml").write_text('<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>')
+    for hook in yaml.safe_load((repo / ".pre-commit-hooks.yaml").read_text(encoding="utf-8")):
+        command = [sys.executable, "-m", *hook["entry"].split()]
+        done = subprocess.run([*command, "pom.xml"], cwd=tmp_path, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        names = [name for name in ("pom.xml", "id.xml", "a.sto") if re.search(hook["files"], name)]
+        done = subprocess.run([*command, *names], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode and all(name in done.stdout + done.stderr for name in names if name != "pom.xml")
+        assert "pom.xml" not in done.stdout + done.stderr
+    assert (tmp_path / "pom.xml").read_text() == "<project>\n<a/></project>"
 
 
 on_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action runs bash")
@@ -100,6 +120,16 @@ def test_the_action_checks_every_path(repo: Path, tmp_path: Path, paths: str, fo
         place.write_text(wrong)
     done = act(repo, tmp_path, paths)
     assert (done.returncode, checked(done)) == (1, found), done.stderr
+
+
+@on_bash
+def test_the_action_checks_setups_and_tables(repo: Path, tmp_path: Path) -> None:
+    (tmp_path / "pom.xml").write_text("<project/>")
+    (tmp_path / "a.sto").write_text("a\ninDegrees=true\nendheader\ntime\ta\n0\t0\n")
+    (tmp_path / "id.xml").write_text('<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>')
+    for paths in (".", "*.xml *.sto"):
+        done = act(repo, tmp_path, paths)
+        assert (done.returncode, checked(done)) == (1, ["a.sto", "id.xml"]), done.stdout
 
 
 @on_bash
