@@ -1,7 +1,8 @@
 """What was found in files before, so that a file that has not changed need not be checked again.
 
-An entry holds for one text, under one path, by one configuration, with this very osimlite. Files that the model names
-may change as well: an entry notes when each of them was last written, or that it was not there.
+An entry holds for one text, under one path, by one configuration, with this very osimlite. A file whose times, size and
+place on the disk are those noted has not changed; of another its text tells. Files that the model names may change as
+well: an entry notes when each of them was last written, or that it was not there.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ import sys
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
+from time import time_ns
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
 
 from osimlite import __version__
 from osimlite.errors import OsimliteError
@@ -39,21 +42,42 @@ class Cache:
         """The findings in a file, None unless they were kept for this key and nothing has changed since."""
         try:
             match json.loads(read_file(self._entry(file))):
-                case {"key": str(kept), "outside": [*outside], "findings": [*findings]} if kept == key:
-                    if all(self._stamp(path) == stamp for path, stamp in map(_outside, outside)):
-                        return [_finding(file, values) for values in findings]
-        except (OsimliteError, ValueError, TypeError, RecursionError):
+                case {"key": str(kept), "text": [*text], "outside": [*outside], "findings": [*findings], **rest}:
+                    stamps = dict(map(_outside, outside))
+                    if kept != key or any(self._stamp(path) != stamp for path, stamp in stamps.items()):
+                        return None
+                    known = [_finding(file, values) for values in findings]
+                    now = time_ns()
+                    if rest.get("file") != _own_stamp(file):
+                        if text != text_of(read_file(file)):
+                            return None
+                        self.put(file, key, text, known, stamps, now)
+                    return known
+        except (OsimliteError, OSError, ValueError, TypeError, RecursionError):
             pass
         return None
 
-    def put(self, file: str, key: str, findings: Iterable[Finding], outside: Iterable[str]) -> None:
-        """Keep the findings in a file; `outside` are the paths at which the check looked for something."""
+    def put(
+        self, file: str, key: str, text: list[object], findings: Iterable[Finding], outside: Iterable[str], since: int
+    ) -> None:
+        """Keep what was found.
+
+        Args:
+            file: its path.
+            key: what the entry holds for.
+            text: the text that was checked.
+            findings: in it.
+            outside: the paths at which the check looked for something.
+            since: when the check began, ns.
+        """
         place = self._entry(file)
         try:
             # Making the folder changes the one around it, whose time may be noted.
             self._prepare(place.parent)
             entry = {
                 "key": key,
+                "file": _stamp_since(file, since),
+                "text": text,
                 "outside": [(path, self._stamp(path)) for path in outside],
                 "findings": [_values(finding) for finding in findings],
             }
@@ -100,14 +124,31 @@ def folder_for(settings_file: Path | None) -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "osimlite"
 
 
-def key_of(data: bytes, file: str, config: Config) -> str:
-    """What an entry holds for: the text, its path as it was given, the configuration, and the code that checks."""
+def key_of(file: str, config: Config) -> str:
+    """What an entry holds for: the path as it was given, the configuration, and the code that checks."""
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (_code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds)
-    digest = blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16)
-    digest.update(data)
-    return digest.hexdigest()
+    return blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16).hexdigest()
+
+
+def text_of(data: bytes) -> list[object]:
+    """What tells a text from that of an earlier day: its size and its sum."""
+    return [len(data), crc32(data)]
+
+
+def _own_stamp(file: str) -> list[int]:
+    """What is another when a file has changed: its times, its size, and where it is on the disk."""
+    found = os.stat(file)
+    return [found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino]
+
+
+def _stamp_since(file: str, moment: int) -> list[int] | None:
+    """The stamp of a file, None if it may have changed after a moment (ns): clocks of file systems tick slowly."""
+    stamp = _own_stamp(file)
+    changed = max(stamp[:2])
+    tick = 100_000_000 if changed % 1_000_000_000 else 2_000_000_000
+    return stamp if changed + tick < moment else None
 
 
 @cache

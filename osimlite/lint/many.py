@@ -7,11 +7,12 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from time import time_ns
 from typing import NamedTuple
 
 from osimlite.errors import MissingFileError
-from osimlite.files import read_file, read_standard_input
-from osimlite.lint.cache import Cache, folder_for, key_of
+from osimlite.files import read_standard_input
+from osimlite.lint.cache import Cache, folder_for, key_of, text_of
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.settings import Settings, settings_for
@@ -65,7 +66,7 @@ def check_files(
         known = None
         if job.kept_in is not None:
             kept = caches.setdefault(job.kept_in, Cache(job.kept_in))
-            known = kept.get(file, key_of(_read(file), file, config))
+            known = kept.get(file, key_of(file, config))
         if known is None:
             jobs.append(job)
         else:
@@ -140,13 +141,15 @@ def check_one(job: Job) -> list[Finding]:
     from osimlite.document.reader import collector_paused
     from osimlite.lint.engine import run, subject_of
 
+    began = time_ns()
     with collector_paused():
         subject = subject_of(job.file, job.config)
         findings = run(subject).findings
         outside = subject.outside() if job.kept_in is not None else None
         if job.kept_in is not None and outside is not None:
             # A file that changes while it is checked must not be taken for one that was checked after.
-            Cache(job.kept_in).put(job.file, key_of(subject.data, job.file, job.config), findings, outside)
+            key, text = key_of(job.file, job.config), text_of(subject.data)
+            Cache(job.kept_in).put(job.file, key, text, findings, outside, began)
     return findings
 
 
@@ -157,11 +160,3 @@ def _standard_input(config: Config, texts: dict[str, str]) -> list[Finding]:
     source = Source(read_standard_input(), "<stdin>")
     texts["<stdin>"] = source.text
     return check_source(source, config).findings
-
-
-def _read(file: str) -> bytes:
-    try:
-        return read_file(file)
-    except MissingFileError:
-        # Whoever checks the file says what is wrong.
-        return b""

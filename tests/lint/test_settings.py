@@ -52,7 +52,7 @@ def test_thresholds_of_a_project_move_what_is_found(tmp_path):
     assert validate(Source(TEXT.encode()), config=config).codes == {"OSIM101": 1}
     own = settings_for(tmp_path).config_for(tmp_path / "x.osim", Config(thresholds={"largest-gravity": 5}))
     assert validate(Source(TEXT.encode()), config=own).codes == {"OSIM505": 1, "OSIM101": 1}
-    assert key_of(b"", "x.osim", config) != key_of(b"", "x.osim", own) != key_of(b"", "x.osim", Config())
+    assert key_of("x.osim", config) != key_of("x.osim", own) != key_of("x.osim", Config())
 
 
 @pytest.mark.parametrize("rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code)
