@@ -19,7 +19,8 @@ def short_path(subject: Subject, found: Found) -> None:
     """A path has fewer than two points.
 
     ## What it does
-    Reports geometry paths with no point, or with one, and muscles and springs without a path.
+    Reports geometry paths with no point, or with one, muscles and springs without a path, and a
+    Scholz2015GeometryPath that begins or ends with an obstacle.
 
     ## Why is this bad
     OpenSim refuses the model.
@@ -62,8 +63,19 @@ def short_path(subject: Subject, found: Found) -> None:
             found(f"the path of {called(owner)} has {times(len(points), 'point')} and needs two", path)
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
             found(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
+    for path in subject.named("Scholz2015GeometryPath"):
+        elements = path.path_elements
+        count = sum(item.tag == _CABLE_POINT for item in elements)
+        owner = subject.tree.parent_of(path)
+        if count < 2:
+            found(f"the path of {called(owner)} has {times(count, 'point')} and needs two", path)
+            continue
+        for item, end in ((elements[0], "begins"), (elements[-1], "ends")):
+            if item.tag != _CABLE_POINT:
+                found(f"the path of {called(owner)} {end} with an obstacle, and OpenSim refuses the model", item)
 
 
+_CABLE_POINT = "Scholz2015GeometryPathPoint"
 _NOT_READ = frozenset(("unknown-tag", "wrong-name", "wrong-class", "unknown-class", "empty"))
 """What is reported of an element that may have been meant for the path."""
 
