@@ -66,7 +66,7 @@ def short_path(subject: Subject, found: Found) -> None:
     for path in subject.named("Scholz2015GeometryPath"):
         elements = path.path_elements
         count = sum(item.tag == _CABLE_POINT for item in elements)
-        owner = subject.tree.parent_of(path)
+        owner = subject.tree.parent_of(path) or path
         if count < 2:
             found(f"the path of {called(owner)} has {times(count, 'point')} and needs two", path)
             continue
