@@ -169,6 +169,18 @@ class Legacy:
 LEGACY: Final = Legacy()
 
 
+@dataclass(frozen=True, slots=True)
+class NamesOf:
+    """Says of what a property holds names: its words, the names of its objects, the labels of its table.
+
+    Classes such as sets of weights are used for many things; only the property that holds them tells for what. OpenSim
+    refuses a name that leads to nothing, or passes over it.
+    """
+
+    reference: Reference
+    refused: bool = True
+
+
 def note_change(owner: Any) -> None:
     """Tell the model that a changed object or list was last seen in that its index is out of date.
 

@@ -6,11 +6,13 @@ properties look a bare name up in one set, and nothing searches.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from osimlite.schema.base import Component, Object
+from osimlite.schema.states import variables
 
 if TYPE_CHECKING:
     from osimlite.schema.tree import Tree
@@ -121,10 +123,20 @@ def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Ca
     return rule
 
 
-def _state_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """The component that has the state or the control: the path of a state goes on with its name."""
-    whole = _model_path(tree, text, owner, "Component")
-    return _model_path(tree, text.rpartition("/")[0], owner, "Component") if whole.target is None else whole
+def _variable(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    """The name of a state, a control or a generalized force."""
+    found = variables(tree, target).get(text)
+    return Resolution(found, None if found is not None else "missing" if text else "empty")
+
+
+def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    """A regular expression that the whole name of one at least must match."""
+    try:
+        pattern = re.compile(text)
+    except re.error:
+        return Resolution(None, "illegal")
+    found = next((item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None)
+    return Resolution(found, None if found is not None else "missing")
 
 
 def nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
@@ -161,7 +173,8 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "input-folder": nothing_to_resolve,
     "output-folder": nothing_to_resolve,
     "column": nothing_to_resolve,
-    "state-path": _state_path,
+    "state-path": _variable,
+    "pattern": _pattern,
     "external-force-name": nothing_to_resolve,
     "positional": nothing_to_resolve,
     "point-index": nothing_to_resolve,

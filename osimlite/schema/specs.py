@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from osimlite.schema.fields import Held, Kind, Legacy, ObjectList, Reference, Tag, Value, class_in
+from osimlite.schema.fields import Held, Kind, Legacy, NamesOf, ObjectList, Reference, Tag, Value, class_in
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
@@ -17,7 +17,8 @@ class FieldSpec(NamedTuple):
     """One property of a class as the reader, the printer and the linter see it.
 
     `name` is the Python attribute, `tag` the XML element, `accepts` the class of the objects held (None for text).
-    `factory` makes the default value of an object property; `default` is the value of the others.
+    `factory` makes the default value of an object property; `default` is the value of the others. `names` says what the
+    words, objects or columns in it are names of, where that is not said by their class.
     """
 
     name: str
@@ -27,6 +28,7 @@ class FieldSpec(NamedTuple):
     default: Any
     factory: Any
     declared_in: type[Object]
+    names: NamesOf | None = None
 
     @property
     def legacy(self) -> bool:
@@ -50,7 +52,8 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
         tag = next((item.text for item in info.metadata if isinstance(item, Tag)), tag)
         declared = next(base for base in reversed(cls.__mro__) if name in getattr(base, "__annotations__", {}))
         default = info.default if info.default_factory is None else None
-        specs.append(FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared))
+        names = next((item for item in info.metadata if isinstance(item, NamesOf)), None)
+        specs.append(FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared, names))
     specs.sort(key=lambda spec: spec.legacy)
     return {spec.tag: spec for spec in specs}
 
@@ -98,6 +101,12 @@ def lineage(cls: type[Object]) -> tuple[str, ...]:
 def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that name other components."""
     return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Reference))
+
+
+@cache
+def naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+    """The properties of `cls` that say what the words, objects or columns in them are names of."""
+    return tuple(spec for spec in field_specs(cls).values() if spec.names is not None)
 
 
 @cache

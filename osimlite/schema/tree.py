@@ -337,7 +337,8 @@ class Tree:
             return Resolution(None, "illegal")
         return self._typed(self.by_path.get(path), target)
 
-    def _named(self, key: str, members: Callable[[], Iterator[tuple[str, Component]]]) -> dict[str, Component]:
+    def named(self, key: str, members: Callable[[], Iterator[tuple[str, Component]]]) -> dict[str, Component]:
+        """Components by name, of equal names the first; made once for each `key`."""
         if key not in self._names:
             names: dict[str, Component] = {}
             for name, component in members():
@@ -347,7 +348,7 @@ class Tree:
 
     def of_class(self, target: str) -> dict[str, Component]:
         """The components of a class by name, of equal names the first."""
-        return self._named(target, lambda: ((last_name(self._paths[id(c)]), c) for c in self._all_of(target)))
+        return self.named(target, lambda: ((last_name(self._paths[id(c)]), c) for c in self._all_of(target)))
 
     def _all_of(self, target: str) -> list[Component]:
         """The components of a class."""
@@ -364,7 +365,7 @@ class Tree:
                 if is_a(component, target):
                     yield last_name(self._paths[id(component)]), component
 
-        return self._named(f"{path}:{target}", below)
+        return self.named(f"{path}:{target}", below)
 
 
 @cache

@@ -19,10 +19,14 @@ from osimlite.schema.fields import (
     word,
 )
 from osimlite.schema.moco.parts import (
+    ControlWeights,
     MocoConstraintInfo,
     MocoParameter,
     MocoScaleFactor,
     MocoWeightSet,
+    PatternOfControls,
+    StatePattern,
+    StateWeights,
     Strings,
 )
 from osimlite.schema.references import Named, Names
@@ -87,9 +91,11 @@ class MocoInitialVelocityEquilibriumDGFGoal(MocoGoal):
 class MocoControlGoal(MocoGoal):
     """Controls, each to a power, over the motion."""
 
-    control_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="control_weights")
+    control_weights: ControlWeights = made(MocoWeightSet, name="control_weights")
     """Weights by paths of controls."""
-    control_weights_pattern: Single[MocoWeightSet] = made(MocoWeightSet, name="control_weights_pattern")
+    control_weights_pattern: Annotated[Single[MocoWeightSet], PatternOfControls] = made(
+        MocoWeightSet, name="control_weights_pattern"
+    )
     """Weights by patterns of paths, for controls that have none by path."""
     exponent: Integer = 2
     """The power, at least two."""
@@ -102,9 +108,9 @@ class MocoControlGoal(MocoGoal):
 class MocoSumSquaredStateGoal(MocoGoal):
     """Squares of states over the motion."""
 
-    state_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="state_weights")
+    state_weights: StateWeights = made(MocoWeightSet, name="state_weights")
     """Weights by paths of states."""
-    pattern: Annotated[str | None, Value("string", "optional")] = None
+    pattern: StatePattern = None
     """A regular expression; only states whose paths match it count."""
 
 

@@ -3,12 +3,33 @@
 from typing import Annotated
 
 from osimlite.schema.base import Component, Object, made, none
-from osimlite.schema.fields import LegacyMany, Many, Number, Reals, Reference, Text, Unnamed, Value, reals
+from osimlite.schema.fields import (
+    LegacyMany,
+    Many,
+    NamesOf,
+    Number,
+    Reals,
+    Reference,
+    Single,
+    Text,
+    Unnamed,
+    Value,
+    reals,
+)
 from osimlite.schema.references import Names
 from osimlite.schema.sets import ObjectGroup
 
 Bounds = Annotated[Reals, reals(most=2)]
 Strings = Annotated[tuple[str, ...], Value("string", "list")]
+OfStates = NamesOf(Reference("state-path", "state variable"))
+OfControls = NamesOf(Reference("state-path", "control"))
+OfFrames = NamesOf(Reference("model-path", "Frame"), refused=False)
+OfMarkers = NamesOf(Reference("marker-name", "Marker"), refused=False)
+OfForces = NamesOf(Reference("state-path", "generalized force"))
+PatternOfStates = NamesOf(Reference("pattern", "state variable"), refused=False)
+PatternOfControls = NamesOf(Reference("pattern", "control"), refused=False)
+PatternOfForces = NamesOf(Reference("pattern", "generalized force"), refused=False)
+StatePattern = Annotated[str | None, Value("string", "optional"), PatternOfStates]
 
 
 class MocoBounds(Object):
@@ -40,6 +61,12 @@ class MocoWeightSet(Object):
     """The weights; what has none counts one."""
     groups: LegacyMany[ObjectGroup] = none()
     """Named selections of the weights; Moco ignores them."""
+
+
+StateWeights = Annotated[Single[MocoWeightSet], OfStates]
+ControlWeights = Annotated[Single[MocoWeightSet], OfControls]
+FrameWeights = Annotated[Single[MocoWeightSet], OfFrames]
+MarkerWeights = Annotated[Single[MocoWeightSet], OfMarkers]
 
 
 class MocoConstraintInfo(Object):

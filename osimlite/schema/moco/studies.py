@@ -20,12 +20,20 @@ from osimlite.schema.fields import (
 )
 from osimlite.schema.moco.goals import MocoGoal
 from osimlite.schema.moco.parts import (
+    ControlWeights,
+    MarkerWeights,
     MocoBounds,
     MocoFinalBounds,
     MocoInitialBounds,
     MocoParameter,
     MocoVariableInfo,
     MocoWeightSet,
+    OfControls,
+    OfMarkers,
+    OfStates,
+    PatternOfControls,
+    PatternOfStates,
+    StateWeights,
 )
 from osimlite.schema.moco.path_constraints import MocoPathConstraint
 from osimlite.schema.model import Model
@@ -48,13 +56,13 @@ class MocoPhase(Object):
     """Bounds of speeds that have none of their own."""
     bound_activation_from_excitation: Flag = True
     """Whether activations without bounds have those of their excitations."""
-    state_infos: Many[MocoVariableInfo] = none()
+    state_infos: Annotated[Many[MocoVariableInfo], OfStates] = none()
     """Bounds of states by path."""
-    state_infos_pattern: Many[MocoVariableInfo] = none()
+    state_infos_pattern: Annotated[Many[MocoVariableInfo], PatternOfStates] = none()
     """Bounds of states by patterns of paths."""
-    control_infos: Many[MocoVariableInfo] = none()
+    control_infos: Annotated[Many[MocoVariableInfo], OfControls] = none()
     """Bounds of controls by path."""
-    control_infos_pattern: Many[MocoVariableInfo] = none()
+    control_infos_pattern: Annotated[Many[MocoVariableInfo], PatternOfControls] = none()
     """Bounds of controls by patterns of paths."""
     input_control_infos: Many[MocoVariableInfo] = none()
     """Bounds of inputs of controllers by path."""
@@ -212,7 +220,7 @@ class MocoTool(Object, abstract=True):
 class MocoInverse(MocoTool):
     """Finds controls of muscles for a motion that is given exactly."""
 
-    kinematics: Single[TableProcessor] = made(TableProcessor, name="kinematics")
+    kinematics: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="kinematics")
     """The motion."""
     kinematics_allow_extra_columns: Flag = False
     """Whether the table may have columns that are no states."""
@@ -233,21 +241,21 @@ class MocoInverse(MocoTool):
 class MocoTrack(MocoTool):
     """Finds a motion that follows measured states or markers."""
 
-    states_reference: Single[TableProcessor] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
     """How much deviations of states count."""
-    states_weight_set: Single[MocoWeightSet] = made(MocoWeightSet, name="states_weight_set")
+    states_weight_set: StateWeights = made(MocoWeightSet, name="states_weight_set")
     """Weights by paths of states."""
     scale_state_weights_with_range: Flag = False
     """Whether deviations are divided by the ranges of the coordinates."""
     track_reference_position_derivatives: Flag = False
     """Whether speeds are followed that are derivatives of the measured values."""
-    markers_reference: Single[TableProcessor] = made(TableProcessor, name="markers_reference")
+    markers_reference: Annotated[Single[TableProcessor], OfMarkers] = made(TableProcessor, name="markers_reference")
     """Markers to follow."""
     markers_global_tracking_weight: Number = 1.0
     """How much deviations of markers count."""
-    markers_weight_set: Single[MocoWeightSet] = made(MocoWeightSet, name="markers_weight_set")
+    markers_weight_set: MarkerWeights = made(MocoWeightSet, name="markers_weight_set")
     """Weights by names of markers."""
     allow_unused_references: Flag = False
     """Whether tables may have columns that the model has not."""
@@ -259,5 +267,5 @@ class MocoTrack(MocoTool):
     """Whether squares of controls are a cost."""
     control_effort_weight: Number = 0.001
     """How much that cost counts."""
-    controls_weight_set: Single[MocoWeightSet] = made(MocoWeightSet, name="controls_weight_set")
+    controls_weight_set: ControlWeights = made(MocoWeightSet, name="controls_weight_set")
     """Weights by paths of controls."""

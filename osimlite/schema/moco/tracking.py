@@ -8,6 +8,7 @@ from osimlite.schema.fields import (
     Integer,
     Many,
     MaybeFlag,
+    NamesOf,
     Optional,
     Reference,
     Single,
@@ -17,7 +18,18 @@ from osimlite.schema.fields import (
     word,
 )
 from osimlite.schema.moco.goals import ContactForcePaths, FramePaths, MocoGoal
-from osimlite.schema.moco.parts import MocoWeightSet
+from osimlite.schema.moco.parts import (
+    ControlWeights,
+    FrameWeights,
+    MocoWeightSet,
+    OfControls,
+    OfForces,
+    OfMarkers,
+    OfStates,
+    PatternOfForces,
+    StatePattern,
+    StateWeights,
+)
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.schema.references import InputTable, Names, reads
 from osimlite.schema.tools.inverse_kinematics import MarkersReference
@@ -31,11 +43,11 @@ ExternalForceName = Annotated[str, Reference("external-force-name", "ExternalFor
 class MocoStateTrackingGoal(MocoGoal):
     """States follow a table."""
 
-    reference: Single[TableProcessor] = made(TableProcessor, name="reference")
+    reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="reference")
     """The table, a column for each state by its path."""
-    state_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="state_weights")
+    state_weights: StateWeights = made(MocoWeightSet, name="state_weights")
     """Weights by paths of states."""
-    pattern: Annotated[str | None, Value("string", "optional")] = None
+    pattern: StatePattern = None
     """A regular expression; only states whose paths match it count."""
     allow_unused_references: Flag = False
     """Whether the table may have columns that are no states."""
@@ -53,13 +65,13 @@ class MocoControlTrackingGoalReference(Object):
 class MocoControlTrackingGoal(MocoGoal):
     """Controls follow a table."""
 
-    reference: Single[TableProcessor] = made(TableProcessor, name="reference")
+    reference: Annotated[Single[TableProcessor], OfControls] = made(TableProcessor, name="reference")
     """The table, a column for each control."""
     allow_unused_references: Flag = False
     """Whether the table may have columns that are no controls."""
-    control_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="control_weights")
+    control_weights: ControlWeights = made(MocoWeightSet, name="control_weights")
     """Weights by paths of controls."""
-    reference_labels: Many[MocoControlTrackingGoalReference] = none()
+    reference_labels: Annotated[Many[MocoControlTrackingGoalReference], OfControls] = none()
     """Columns for controls that are not followed by a column of their own path."""
     ignore_controlled_actuators: Flag = False
     """Whether controls that controllers of the model set are left out."""
@@ -70,7 +82,7 @@ class MocoControlTrackingGoal(MocoGoal):
 class MocoMarkerTrackingGoal(MocoGoal):
     """Markers follow measured ones."""
 
-    markers_reference: Single[MarkersReference] = made(MarkersReference, name="markers_reference")
+    markers_reference: Annotated[Single[MarkersReference], OfMarkers] = made(MarkersReference, name="markers_reference")
     """The measured markers and their weights."""
     allow_unused_references: Flag = False
     """Whether there may be measured markers that the model has not."""
@@ -79,39 +91,39 @@ class MocoMarkerTrackingGoal(MocoGoal):
 class MocoTranslationTrackingGoal(MocoGoal):
     """Origins of frames follow given places."""
 
-    states_reference: Single[TableProcessor] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
     """A motion of the model, from which the places are computed."""
     translation_reference_file: InputTable = ""
     """The places themselves, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    translation_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="translation_weights")
+    translation_weights: FrameWeights = made(MocoWeightSet, name="translation_weights")
     """Weights by paths of frames."""
 
 
 class MocoOrientationTrackingGoal(MocoGoal):
     """Frames follow given orientations."""
 
-    states_reference: Single[TableProcessor] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
     """A motion of the model, from which the orientations are computed."""
     rotation_reference_file: InputTable = ""
     """The orientations themselves, a column of quaternions for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    rotation_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="rotation_weights")
+    rotation_weights: FrameWeights = made(MocoWeightSet, name="rotation_weights")
     """Weights by paths of frames."""
 
 
 class MocoAngularVelocityTrackingGoal(MocoGoal):
     """Frames follow given angular velocities."""
 
-    states_reference: Single[TableProcessor] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
     """A motion of the model, from which the angular velocities are computed."""
     angular_velocity_reference_file: InputTable = ""
     """The angular velocities themselves, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    angular_velocity_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="angular_velocity_weights")
+    angular_velocity_weights: FrameWeights = made(MocoWeightSet, name="angular_velocity_weights")
     """Weights by paths of frames."""
 
 
@@ -122,7 +134,7 @@ class MocoAccelerationTrackingGoal(MocoGoal):
     """The accelerations, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    acceleration_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="acceleration_weights")
+    acceleration_weights: FrameWeights = made(MocoWeightSet, name="acceleration_weights")
     """Weights by paths of frames."""
     gravity_offset: Flag = False
     """Whether gravity is taken from the accelerations of the model, as accelerometers measure."""
@@ -133,13 +145,19 @@ class MocoAccelerationTrackingGoal(MocoGoal):
 class MocoGeneralizedForceTrackingGoal(MocoGoal):
     """Generalized forces follow a table."""
 
-    reference: Single[TableProcessor] = made(TableProcessor, name="reference")
+    reference: Annotated[Single[TableProcessor], OfForces] = made(TableProcessor, name="reference")
     """The table, a column for each coordinate with the ending _moment or _force."""
-    force_paths: Annotated[Names, Reference("model-path", "Force", "list", required=False)] = ()
+    force_paths: Annotated[
+        Names,
+        Reference("model-path", "Force", "list", required=False),
+        NamesOf(Reference("pattern", "Force"), refused=False),
+    ] = ()
     """Paths or patterns of the forces that are added up."""
-    generalized_force_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="generalized_force_weights")
+    generalized_force_weights: Annotated[Single[MocoWeightSet], OfForces] = made(
+        MocoWeightSet, name="generalized_force_weights"
+    )
     """Weights by names of generalized forces."""
-    generalized_force_weights_pattern: Single[MocoWeightSet] = made(
+    generalized_force_weights_pattern: Annotated[Single[MocoWeightSet], PatternOfForces] = made(
         MocoWeightSet, name="generalized_force_weights_pattern"
     )
     """Weights by patterns of names."""

@@ -1,0 +1,92 @@
+"""The variables of a model as tables, studies and Moco call them: states, controls, generalized forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from osimlite.schema.base import Component
+from osimlite.schema.specs import lineage
+
+if TYPE_CHECKING:
+    from osimlite.schema.joints import Joint, MotionType
+    from osimlite.schema.tree import Tree
+
+_STATES: Final = {
+    "ActivationCoordinateActuator": "activation",
+    "ActivationFiberLengthMuscle": "activation fiber_length",
+    "ActivationFiberLengthMuscle_Deprecated": "activation fiber_length",
+    "BushingForce": "dissipated_energy",
+    "ClutchedPathSpring": "stretch",
+    "Coordinate": "value speed",
+    "CoordinateLimitForce": "dissipatedEnergy",
+    "DeGrooteFregly2016Muscle": "activation normalized_tendon_force",
+    "Delp1990Muscle_Deprecated": "activation fiber_length fiber_velocity",
+    "MeyerFregly2016Muscle": "activation",
+    "Millard2012AccelerationMuscle": "activation fiber_length fiber_velocity",
+    "Millard2012EquilibriumMuscle": "activation fiber_length",
+}
+"""The states that OpenSim 4.6 gives the components of a class."""
+_WITHOUT: Final = {
+    "ignore_activation_dynamics": ("activation",),
+    "ignore_tendon_compliance": ("fiber_length", "normalized_tendon_force"),
+}
+"""The states that a component has not if this property is true."""
+
+
+def states_of(component: Component) -> list[str]:
+    """The names of the state variables of one component, in OpenSim's order."""
+    own = next((_STATES[name] for name in lineage(type(component)) if name in _STATES), "").split()
+    if getattr(component, "compute_dissipation_energy", True) is False:
+        return []
+    gone = {name for flag, names in _WITHOUT.items() if getattr(component, flag, False) for name in names}
+    return [name for name in own if name not in gone]
+
+
+def motions_of(joint: Joint) -> dict[str, MotionType]:
+    """How the joint moves with each of its coordinates, by their names.
+
+    A coordinate of a CustomJoint is rotational or translational if it drives an axis with a slope of 1 or -1.
+    """
+    names = [coordinate.name for coordinate in joint.coordinates]
+    if joint.motion_types is not None:
+        return dict(zip(names, joint.motion_types, strict=False))
+    found: dict[str, MotionType] = dict.fromkeys(names, "coupled")
+    transform: Any = getattr(joint, "spatial_transform", None)
+    for number in range(6) if transform is not None else ():
+        axis = getattr(transform, f"rotation{number + 1}" if number < 3 else f"translation{number - 2}")
+        if "LinearFunction" in lineage(type(axis.function)) and abs(axis.function.coefficients[0]) == 1.0:
+            found |= dict.fromkeys(map(str, axis.coordinates), "rotational" if number < 3 else "translational")
+    return found
+
+
+def variables(tree: Tree, kind: str) -> dict[str, Component]:
+    """The components of a model by the names of their variables.
+
+    Args:
+        tree: that of the model.
+        kind: ``state variable``, ``control``, ``state or control variable`` or ``generalized force``; of a class of
+            components their paths.
+    """
+    return tree.named(f"variables: {kind}", lambda: _variables(tree, kind))
+
+
+def _variables(tree: Tree, kind: str) -> Any:
+    for component in tree.components:
+        path = tree.path_of(component)
+        classes = lineage(type(component))
+        if kind.startswith("state"):
+            yield from ((f"{path}/{name}", component) for name in states_of(component))
+        if kind.endswith(("control", "control variable")) and "Actuator" in classes:
+            # A body actuator has one control for each component of torque and force.
+            yield from (
+                ((f"{path}_{number}", component) for number in range(6))
+                if "BodyActuator" in classes
+                else ((path, component),)
+            )
+        if kind == "generalized force" and "Joint" in classes:
+            motions = motions_of(component)
+            for coordinate in component.coordinates:
+                ending = "moment" if motions[coordinate.name] == "rotational" else "force"
+                yield f"{coordinate.name}_{ending}", coordinate
+        if kind in classes:
+            yield path, component
