@@ -76,6 +76,7 @@ _MODULES = (
     "setup_columns",
     "setup_times",
     "setup_tools",
+    "moco",
 )
 
 

@@ -21,8 +21,9 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_table
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Reference
-from osimlite.schema.specs import FieldSpec, name_spec, reference_specs
+from osimlite.schema.fields import NamesOf, Reference
+from osimlite.schema.model import Model
+from osimlite.schema.specs import FieldSpec, member_specs, name_spec, naming_specs, reference_specs
 from osimlite.schema.tree import Tree, Use
 
 NOTHING = ("", "unassigned")
@@ -183,19 +184,40 @@ class Setup(Subject):
     @cached_property
     def tree(self) -> Tree | None:  # type: ignore[override]
         """The component tree of the model that the tool works on; None if there is none to be read."""
-        return None if self.model_file is None else tree_at(self.model_file)
+        if self.model_file is not None:
+            return tree_at(self.model_file)
+        # A study may hold its model itself.
+        models = (
+            [item for item in self.tool[1].walk() if isinstance(item, Model) and item._index]
+            if self.tool is not None
+            else []
+        )
+        return Tree(models[0]) if models else None
 
     @cached_property
     def uses(self) -> list[Use]:
         """Every name that stands in the document, of a component or of something else."""
         found: list[Use] = []
+        named: dict[int, NamesOf | None] = {}
+        inside: set[int] = set()
         for item in self.items:
             cls = type(item)
             # What is named in a setup is looked up in the model: nothing in the document owns it.
             owner: Any = item if self.tree is None else self.tree.model
-            if cls.name_reference is not None and item.name:
-                found.append(Use(item, owner, name_spec(cls), item.name))
-            for spec in reference_specs(cls):
+            if id(item) in inside:
+                continue
+            if cls is Model:
+                inside |= set(map(id, item.walk()))
+            names = named.get(id(item))
+            if item.name and (names is not None or cls.name_reference is not None):
+                found.append(Use(item, owner, name_spec(cls, names), item.name))
+            for spec in member_specs(cls):
+                held = getattr(item, spec.name)
+                members = held if isinstance(held, list) else getattr(held, "objects", ())
+                named |= dict.fromkeys(map(id, members), spec.names)
+            for spec in naming_specs(cls):
+                if names is not None and spec.kind.rule == names.reference.rule:  # type: ignore[attr-defined]
+                    spec = spec._replace(kind=names.reference)
                 value = getattr(item, spec.name)
                 if isinstance(value, tuple):
                     found += [Use(item, owner, spec, word, position) for position, word in enumerate(value)]

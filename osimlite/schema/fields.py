@@ -92,6 +92,8 @@ class Value(Kind):
         exact = self.size if self.size is not None else self.most if self.most == self.least else None
         if exact is not None:
             return f"{exact} {nouns}"
+        if self.most is not None:
+            return f"at most {self.most} {nouns}"
         return f"at least {self.least} {nouns}" if self.least else f"a list of {nouns}"
 
 

@@ -105,15 +105,29 @@ def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 @cache
 def naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that say what the words, objects or columns in them are names of."""
-    return tuple(spec for spec in field_specs(cls).values() if spec.names is not None)
+    """The properties of `cls` whose words are names of something, each with the reference as its kind."""
+    return tuple(
+        spec if spec.names is None else spec._replace(kind=spec.names.reference)
+        for spec in field_specs(cls).values()
+        if isinstance(spec.kind, Reference) or (spec.names is not None and isinstance(spec.kind, Value))
+    )
 
 
 @cache
-def name_spec(cls: type[Object]) -> FieldSpec:
-    """The name of a class whose instances bear the name of another component, as a property with tag ``@name``."""
-    assert cls.name_reference is not None
-    return FieldSpec("name", "@name", cls.name_reference, None, "", None, cls)
+def member_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+    """The properties of `cls` that hold objects, or a table, with the names of something."""
+    return tuple(spec for spec in object_specs(cls) if spec.names is not None)
+
+
+@cache
+def name_spec(cls: type[Object], names: NamesOf | None = None) -> FieldSpec:
+    """The name of an object that is the name of something else, as a property with tag ``@name``.
+
+    What it names is said by its class, or by the property that holds it.
+    """
+    reference = cls.name_reference if names is None else names.reference
+    assert reference is not None
+    return FieldSpec("name", "@name", reference, None, "", None, cls, names)
 
 
 @cache

@@ -1,10 +1,11 @@
-"""The variables of a model as tables, studies and Moco call them: states, controls, generalized forces."""
+"""The variables of a model as tables, studies and Moco call them: states, controls, generalized forces, outputs."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
 from osimlite.schema.base import Component
+from osimlite.schema.outputs import outputs_of
 from osimlite.schema.specs import lineage
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def motions_of(joint: Joint) -> dict[str, MotionType]:
     transform: Any = getattr(joint, "spatial_transform", None)
     for number in range(6) if transform is not None else ():
         axis = getattr(transform, f"rotation{number + 1}" if number < 3 else f"translation{number - 2}")
-        if "LinearFunction" in lineage(type(axis.function)) and abs(axis.function.coefficients[0]) == 1.0:
+        if type(axis.function).__name__ == "LinearFunction" and abs(axis.function.coefficients[0]) == 1.0:
             found |= dict.fromkeys(map(str, axis.coordinates), "rotational" if number < 3 else "translational")
     return found
 
@@ -64,8 +65,8 @@ def variables(tree: Tree, kind: str) -> dict[str, Component]:
 
     Args:
         tree: that of the model.
-        kind: ``state variable``, ``control``, ``state or control variable`` or ``generalized force``; of a class of
-            components their paths.
+        kind: ``state variable``, ``control``, ``state or control variable``, ``generalized force`` or ``output``; of a
+            class of components their paths.
     """
     return tree.named(f"variables: {kind}", lambda: _variables(tree, kind))
 
@@ -84,9 +85,12 @@ def _variables(tree: Tree, kind: str) -> Any:
                 else ((path, component),)
             )
         if kind == "generalized force" and "Joint" in classes:
-            motions = motions_of(component)
-            for coordinate in component.coordinates:
+            joint: Any = component
+            motions = motions_of(joint)
+            for coordinate in joint.coordinates:
                 ending = "moment" if motions[coordinate.name] == "rotational" else "force"
                 yield f"{coordinate.name}_{ending}", coordinate
+        if kind == "output":
+            yield from ((f"{path}|{name}", component) for name in outputs_of(type(component)))
         if kind in classes:
             yield path, component

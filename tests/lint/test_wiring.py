@@ -11,9 +11,9 @@ import pytest
 from osimlite.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.axes import axes_refused
-from osimlite.lint.outputs import outputs_of
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint
+from osimlite.schema.outputs import outputs_of
 from osimlite.schema.registry import MODULES
 
 HERE = Path(__file__).resolve().parent

@@ -149,13 +149,17 @@ def unknown_choice(subject: Subject, found: Found) -> None:
                 continue
             for item in items:
                 value = getattr(item, spec.name)
-                if spec.name in item.model_fields_set and value not in choices and not subject.noted(item, spec):
-                    found(
-                        f"{subject.titled(item, spec)} is '{value}'; OpenSim knows {listed(map(str, choices))}",
-                        item,
-                        tag=spec.tag,
-                        suggestion=nearest(str(value), map(str, choices)),
-                    )
+                if spec.name not in item.model_fields_set or subject.noted(item, spec):
+                    continue
+                for word in value if isinstance(value, tuple) else (value,):
+                    if word not in choices:
+                        found(
+                            f"{subject.titled(item, spec)} is '{word}'; OpenSim knows {listed(map(str, choices))}",
+                            item,
+                            tag=spec.tag,
+                            word=str(word) if isinstance(value, tuple) else None,
+                            suggestion=nearest(str(word), map(str, choices)),
+                        )
 
 
 class Verdict(NamedTuple):
@@ -221,12 +225,7 @@ def _report_domain(subject: Subject, found: Found, item: Object, spec: FieldSpec
         found(f"{subject.titled(item, spec)} is not given and has no default: {verdict.fate}", item, tag=spec.tag)
         return
     size = quantity(value, spec.kind.unit) if given else f"not given, so {quantity(value, spec.kind.unit)}"
-    wanted = (
-        verdict.domain.replace(">= 0", "0 or more")
-        .replace("> 0", "more than 0")
-        .replace("> 1", "more than 1")
-        .replace("!=", "other than")
-    )
+    wanted = re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain).replace(">", "more than").replace("!=", "other than")
     fate = f": {verdict.fate}" if verdict.fate else ""
     found(
         f"{subject.titled(item, spec)} is {size}, it should be {wanted}{fate}",

@@ -9,6 +9,7 @@ from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Unknown
 from osimlite.schema.fields import Reference
+from osimlite.schema.states import variables
 
 _IN_MODEL = {
     "coordinate-name": "coordinate",
@@ -19,8 +20,11 @@ _IN_MODEL = {
     "muscle-name": "muscle",
     "marker-name": "marker",
     "frame-path-or-body-name": "frame",
+    "model-path": "",
+    "state-path": "",
+    "pattern": "",
 }
-"""The rules of references that lead into the model, with what they lead to."""
+"""The rules of references that lead into the model, with what they lead to if that is not said by the reference."""
 _WORDS = {
     "bodies": {"all", "center_of_mass"},
     "body_names": {"all", "center_of_mass"},
@@ -61,11 +65,12 @@ def unknown_name(setup: Setup, found: Found) -> None:
 
     ## What it does
     Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that a setup reads, names
-    in the model of the tool, with the sets of forces and markers that the tool adds to it.
+    in the model of the tool, with the sets of forces and markers that the tool adds to it. In studies of Moco also
+    states, controls and outputs, by their paths or by patterns of them.
 
     ## Why is this bad
     Most tools refuse the setup, some crash. Tasks of markers, scale factors of bodies, muscles of an analysis that are
-    not there are left out without a word (a warning).
+    not there are left out without a word, and so are patterns that nothing matches (warnings).
 
     ## Example
     ```setup
@@ -99,9 +104,12 @@ def unknown_name(setup: Setup, found: Found) -> None:
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
     model = tree.model
     known: dict[tuple[str, str], set[str]] = {}
+    off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
     for use in setup.uses:
         item, kind, tag, text = use.holder, use.reference, use.spec.tag, str(use.value).strip()
         what = _IN_MODEL.get(kind.rule)
+        if what == "":
+            what = kind.target
         if kind.rule == "socket" and text.startswith(("/bodyset/", "/jointset/")):
             what = "component"
         elif kind.rule == "socket" and is_of(item, "Controller"):
@@ -111,7 +119,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
             continue
         if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):
             continue
-        if not getattr(item, "on", True) or not getattr(item, "apply", True):
+        if id(item) in off or not getattr(item, "on", True) or not getattr(item, "apply", True):
             continue
         reference = kind if kind.rule != "body-name-or-com" else Reference("body-name", "Body")
         if tree.lookup(reference, text, model).target is not None:
@@ -123,12 +131,15 @@ def unknown_name(setup: Setup, found: Found) -> None:
             known[key] = (
                 set()
                 if what == "component"
+                else set(variables(tree, what))
+                if not _IN_MODEL.get(kind.rule)
                 else setup.names_of({"body": "Body", "frame": "Body", "joint": "Joint"}.get(what, kind.target))
             )
         names = known[key]
-        if text in names or text in unknown:
+        if text in names or not unknown.isdisjoint(text.split("/")) or _is_made(setup, text):
             continue
         silent = tag in _SILENT or any(map(partial(is_of, item), _SILENT_CLASSES))
+        silent = not use.spec.names.refused if use.spec.names is not None else silent
         fate = "OpenSim leaves it out" if silent else "OpenSim refuses it"
         more = "; it is written in small letters" if text == "ALL" else ""
         of_name = tag == "@name"
@@ -147,6 +158,14 @@ def unknown_name(setup: Setup, found: Found) -> None:
                     f"the model has no actuator '{name}' for {called(control)}: OpenSim refuses it",
                     control, attribute="name", suggestion=nearest_name(name, sorted(actuators)),
                 )  # fmt: skip
+
+
+def _is_made(setup: Setup, text: str) -> bool:
+    """Whether the operators that a study lets loose on its model may make what has this path."""
+    makes = {type(operator).__name__ for operator in setup.named("ModelOperator")}
+    return ("ModOpAddReserves" in makes and "/reserve_" in text) or (
+        "ModOpReplaceMusclesWithDeGrooteFregly2016" in makes and text.endswith("/normalized_tendon_force")
+    )
 
 
 @rule("OSIM832", "excluded-force", severity=WARNING, mends="unsafe", about="document")

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.fixes import replaced
-from osimlite.lint.outputs import outputs_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, times
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
+from osimlite.schema.outputs import outputs_of
 from osimlite.schema.tree import Use, normalised
 from osimlite.text import nearest
 

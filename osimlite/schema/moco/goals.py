@@ -24,6 +24,9 @@ from osimlite.schema.moco.parts import (
     MocoParameter,
     MocoScaleFactor,
     MocoWeightSet,
+    OfControls,
+    OfOutputs,
+    OfStates,
     PatternOfControls,
     StatePattern,
     StateWeights,
@@ -33,8 +36,9 @@ from osimlite.schema.references import Named, Names
 
 DIRECTIONS = ("positive-x", "positive-y", "positive-z", "negative-x", "negative-y", "negative-z")
 
-OutputPath = Annotated[str, Reference("input", "Output")]
-SecondOutputPath = Annotated[str, Reference("input", "Output", required=False)]
+_MEASURES = tuple(f"{load}-{axis}" for load in ("moment", "force") for axis in "xyz")
+OutputPath = Annotated[str, Reference("input", "Output"), OfOutputs]
+SecondOutputPath = Annotated[str, Reference("input", "Output", required=False), OfOutputs]
 Operation = Annotated[str, word("", "addition", "subtraction", "multiplication", "division")]
 Variable = Annotated[str, Reference("state-path", "state or control variable")]
 FramePath = Annotated[Named, Reference("model-path", "Frame")]
@@ -97,7 +101,7 @@ class MocoControlGoal(MocoGoal):
         MocoWeightSet, name="control_weights_pattern"
     )
     """Weights by patterns of paths, for controls that have none by path."""
-    exponent: Integer = 2
+    exponent: Annotated[int, Value("int", domain=">= 2")] = 2
     """The power, at least two."""
     ignore_controlled_actuators: Flag = False
     """Whether controls that controllers of the model set are left out."""
@@ -139,9 +143,9 @@ class MocoPeriodicityGoalPair(Object):
 class MocoPeriodicityGoal(MocoGoal):
     """A motion that ends as it began."""
 
-    state_pairs: Many[MocoPeriodicityGoalPair] = none()
+    state_pairs: Annotated[Many[MocoPeriodicityGoalPair], OfStates] = none()
     """Pairs of states."""
-    control_pairs: Many[MocoPeriodicityGoalPair] = none()
+    control_pairs: Annotated[Many[MocoPeriodicityGoalPair], OfControls] = none()
     """Pairs of controls."""
 
 
@@ -163,7 +167,7 @@ class MocoJointReactionGoal(MocoGoal):
     """Which of its two frames the load acts on."""
     expressed_in_frame_path: Annotated[Named, Reference("model-path", "Frame", required=False)] = ""
     """The frame along whose axes the load counts; left out, that of `loads_frame`."""
-    reaction_measures: Strings = ()
+    reaction_measures: Annotated[tuple[str, ...], Value("string", "list", choices=_MEASURES)] = ()
     """Components that count, such as force-x or moment-z; left out, all six."""
     reaction_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="reaction_weights")
     """Weights by components."""

@@ -8,6 +8,7 @@ from osimlite.schema.fields import (
     Integer,
     Many,
     MaybeFlag,
+    NamesOf,
     Number,
     Reals,
     Reference,
@@ -96,7 +97,7 @@ class MocoSolver(Object, abstract=True):
 class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     """Makes a problem of many variables of a motion, by values at the nodes of a mesh."""
 
-    num_mesh_intervals: Integer = 100
+    num_mesh_intervals: Annotated[int, Value("int", domain=">= 0")] = 100
     """Number of equal intervals of the mesh."""
     mesh: Annotated[Reals, reals()] = ()
     """Nodes of a mesh of unequal intervals, from 0 to 1."""
@@ -209,7 +210,7 @@ class MocoTool(Object, abstract=True):
     """Where the motion begins; left out, where the data do."""
     final_time: Annotated[float | None, maybe("s")] = None
     """Where the motion ends; left out, where the data do."""
-    mesh_interval: Annotated[float, real("s")] = 0.02
+    mesh_interval: Annotated[float, real("s", "> 0")] = 0.02
     """Length of an interval of the mesh."""
     clip_time_range: Flag = False
     """Whether the times are moved a little into the data."""
@@ -232,7 +233,11 @@ class MocoInverse(MocoTool):
     """How far the optimizer goes."""
     constraint_tolerance: Number = 1e-3
     """How well constraints are met."""
-    output_paths: Annotated[tuple[str, ...], Reference("input", "Output", "list", required=False)] = ()
+    output_paths: Annotated[
+        tuple[str, ...],
+        Reference("input", "Output", "list", required=False),
+        NamesOf(Reference("pattern", "output"), refused=False),
+    ] = ()
     """Outputs that are computed for the solution, as patterns of `path|output`."""
     reserves_weight: Number = 1.0
     """How much reserve actuators cost."""

@@ -12,6 +12,7 @@ from osimlite.schema.fields import (
     LegacyNumber,
     LegacyText,
     LegacyUnnamed,
+    NamesOf,
     Reals,
     Reference,
     Value,
@@ -141,7 +142,11 @@ class MuscleAnalysis(Analysis):
 class OutputReporter(Analysis):
     """Outputs of components."""
 
-    output_paths: Annotated[tuple[str, ...], Reference("input", "Output", "list", required=False)] = ()
+    output_paths: Annotated[
+        tuple[str, ...],
+        Reference("input", "Output", "list", required=False),
+        NamesOf(Reference("state-path", "output")),
+    ] = ()
     """The outputs, each as `path|output`."""
 
 

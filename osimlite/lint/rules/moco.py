@@ -1,0 +1,278 @@
+"""OSIM86x: studies of Moco that OpenSim refuses, or cannot solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import Any
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.words import called, nearest_name
+from osimlite.schema.base import Component, Unknown
+from osimlite.schema.fields import Value
+from osimlite.schema.specs import FieldSpec, field_specs, member_specs
+from osimlite.schema.states import variables
+from osimlite.text import listed
+
+_FILES = ("filepath", "marker_file")
+"""Properties that name the table of a goal."""
+_NEEDED = ("reference", "kinematics")
+"""Tables without which there is nothing to follow."""
+_ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
+"""What lets a table have columns that nothing follows."""
+_REFUSED_JOINTS = ("FreeJoint", "BallJoint", "EllipsoidJoint", "ScapulothoracicJoint")
+
+
+@rule("OSIM861", "impossible-bounds", severity=ERROR, about="document")
+def impossible_bounds(setup: Setup, found: Found) -> None:
+    """Bounds of a study leave no value.
+
+    ## What it does
+    Compares both ends of all bounds, bounds at the start and at the end with those of the whole phase, and the times at
+    which a phase begins and ends. Points out a state or control that has bounds twice.
+
+    ## Why is this bad
+    The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds the last counts,
+    without a word.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MocoPhase name="phase">
+            <state_infos>
+                <MocoVariableInfo name="/jointset/knee/knee_angle/value"> <bounds>0 -2</bounds> </MocoVariableInfo>
+            </state_infos>
+        </MocoPhase>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MocoPhase name="phase">
+            <state_infos>
+                <MocoVariableInfo name="/jointset/knee/knee_angle/value"> <bounds>-2 0</bounds> </MocoVariableInfo>
+            </state_infos>
+        </MocoPhase>
+    </OpenSimDocument>
+    ```
+    """
+    for item in chain.from_iterable(map(setup.named, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))):
+        for tag in ("bounds", "initial_bounds", "final_bounds"):
+            ends: tuple[float, ...] = getattr(item, tag, ())
+            whole: tuple[float, ...] = item.bounds
+            if len(ends) == 2 and ends[0] > ends[1]:
+                found(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
+            elif ends and whole and whole[0] <= whole[-1] and (ends[-1] < whole[0] or ends[0] > whole[-1]):
+                found(
+                    f"{tag} of {called(item)} are outside its bounds from {whole[0]:g} to {whole[-1]:g}: OpenSim fails",
+                    item, tag=tag,
+                )  # fmt: skip
+    for phase in setup.named("MocoPhase"):
+        starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
+        if starts and ends and ends[-1] < starts[0]:
+            found(
+                f"the phase ends at {ends[-1]:g} s at the latest, and begins at {starts[0]:g} s at the earliest",
+                phase.time_final_bounds, tag="bounds",
+            )  # fmt: skip
+        for infos in (phase.state_infos, phase.control_infos, phase.input_control_infos):
+            for info in _repeated(infos):
+                found(
+                    f"'{info.name}' has bounds already: these replace all of them", info, attribute="name",
+                    severity=WARNING,
+                )  # fmt: skip
+
+
+def _repeated(items: list[Any]) -> Iterator[Any]:
+    """The objects with a name that one before has."""
+    names: set[str] = set()
+    for item in items:
+        if item.name in names:
+            yield item
+        names.add(item.name)
+
+
+@rule("OSIM862", "study-data", severity=ERROR, about="document")
+def study_data(setup: Setup, found: Found) -> None:
+    """A table that a study follows, or starts from, does not fit its model.
+
+    ## What it does
+    Looks for tables that are not named, for columns that are no state, control, generalized force or marker of the
+    model, and for states and controls that an initial guess lacks.
+
+    ## Why is this bad
+    OpenSim refuses the study.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MocoStudy name="study">
+            <MocoProblem name="problem">
+                <MocoPhase name="phases">
+                    <ModelProcessor name="model"> <filepath>leg.osim</filepath> </ModelProcessor>
+                    <goals>
+                        <MocoStateTrackingGoal name="follow">
+                            <TableProcessor name="reference"> <filepath>leg.mot</filepath> </TableProcessor>
+                        </MocoStateTrackingGoal>
+                    </goals>
+                </MocoPhase>
+            </MocoProblem>
+        </MocoStudy>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MocoStudy name="study">
+            <MocoProblem name="problem">
+                <MocoPhase name="phases">
+                    <ModelProcessor name="model"> <filepath>leg.osim</filepath> </ModelProcessor>
+                    <goals>
+                        <MocoStateTrackingGoal name="follow">
+                            <TableProcessor name="reference">
+                                <filepath>leg.mot</filepath>
+                                <operators> <TabOpUseAbsoluteStateNames /> </operators>
+                            </TableProcessor>
+                        </MocoStateTrackingGoal>
+                    </goals>
+                </MocoPhase>
+            </MocoProblem>
+        </MocoStudy>
+    </OpenSimDocument>
+    ```
+    """
+    for item in setup.items:
+        for spec in member_specs(type(item)) if getattr(item, "enabled", True) else ():
+            held = getattr(item, spec.name)
+            tag = next((tag for tag in _FILES if hasattr(held, tag)), "")
+            name = getattr(held, tag, "").strip()
+            if not name and spec.tag in _NEEDED and tag:
+                found(f"{called(item)} names no table to follow: OpenSim refuses it", item)
+            allowed = any(getattr(item, flag, False) for flag in _ALLOW)
+            for column in [] if allowed else _strangers(setup, spec, held, name):
+                found(
+                    f"'{name}' has a column '{column}', which is nothing of the model: OpenSim refuses the study",
+                    held, tag=tag,
+                )  # fmt: skip
+    if setup.tree is None or any(setup.named("ModelOperator")):
+        return
+    for item in setup.items:
+        guess = setup.table(getattr(item, "guess_file", ""))
+        if guess is not None and guess.labels:
+            wanted = set(variables(setup.tree, "state or control variable"))
+            wanted |= {parameter.name for parameter in setup.named("MocoParameter")}
+            columns = {
+                column
+                for column in guess.columns
+                if column in wanted or (column.startswith("/") and "/implicitderiv_" not in column)
+            }
+            missing, more = sorted(wanted - columns), sorted(columns - wanted)
+            if missing or more:
+                what = f"lacks {listed(missing)}" if missing else f"has {listed(more)}, which the model has not"
+                found(f"the guess '{item.guess_file}' {what}: OpenSim refuses it", item, tag="guess_file")
+
+
+def _strangers(setup: Setup, spec: FieldSpec, held: Any, name: str) -> list[str]:
+    """The columns of a table that are not what they must be names of."""
+    tree, table = setup.tree, setup.table(name)
+    if tree is None or table is None or Unknown in tree.by_class or any(setup.named("ModelOperator")):
+        return []
+    if any(is_of(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())):
+        return []
+    assert spec.names is not None
+    reference = spec.names.reference
+    return [column for column in table.columns if tree.lookup(reference, column, tree.model).target is None]
+
+
+@rule("OSIM863", "study-parts", severity=ERROR, about="document")
+def study_parts(setup: Setup, found: Found) -> None:
+    """A part of a study has a name or a target that OpenSim refuses.
+
+    ## What it does
+    Looks for goals, constraints and parameters without a name or with that of another, for parameters of properties
+    that a component has not or that are no numbers, for measured forces that the loads have not, and for models with
+    locked coordinates or with joints whose speeds are not the rates of their coordinates.
+
+    ## Why is this bad
+    OpenSim refuses the study.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MocoPhase name="phases">
+            <goals>
+                <MocoFinalTimeGoal name="goal" />
+                <MocoControlGoal name="goal" />
+            </goals>
+        </MocoPhase>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <MocoPhase name="phases">
+            <goals>
+                <MocoFinalTimeGoal name="time" />
+                <MocoControlGoal name="effort" />
+            </goals>
+        </MocoPhase>
+    </OpenSimDocument>
+    ```
+    """
+    for phase in setup.named("MocoPhase"):
+        for parts in (phase.goals, phase.parameters, phase.path_constraints):
+            for part in parts:
+                if not part.name:
+                    found(f"{called(part)} has no name: OpenSim refuses it", part)
+            for part in _repeated([part for part in parts if part.name]):
+                found(f"another is called '{part.name}' already: OpenSim refuses it", part, attribute="name")
+    for goal in setup.items:
+        if hasattr(goal, "contact_groups") and goal.enabled:
+            loads = goal.external_loads or setup.document(goal.external_loads_file)
+            names = [force.name for force in getattr(loads, "objects", ())]
+            for group in goal.contact_groups if names else ():
+                if group.external_force_name not in names:
+                    found(
+                        f"the loads have no force '{group.external_force_name}': OpenSim refuses the goal", group,
+                        tag="external_force_name", suggestion=nearest_name(group.external_force_name, names),
+                    )  # fmt: skip
+    tree = setup.tree
+    if tree is None:
+        return
+    for parameter in setup.named("MocoParameter"):
+        for path in parameter.component_paths:
+            component = tree.walk(str(path), "", "Component").target
+            if component is None or isinstance(component, Unknown):
+                continue
+            fault = _fault_of(parameter, component)
+            if fault:
+                found(
+                    f"{fault}: OpenSim refuses the study", parameter, tag="property_name",
+                    suggestion=nearest_name(parameter.property_name, [*field_specs(type(component))]),
+                )  # fmt: skip
+    welded = {str(path) for operator in setup.named("ModOpReplaceJointsWithWelds") for path in operator.joint_paths}
+    for processor in setup.named("ModelProcessor") if any(map(setup.named, ("MocoStudy", "MocoTool"))) else ():
+        for joint in tree.of_class("Joint").values():
+            faults = [f"{called(item)} is locked" for item in joint.coordinates if getattr(item, "locked", False)]
+            if type(joint).__name__ in _REFUSED_JOINTS:
+                faults.append(f"{called(joint)} has speeds that are not the rates of its coordinates")
+            for fault in faults if tree.path_of(joint) not in welded else ():
+                found(f"{fault}: Moco refuses the model", processor, tag="filepath")
+
+
+def _fault_of(parameter: Any, component: Component) -> str:
+    """What is wrong with the property that a parameter is about, nothing if all is right."""
+    name, element = parameter.property_name, parameter.property_element
+    spec = field_specs(type(component)).get(name)
+    if spec is None:
+        return f"{called(component)} has no property '{name}'"
+    size = spec.kind.size if isinstance(spec.kind, Value) and spec.kind.scalar == "double" else None
+    if size not in (1, 3, 6):
+        return f"{name} of {called(component)} is not one, three or six numbers"
+    if size == 1:
+        return "" if element is None else f"{name} is one number, and wants no property_element"
+    wrong = element is None or not 0 <= element < size
+    return f"property_element must say which of the {size} numbers of {name} is meant" if wrong else ""

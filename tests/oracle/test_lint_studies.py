@@ -1,0 +1,52 @@
+"""Faults in studies of Moco: what the linter calls an error, OpenSim refuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from osimlite.lint import validate
+from tests.lint.setup_faults import FAULTS, SETUPS, STUDIES, Fault, put_in
+
+pytest.importorskip("opensim")
+pytestmark = pytest.mark.oracle
+
+CASES = [fault for fault in [*FAULTS, *STUDIES] if "slide" in fault.file]
+# Of these OpenSim makes a study that it solves, in another way than was meant.
+SOLVED = {310, 313, 317, 324}
+# The optimizer runs for ever.
+ENDLESS = {322}
+PROGRAM = """
+import json, os, sys, opensim
+opensim.Logger.setLevelString("off")
+for folder in sys.argv[1:]:
+    os.chdir(folder)
+    try:
+        said = opensim.MocoStudy("slide.omoco").solve().success()
+    except RuntimeError as error:
+        said = str(error)
+    print("\\n" + json.dumps([folder, said]))
+"""
+
+
+def test_opensim_refuses_the_studies_with_errors(tmp_path: Path) -> None:
+    asked = [Fault("control", "slide.omoco", "", ""), *(fault for fault in CASES if fault.number not in ENDLESS)]
+    for fault in asked:
+        folder = tmp_path / str(fault.number)
+        folder.mkdir()
+        for file in SETUPS.glob("slide*"):
+            (folder / file.name).write_bytes(file.read_bytes())
+        put_in(folder, fault)
+    folders = [str(tmp_path / str(fault.number)) for fault in asked]
+    run = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *folders], capture_output=True, text=True, timeout=120, check=True
+    )
+    said = dict(json.loads(line) for line in run.stdout.splitlines() if line.startswith(f'["{tmp_path}'))
+    assert said.keys() == set(folders)
+    for fault, folder in zip(asked, folders, strict=True):
+        assert (said[folder] is True) == (fault.number in SOLVED | {"control"}), f"{fault.number}: {said[folder]}"
+        assert bool(validate(folder, ignore="OSIM111").findings) == (fault.number != "control"), fault.number
