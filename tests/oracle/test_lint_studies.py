@@ -47,6 +47,6 @@ def test_opensim_refuses_the_studies_with_errors(tmp_path: Path) -> None:
     )
     said = dict(json.loads(line) for line in run.stdout.splitlines() if line.startswith(f'["{tmp_path}'))
     assert said.keys() == set(folders)
-    for fault, folder in zip(asked, folders, strict=True):
-        assert (said[folder] is True) == (fault.number in SOLVED | {"control"}), f"{fault.number}: {said[folder]}"
-        assert bool(validate(folder, ignore="OSIM111").findings) == (fault.number != "control"), fault.number
+    for fault, path in zip(asked, folders, strict=True):
+        assert (said[path] is True) == (fault.number in SOLVED | {"control"}), f"{fault.number}: {said[path]}"
+        assert bool(validate(path, ignore="OSIM111").findings) == (fault.number != "control"), fault.number
