@@ -114,3 +114,12 @@ def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
     assert (finding.code, finding.line, finding.column) == ("OSIM807", 157, 10)
     assert isinstance(table, Table)
     assert (table.span, round(table.step, 9), table.rows.line_of(199)) == ((0.0, 1.99), 0.01, 206)
+
+
+@pytest.mark.parametrize(("times", "severity"), [("0 0.1 0.2 0.2", "info"), ("0 0.1 0.1 0.2", "warning")])
+def test_the_last_row_twice_is_how_opensim_ends_some_results(tmp_path, times, severity):
+    rows = "".join(f"{time} 0.5\n" for time in times.split())
+    file = tmp_path / "states.sto"
+    file.write_text(f"states\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime knee\n{rows}")
+    (finding,) = run(subject_of(str(file))).findings
+    assert (finding.code, str(finding.severity)) == ("OSIM808", severity)

@@ -202,7 +202,8 @@ def time_order(table: Table, found: Found) -> None:
 
     ## Why is this bad
     Of two rows with one time OpenSim keeps the second, without a word; where time goes back the rows before are lost,
-    or the tool stops. A marker file is refused for either. One time twice in a storage file is a warning.
+    or the tool stops. A marker file is refused for either. One time twice in a storage file is a warning, and in the
+    last row an information: so OpenSim ends some of its results.
 
     ## Example
     ```sto
@@ -232,11 +233,12 @@ def time_order(table: Table, found: Found) -> None:
     """
     if not table.is_markers and table.labels and table.labels[0].text.lower() != "time":
         return
+    # OpenSim itself writes the last row of some results twice.
+    last = table.rows.line_of(table.rows.count - 1) if table.rows.count else None
     for fault in table.rows.of("order"):
         time, before = fault.text.split()
         what = f"goes back from {before} to {time}" if fault.number else f"{time} is that of the row before, too"
-        # OpenSim itself writes the last row of some results twice.
-        severity = None if fault.number or table.is_markers else WARNING
+        severity = None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
         at = Position(fault.line, fault.column, fault.length)
         found(f"the time {what}{_more(fault, 'row')}", at=at, severity=severity)
 
