@@ -217,6 +217,17 @@ def test_what_differs_or_is_quickly_read_is_not_folded():
     assert render(report).count("OSIM301") == 9 and "more like this" not in render(report)
 
 
+def test_what_many_files_say_is_folded_too():
+    late = [_finding(9, f"the time 0.{n} in m/s{n}.sto is that of 'a'", file=f"d/m{n}.sto") for n in range(6)]
+    named = [_finding(3, f"no body 'b{n}'", file=f"d/m{n}.sto") for n in range(6)]
+    full = render(Report([*late, *named]))
+    assert full.count("the time") == 1 and "= 5 more in other files: m1.sto, m2.sto, m3.sto and 2 more\n" in full
+    # Of other names each file says something of its own.
+    assert full.count("no body") == 6
+    assert "; 5 more in other files\n" in render(Report(late), "concise")
+    assert render(Report(late[:3])).count("the time") == 3
+
+
 def test_missing_meshes_are_one_finding_of_a_model(tmp_path, monkeypatch):
     from osimlite import Body, Mesh, PinJoint, write
 

@@ -1,57 +1,89 @@
-"""What is alike in a file, for people: one finding stands for all that say the same of other names."""
+"""What is alike, for people: one finding stands for those that say the same, of other names in a file or in others."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Hashable, Iterable
+from typing import NamedTuple, TypeVar
 
 from osimlite.lint.diagnostic import Finding
 from osimlite.text import listed
 
+T = TypeVar("T")
+
 MANY = 4
-"""So many findings that are alike are folded; fewer are as quickly read."""
+"""So many findings that are alike are folded, and so many files that say the same; fewer are as quickly read."""
 
 _ONE_CAUSE = {"OSIM701"}
-"""Rules whose findings in one file are mended together: two are folded already."""
+"""Rules whose findings are mended together: two are folded already."""
 
-# A name in quotes, a number with what is written to it.
-_PARTICULAR = re.compile(r"'[^']*'|(?<![\w])[-+]?[\d.][\w.+-]*")
+# A name in quotes; a number with what is written to it, or a path.
+_NAMES = re.compile(r"'[^']*'")
+_NUMBERS = re.compile(r"(?<!\S)[^\s']*/[^\s']*|(?<!\w)[-+]?[\d.][\w.+-]*")
 
 
 class Fold(NamedTuple):
-    """A finding, and those in the same file that are like it."""
+    """A finding, those in the same file that are like it, and those in other files that say the same."""
 
     first: Finding
     more: list[Finding]
+    elsewhere: list[Finding]
 
     @property
-    def remark(self) -> str:
-        """``91 more like this, on lines 12, 40 and 88 more``, or an empty text if there are none."""
-        if not self.more:
-            return ""
-        lines = list(dict.fromkeys(str(finding.line) for finding in self.more if finding.line is not None))
-        first = f", on line{'s' * (len(lines) > 1)} {listed(lines, most=4)}" if lines else ""
-        return f"{len(self.more)} more like this{first}"
+    def remarks(self) -> list[str]:
+        """``91 more like this, on lines 12, 40 and 88 more``; nothing if there are none."""
+        found = []
+        if self.more:
+            lines = list(dict.fromkeys(str(finding.line) for finding in self.more if finding.line is not None))
+            places = f", on line{'s' * (len(lines) > 1)} {listed(lines, most=4)}" if lines else ""
+            found.append(f"{len(self.more)} more like this{places}")
+        if self.elsewhere:
+            files = dict.fromkeys(os.path.basename(finding.file or "") for finding in self.elsewhere)
+            found.append(f"{len(self.elsewhere)} more in other files: {listed(files, most=3)}")
+        return found
 
 
 def folded(findings: Iterable[Finding], *, everything: bool = False) -> list[Fold]:
     """Findings in their order, those that are alike under the first of them; `everything` folds none."""
-    alike: dict[tuple[object, ...], list[tuple[int, Finding]]] = {}
-    for number, finding in enumerate(findings):
-        words = _PARTICULAR.sub("", finding.message)
-        key = (number,) if everything else (finding.file, finding.code, finding.severity, words)
-        alike.setdefault(key, []).append((number, finding))
-    folds: list[tuple[int, Fold]] = []
-    for group in alike.values():
-        (number, first), more = group[0], [finding for _, finding in group[1:]]
-        if len(group) < (2 if first.code in _ONE_CAUSE else MANY):
-            folds += [(place, Fold(finding, [])) for place, finding in group]
+    every = list(findings)
+    if everything:
+        return [Fold(finding, [], []) for finding in every]
+    parts = [
+        part
+        for group in _grouped(every, lambda finding: (finding.file, *_kind(finding, names=False)))
+        for part in ([group] if len(group) >= _least(group[0]) else [[finding] for finding in group])
+    ]
+    found: list[Fold] = []
+    # What other files say is the same only with the same names, unless there is one cause.
+    for alike in _grouped(parts, lambda part: _kind(part[0], names=part[0].code not in _ONE_CAUSE)):
+        first, *rest = [finding for part in alike for finding in part]
+        if len({part[0].file for part in alike}) < _least(first):
+            found += [Fold(part[0], part[1:], []) for part in alike]
         else:
-            folds.append((number, Fold(first, more)))
-    return [fold for _, fold in sorted(folds, key=lambda each: each[0])]
+            here = [finding for finding in rest if finding.file == first.file]
+            found.append(Fold(first, here, [finding for finding in rest if finding.file != first.file]))
+    place = {id(finding): number for number, finding in enumerate(every)}
+    return sorted(found, key=lambda fold: place[id(fold.first)])
+
+
+def _least(finding: Finding) -> int:
+    return 2 if finding.code in _ONE_CAUSE else MANY
+
+
+def _kind(finding: Finding, *, names: bool) -> tuple[object, ...]:
+    """What findings that are alike have in common: the same words, perhaps with the same names."""
+    words = finding.message if names else _NAMES.sub("", finding.message)
+    return finding.code, finding.severity, _NUMBERS.sub("", words)
+
+
+def _grouped(items: Iterable[T], key: Callable[[T], Hashable]) -> list[list[T]]:
+    groups: dict[Hashable, list[T]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return list(groups.values())
 
 
 def told(folds: Iterable[Fold]) -> str:
     """How to see what is folded, or an empty text if nothing is."""
-    return "--all prints what is folded." if any(fold.more for fold in folds) else ""
+    return "--all prints what is folded." if any(fold.remarks for fold in folds) else ""

@@ -67,8 +67,7 @@ def _block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str
     if finding.component not in ("", "/") and finding.line is not None:
         notes.append((f"in {finding.component}", "dim"))
     margin = " " * len(str(finding.line or ""))
-    if fold.more:
-        notes.append((textwrap.shorten(fold.remark, width - len(margin) - 3, placeholder=" ..."), "strong"))
+    notes += [(textwrap.shorten(it, width - len(margin) - 3, placeholder=" ..."), "strong") for it in fold.remarks]
     for note, style in notes:
         rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(visible(note), style, colour)}")
     return "\n".join(rows)
