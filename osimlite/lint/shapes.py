@@ -66,6 +66,9 @@ MARKERS = _layout(
 )
 """Rows of numbers that end with tabs, which may have nothing between them."""
 
+_AS_NUMBERS = bytes.maketrans(b" \t", b"00")
+_NO_SEPARATORS = bytes(set(range(256)) - set(b" \t\n"))
+
 
 def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
     """What lines look like: a ``0`` for each number, the separators that are kept, and ``!`` where something is wrong.
@@ -99,6 +102,9 @@ def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
         # Before the point must be a digit then: neither point nor sign, and no sign may follow on it.
         digits = (text >> 4 & solid | points | text & ones) ^ (points | text & ones)
         wrong |= last_points ^ (last_points & digits << 8)
+    if layout is ROWS and not wrong and not spaces & behind_space:
+        # One separator between any two numbers: they tell how many there are.
+        return block.translate(_AS_NUMBERS, _NO_SEPARATORS).replace(b"\n", b"0\n"), False
     starts = behind_space & solid
     zeros = 0
     if layout is MARKERS:
