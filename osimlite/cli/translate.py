@@ -68,6 +68,14 @@ def translate(
             rich_help_panel="MJCF",
         ),
     ] = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(
+            help="'wraps' fits what tendons go around to the paths, 'force' muscles too (up to a minute).",
+            show_default="none",
+            rich_help_panel="MJCF",
+        ),
+    ] = None,
 ) -> None:
     """Translate a model: writes its text, its meshes and fidelity.json.
 
@@ -87,7 +95,7 @@ def translate(
             to_urdf,
             {"limits": limits, "merge": merge, "collision": collision, "effort": effort, "velocity": velocity},
         ),
-        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact}),
+        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact, "fit": fit}),
     }
     if to not in formats:
         raise OsimliteError(f"--to is 'urdf' or 'mjcf', not '{to}'")

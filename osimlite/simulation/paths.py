@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,9 +19,10 @@ from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.path import Path as Along
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.paths import LENGTH, SPEED
+from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED
 from osimlite.simulation.kernels.projection import REDUNDANT
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
@@ -51,6 +52,7 @@ class Paths:
 
     Attributes:
         names: component paths of their owners, in the order of the model.
+        routes: what each runs through, in terms of the mechanism, by these names.
         mechanism: of the model.
     """
 
@@ -67,6 +69,7 @@ class Paths:
         elements = [_Measured(name, PATH.read(builder, owner)) for name, owner in zip(self.names, owners, strict=True)]
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
+        self.routes = {element.path: element.along for element in elements}
         self._system = _System(self.mechanism.released(), Forces(tuple(elements)))
 
     def lengths(self, q: Values) -> dict[str, float]:
@@ -83,6 +86,13 @@ class Paths:
         speeds = self._system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
         return dict(zip(self.names, speeds.tolist(), strict=True))
 
+    def points(self, q: Values) -> dict[str, list[tuple[int, Array]]]:
+        """What each path through points runs through, from end to end: numbers, and places (3,) in ground (m).
+
+        Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k and n + 2 k + 1.
+        """
+        return self._system.nodes(self.mechanism.values(q), self.routes)
+
     def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
         """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.
 
@@ -92,14 +102,18 @@ class Paths:
         """
         values = self.mechanism.values(q)
         arms = self._system.pulled(values)
-        arms[self._coupled] = arms[self._coupled] @ self._coupling(values)
+        arms[self._coupled] = arms[self._coupled] @ self.coupling(values)
         return {
             name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if not abs(arm) <= ROUNDING}
             for name, row in zip(self.names, arms.tolist(), strict=True)
         }
 
-    def _coupling(self, q: Array) -> Array:
-        """The generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column."""
+    def coupling(self, q: Values) -> Array:
+        """The generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column.
+
+        NaN where a coordinate cannot move.
+        """
+        q = self.mechanism.values(q)
         constraints = self.mechanism.constraints
         if not constraints:
             return np.eye(len(q))
@@ -174,6 +188,18 @@ class _System(System):
         self.program.code.entry("pull_each")(self.program.ints, self.numbers, self._w, self._y, self._f, forces)
         found = np.zeros((len(self._items), len(q)))
         found[:, self.order] = forces
+        return found
+
+    def nodes(self, q: Array, routes: Mapping[str, Along]) -> dict[str, list[tuple[int, Array]]]:
+        """The nodes that each path through points runs through."""
+        self._evaluated(q, np.zeros(len(q)))
+        found = {}
+        for (name, route), items in zip(routes.items(), self._items, strict=True):
+            if isinstance(route, ThroughPoints):
+                record = self._w[items[-1][0] :]
+                order = record[ORDER : ORDER + int(record[COUNT])].astype(int)
+                work = record[ORDER + len(route.points) + 2 * len(route.surfaces) :]
+                found[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
         return found
 
     def _evaluated(self, q: Array, u: Array) -> None:

@@ -70,10 +70,11 @@ class Group:
         return tuple(record.component for record in self.records)
 
     def worst(self) -> list[tuple[str, Error]]:
-        """The largest error of each quantity and unit."""
+        """The largest error of each quantity and unit, whatever it is about."""
         found: dict[tuple[str, str], Error] = {}
         for record in self.records:
-            for name, error in record.errors.items():
+            for what, error in record.errors.items():
+                name = what.partition(" about ")[0]
                 found[name, error.unit] = max(error, found.get((name, error.unit), error))
         return [(name, error) for (name, _), error in found.items()]
 

@@ -52,7 +52,7 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
     low, high = span(function, info.range, info.default_value)
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
     fit = quartic(function if own == (1.0, 0.0) else Composed(function, Linear(*own)), (first, last), unit)
-    _equality(draft, joint.name, Follower(lead.joint, fit.coefficients))
+    follow(draft, joint.name, Follower(lead.joint, fit.coefficients))
     if fit.error is not None:
         draft.fidelity.add(
             "function",
@@ -80,6 +80,13 @@ def _argument(draft: Draft, place: int) -> Lead:
     return draft.leads[place]
 
 
+def leading(draft: Draft, place: int) -> Lead | None:
+    """The joint that a coordinate is a line of, which is made if it is not there; None if the coordinate is locked."""
+    if draft.mechanism.coordinates[place].locked:
+        return None
+    return draft.leads.get(place) or _argument(draft, place)
+
+
 def _hold(draft: Draft, joint: RobotJoint) -> None:
     """Hold a joint that is a function of several coordinates where the default pose has it."""
     value = joint.value(draft.default_state[0])
@@ -100,10 +107,11 @@ def _hold(draft: Draft, joint: RobotJoint) -> None:
 
 def hold_joint(draft: Draft, joint: str, value: float) -> None:
     """Keep a joint at a value (rad, m)."""
-    _equality(draft, joint, Follower(None, (value,)))
+    follow(draft, joint, Follower(None, (value,)))
 
 
-def _equality(draft: Draft, joint: str, follower: Follower) -> None:
+def follow(draft: Draft, joint: str, follower: Follower) -> None:
+    """Add the equality that makes a joint follow another."""
     draft.followers[joint] = follower
     coefficients = np.zeros(DEGREE + 1)
     coefficients[: len(follower.polynomial)] = follower.polynomial

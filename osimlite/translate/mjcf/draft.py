@@ -25,6 +25,7 @@ from osimlite.translate.fidelity import Fidelity
 
 Version = Literal[3, 4]
 Contact = Literal["native", "none"]
+Fit = Literal["none", "wraps", "force"]
 Value = str | bool | int | float | Sequence[float] | Array | None
 C = TypeVar("C", bound=Component)
 
@@ -47,11 +48,13 @@ class Options:
         version: of MuJoCo, whose first number decides what a side site means.
         visuals: whether to say what bodies look like.
         contact: whether contact forces become contacts of MuJoCo's own law, or nothing.
+        fit: what is fitted: nothing, what tendons go around, or that and the forces of muscles.
     """
 
     version: Version = 4
     visuals: bool = True
     contact: Contact = "native"
+    fit: Fit = "none"
 
 
 class Lead(NamedTuple):
@@ -66,6 +69,14 @@ class Follower(NamedTuple):
 
     leader: str | None
     polynomial: tuple[float, ...]
+
+
+class Tied(NamedTuple):
+    """The tendon of a path, and lengths (P,) of the path (m) in random poses and in others (R,) that are held out."""
+
+    name: str
+    lengths: Array
+    held_out: Array
 
 
 def add(parent: _Element, tag: str, **attributes: Value) -> _Element:
@@ -89,6 +100,7 @@ class Draft:
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
         starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
+        tendons: of paths, by the absolute path of their owners.
         activations: at the start, of the actuators that have one, by name.
     """
 
@@ -101,6 +113,7 @@ class Draft:
     bodies: dict[int, _Element] = field(default_factory=dict)
     leads: dict[int, Lead] = field(default_factory=dict)
     followers: dict[str, Follower] = field(default_factory=dict)
+    tendons: dict[str, Tied] = field(default_factory=dict)
     activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)
     _names: dict[str, set[str]] = field(default_factory=dict)
@@ -134,6 +147,12 @@ class Draft:
         for component in self.tree.components:
             if isinstance(component, kind) and (path := self.tree.path_of(component) or "") not in spoken_of:
                 yield component, path
+
+    def account(self, path: str, became: str) -> None:
+        """Say what a component and all below it became, but for what is spoken of already."""
+        for each in self.tree.by_path:
+            if each == path or each.startswith(f"{path}/"):
+                self.fidelity.translated.setdefault(each, became)
 
     def section(self, tag: str) -> _Element:
         """The part of the file with this tag: ``tendon``, ``actuator``, ``equality`` ..."""

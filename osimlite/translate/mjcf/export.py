@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lxml.etree import Comment, _Comment, tostring
+from numpy.polynomial.polynomial import polyval
 
 from osimlite import __version__
 from osimlite.errors import SettingError
@@ -26,9 +27,10 @@ from osimlite.translate.mjcf.constraints import add_constraints
 from osimlite.translate.mjcf.contacts import add_contacts
 from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
-from osimlite.translate.mjcf.draft import Contact, Draft, Lead, Options, Version, add
+from osimlite.translate.mjcf.draft import Contact, Draft, Fit, Follower, Lead, Options, Version, add
 from osimlite.translate.mjcf.forces import add_forces
 from osimlite.translate.mjcf.keyframe import add_keyframe
+from osimlite.translate.mjcf.paths import add_paths
 from osimlite.translate.mjcf.scenery import add_markers, add_shapes
 from osimlite.translate.survey import account_for_rest
 
@@ -42,6 +44,7 @@ PASSES: tuple[Callable[[Draft], None], ...] = (
     add_shapes,
     add_markers,
     add_frames,
+    add_paths,
     add_keyframe,
 )
 """What makes a file of a model, in this order: bodies and joints come before what is fixed to them or acts on them."""
@@ -57,6 +60,7 @@ class Mjcf:
         fidelity: what became of every component, exact where there is no record of it.
         robot: the neutral robot that was written; its joints and links have MuJoCo's names.
         files: mesh files that the text names, by name relative to it.
+        followers: what equality constraints make of joints, by name.
         leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
     """
 
@@ -66,12 +70,17 @@ class Mjcf:
     robot: Robot
     files: dict[str, bytes] = field(default_factory=dict)
     leads: Mapping[int, Lead] = field(default_factory=dict)
+    followers: Mapping[str, Follower] = field(default_factory=dict)
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
         values = self.robot.mechanism.values(q)
         leads = {joint: line.slope * values[place] + line.start for place, (joint, line) in self.leads.items()}
-        return leads | self.robot.joint_values(values)
+        found = leads | self.robot.joint_values(values)
+        for joint, follower in self.followers.items():
+            if joint not in found:
+                found[joint] = float(polyval(found[follower.leader or ""], follower.polynomial))
+        return found
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write ``<name>.xml``, its meshes and ``fidelity.json`` into a folder, which is made if it is not there.
@@ -93,6 +102,7 @@ def to_mjcf(
     mujoco: Version = 4,
     visuals: bool = True,
     contact: Contact = "native",
+    fit: Fit = "none",
     folder: str | Path | None = None,
     geometry: Sequence[str | Path] = (),
     name: str | None = None,
@@ -106,6 +116,8 @@ def to_mjcf(
         mujoco: the version to write for, 3 or 4.
         visuals: whether to say what bodies look like.
         contact: ``"native"`` writes contact forces as contacts of MuJoCo's own law, ``"none"`` leaves them out.
+        fit: ``"wraps"`` moves and resizes what tendons go around until they do what the paths do, ``"force"`` fits the
+            curves and lengths of muscles to their isometric forces too; ``"none"`` keeps all numbers of the model.
         folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
         geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
             separated as in PATH, follow them.
@@ -120,12 +132,14 @@ def to_mjcf(
         raise SettingError(f"MJCF is written for MuJoCo 3 or 4, not {mujoco}")
     if contact not in ("native", "none"):
         raise SettingError(f"contact is 'native' or 'none', not '{contact}'")
+    if fit not in ("none", "wraps", "force"):
+        raise SettingError(f"fit is 'none', 'wraps' or 'force', not '{fit}'")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
     mesh_files = MeshFiles(MeshFolders(None if folder is None else Path(folder), [Path(place) for place in geometry]))
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
     robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
-    draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact), mesh_files)
+    draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact, fit), mesh_files)
     _add_settings(draft)
     fidelity.translated["/"] = f"mujoco {mechanism.name}"
     for make in PASSES:
@@ -136,7 +150,13 @@ def to_mjcf(
             draft.root.remove(section)
     text = tostring(draft.root, pretty_print=True, xml_declaration=True, encoding="utf-8").decode()
     return Mjcf(
-        legal(model.name or "model") if name is None else name, text, fidelity, robot, mesh_files.files, draft.leads
+        legal(model.name or "model") if name is None else name,
+        text,
+        fidelity,
+        robot,
+        mesh_files.files,
+        draft.leads,
+        draft.followers,
     )
 
 

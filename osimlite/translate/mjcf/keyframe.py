@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from numpy.polynomial.polynomial import polyval
+from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.translate.mjcf.draft import Draft, add
 
@@ -17,7 +17,9 @@ def add_keyframe(draft: Draft) -> None:
         values[joint], rates[joint] = line.slope * q[place] + line.start, line.slope * qdot[place]
     values |= draft.starts
     for joint, follower in draft.followers.items():
-        values[joint] = float(polyval(values.get(follower.leader or "", 0.0), follower.polynomial))
+        value, rate = values.get(follower.leader or "", 0.0), rates.get(follower.leader or "", 0.0)
+        values[joint] = float(polyval(value, follower.polynomial))
+        rates.setdefault(joint, float(rate * polyval(value, polyder(follower.polynomial))))
     names = [joint.get("name", "") for joint in draft.section("worldbody").iter("joint")]
     actuators = [actuator.get("name", "") for actuator in draft.section("actuator")]
     add(

@@ -42,6 +42,7 @@ class Node:
         coordinate: place in the mechanism of that which it depends on, or -1.
         range: of this coordinate.
         functions: of it, that give the place.
+        name: of the point, or of the surface that it is on.
     """
 
     body: int
@@ -51,6 +52,7 @@ class Node:
     coordinate: int = -1
     range: tuple[float, float] = (-inf, inf)
     functions: tuple[Function, ...] = ()
+    name: str = ""
 
     def packed(self, places: Places, of: int, first: int, path: str) -> tuple[list[int], list[float]]:
         """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to."""
@@ -173,20 +175,21 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
         frame = builder.tree.parent_of(frame)
     body, placed = builder.placement(frame)
     placed = placed @ offset(surface.translation, surface.xyz_body_rotation)
-    tangent = Node(body, placed, np.zeros(3), TANGENT)
+    tangent = Node(body, placed, np.zeros(3), TANGENT, name=surface.name)
     return Surface(number, tangent, law if surface.active else "", (*side, method, alone, *sizes), first, last)
 
 
 def _fixed(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
     builder.check(point, point.location)
-    return Node(body, frame, np.array(point.location))
+    return Node(body, frame, np.array(point.location), name=point.name)
 
 
 def _conditional(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
     builder.check(point, (*point.location, *point.range))
     low, high = point.range
     coordinate = builder.coordinate(point, "socket_coordinate")
-    return Node(body, frame, np.array(point.location), CONDITIONAL, coordinate, (low - TOLERANCE, high + TOLERANCE))
+    within = low - TOLERANCE, high + TOLERANCE
+    return Node(body, frame, np.array(point.location), CONDITIONAL, coordinate, within, name=point.name)
 
 
 def _moving(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
@@ -195,7 +198,7 @@ def _moving(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Nod
     if others != [coordinate, coordinate]:
         raise ModelError(f"the three coordinates of '{builder.path(point)}' differ; name the same one in all sockets")
     within = builder.mechanism.coordinates[coordinate].range
-    return Node(body, frame, np.zeros(3), MOVING, coordinate, within, tuple(functions))
+    return Node(body, frame, np.zeros(3), MOVING, coordinate, within, tuple(functions), point.name)
 
 
 READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array], Node]] = {

@@ -1,0 +1,64 @@
+"""Moving points: a quartic of the coordinate, of which the three places are quartics again.
+
+MuJoCo's joints follow others by quartics. Two in a row follow a spline several times as closely as one, above all in
+its slope, which is what a moment arm is made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
+
+from osimlite._require import require
+from osimlite.multibody.functions import Function
+from osimlite.multibody.spatial import Array
+from osimlite.translate.mjcf.polynomials import DEGREE, as_polynomial, sampled
+
+SAMPLES = 120
+STARTS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, 0.5))
+"""Bends of the first quartic, as powers 2, 3 and 4 beside a slope of 1, from which the best is sought."""
+
+
+def composition(functions: Sequence[Function], span: tuple[float, float]) -> tuple[Array, Array]:
+    """The quartic (5,) of a coordinate, and the quartics (k, 5) of its value that are nearest to k functions on a span.
+
+    All are written from the constant on. Polynomials of up to degree 4 are written as they are.
+    """
+    return _composition(tuple(functions), span)
+
+
+@cache
+def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> tuple[Array, Array]:
+    exact = [as_polynomial(function) for function in functions]
+    known = [item for item in exact if item is not None and item.degree() <= DEGREE]
+    if len(known) == len(exact):
+        return np.eye(DEGREE + 1)[1], np.array([_padded(item) for item in known])
+    low, high = span
+    unit = np.cos(np.linspace(0.0, np.pi, SAMPLES))
+    values = np.stack([sampled(item, 0.5 * (low + high) + 0.5 * (high - low) * unit) for item in functions], axis=1)
+
+    def first(bends: Array) -> Polynomial:
+        bent = Polynomial((0.0, 1.0, *bends))
+        reached = bent(unit)
+        middle, half = 0.5 * (reached.max() + reached.min()), 0.5 * (reached.max() - reached.min())
+        found: Polynomial = (bent - middle) / half
+        return found
+
+    def second(bends: Array) -> tuple[Array, Array]:
+        basis = np.polynomial.chebyshev.chebvander(first(bends)(unit), DEGREE)
+        found: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
+        return found, (basis @ found - values).ravel()
+
+    search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
+    best = min((search(lambda bends: 1e3 * second(bends)[1], start) for start in STARTS), key=lambda each: each.cost)
+    rows, _ = second(best.x)
+    normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
+    drive = first(best.x)(normal)
+    return _padded(drive), np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in rows.T])
+
+
+def _padded(polynomial: Polynomial) -> Array:
+    return np.pad(polynomial.coef, (0, DEGREE + 1 - len(polynomial.coef)))

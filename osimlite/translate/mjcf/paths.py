@@ -1,0 +1,198 @@
+"""Paths of muscles, springs and actuators as spatial tendons, and how far these are from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from osimlite.multibody.spatial import Array
+from osimlite.robot.lines import Line
+from osimlite.schema.forces import Force
+from osimlite.schema.paths import AbstractGeometryPath
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
+from osimlite.simulation.paths import Paths
+from osimlite.translate.fidelity import LEFT_OUT, Error
+from osimlite.translate.mjcf.bodies import LEAST_MASS
+from osimlite.translate.mjcf.couplings import follow, leading
+from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
+from osimlite.translate.mjcf.fits import fitted
+from osimlite.translate.mjcf.poses import Poses, Truth, random_poses
+from osimlite.translate.mjcf.routes import Router
+from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
+
+CHOOSING, FITTING, HELD_OUT = 64, 200, 100
+"""How many random poses a tendon is chosen by, fitted to, and measured in."""
+EXACT = 1e-9
+"""Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
+PULLED = 0.1
+"""Inertia (kg) of helpers along their own axes: muscles pull at them, and the equalities that hold them are soft."""
+WRAPS = 4
+"""Group of the geoms that tendons go around, and of their sites."""
+
+
+def add_paths(draft: Draft) -> None:
+    """Add a tendon for every path through points."""
+    owners: dict[str, AbstractGeometryPath] = {
+        path: owner.geometry_path
+        for owner, path in draft.components(Force)
+        if isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
+    }
+    if not owners:
+        return
+    exact = Paths(draft.model)
+    fits = draft.options.fit != "none"
+    poses, truth = random_poses(exact, FITTING if fits else CHOOSING, 0)
+    held, held_truth = random_poses(exact, HELD_OUT, 1)
+    writer = _Writer(draft)
+    for path, given in owners.items():
+        route = exact.routes[path]
+        own = draft.tree.path_of(given) or ""
+        if not isinstance(route, ThroughPoints):
+            kind = type(given).__name__
+            draft.fidelity.add("path", own, f"a path that is a {kind}", LEFT_OUT)
+            continue
+        router = Router(route, truth[path], poses, draft.options.version)
+        tendon = router.best()
+        if fits:
+            tendon = fitted(router, tendon)
+        name = writer.tendon(path, tendon)
+        draft.tendons[path] = Tied(name, truth[path].lengths, held_truth[path].lengths)
+        draft.account(own, f"tendon {name}")
+        errors = _errors(draft, tendon, held, held_truth[path])
+        if any(error.max > EXACT for error in errors.values()):
+            how = "the nearest tendon that its own points and surfaces make"
+            done = f"{how}, fitted" if fits else how
+            draft.fidelity.add("path", own, _what(route, router), done, f"tendon {name}", errors)
+    draft.fidelity.translated |= {path: f"geom {name}" for path, name in writer.surfaces.items()}
+
+
+def _errors(draft: Draft, tendon: Tendon, poses: Poses, truth: Truth) -> dict[str, Error]:
+    """How far lengths and moment arms are off in poses that the tendon was not chosen by."""
+    lengths, arms = measured(tendon, poses, draft.options.version)
+    errors = {"length": Error.of(lengths - truth.lengths, "m")}
+    for place, off, wanted in zip(poses.moving, (arms - truth.arms).T, truth.arms.T, strict=True):
+        info = draft.mechanism.coordinates[place]
+        if np.abs(off).max() > EXACT or np.abs(wanted).max() > EXACT:
+            unit = "m" if info.motion_type == "rotational" else "1"
+            errors[f"moment arm about {draft.mechanism.coordinate_names[place]}"] = Error.of(off, unit)
+    return errors
+
+
+def _what(route: ThroughPoints, router: Router) -> str:
+    """What of a path MuJoCo has no exact words for."""
+    kinds = {point.kind for point in route.points}
+    touched = [surface for surface, touch in zip(route.surfaces, router.touches, strict=True) if len(touch.poses)]
+    found = [
+        *(["a point that moves with a coordinate"] if MOVING in kinds else []),
+        *(["a point that comes and goes with a coordinate"] if CONDITIONAL in kinds else []),
+        *sorted({f"a {_NAMES[surface.law]}" for surface in touched}),
+    ]
+    several = ", several at a time" if len(touched) > 1 else ""
+    return "a path with " + " and ".join(found or ["surfaces"]) + several
+
+
+_NAMES = {
+    "wrap_cylinder": "cylinder on which it is not the shortest",
+    "wrap_sphere": "sphere to wrap around",
+    "wrap_ellipsoid": "ellipsoid to wrap around",
+    "wrap_torus": "torus to wrap around",
+}
+
+
+@dataclass
+class _Writer:
+    """Writes tendons, each site and surface once.
+
+    Attributes:
+        draft: what they are written into.
+        surfaces: names of geoms by the paths of their wrap objects.
+    """
+
+    draft: Draft
+    surfaces: dict[str, str] = field(default_factory=dict)
+    _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
+    _helpers: dict[tuple[Any, ...], str] = field(default_factory=dict)
+
+    def tendon(self, path: str, tendon: Tendon) -> str:
+        """Write a tendon with all that it needs; returns its name."""
+        name = self.draft.name("tendon", path)
+        element = add(self.draft.section("tendon"), "spatial", name=name, width=0.005, rgba=(0.8, 0.1, 0.1, 1.0))
+        for part in tendon:
+            if isinstance(part, Spot):
+                add(element, "site", site=self._site(f"{path}/{part.name or 'between'}", part))
+            else:
+                side = None if part.side is None else self._site(f"{path}/{part.name or 'around'}_side", part.side)
+                add(element, "geom", geom=self._geom(path, part), sidesite=side)
+        return name
+
+    def _site(self, path: str, spot: Spot) -> str:
+        if spot.slides is None:
+            return self.draft.site(path, spot.body, spot.place, group=WRAPS)
+        assert spot.drive is not None
+        helper = self._helper(spot.coordinate, spot.drive)
+        if helper is None:
+            # The coordinate is locked.
+            value = self.draft.mechanism.coordinates[spot.coordinate].default_value
+            moved = [Polynomial(row)(Polynomial(spot.drive)(value)) for row in spot.slides]
+            return self.draft.site(path, spot.body, spot.place + np.array(moved), group=WRAPS)
+        joint, line = helper
+        name = self.draft.name("body", path)
+        carrier = add(self.draft.bodies[spot.body], "body", name=name, pos=tidy(spot.place + spot.slides[:, 0]))
+        add(carrier, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
+        for axis, polynomial in _straight(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
+            slide = self.draft.name("joint", f"{name}_{len(carrier)}")
+            add(carrier, "joint", name=slide, type="slide", axis=axis, armature=PULLED)
+            follow(self.draft, slide, Follower(joint, _along(line, polynomial)))
+        site = self.draft.name("site", path)
+        add(carrier, "site", name=site, group=WRAPS)
+        return site
+
+    def _helper(self, coordinate: int, drive: Array) -> tuple[str, Line] | None:
+        """The joint, and the line of it, that is a polynomial of a coordinate; None if the coordinate is locked."""
+        lead = leading(self.draft, coordinate)
+        if lead is None:
+            return None
+        own = lead.line.inverse()
+        if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
+            return lead.joint, own
+        key = (coordinate, *drive.tolist())
+        if key not in self._helpers:
+            name = self.draft.name("joint", f"{self.draft.mechanism.coordinates[coordinate].name}_helper")
+            speck = add(self.draft.section("worldbody"), "body", name=self.draft.name("body", name))
+            add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
+            add(speck, "joint", name=name, type="slide", axis=(1.0, 0.0, 0.0), armature=PULLED)
+            follow(self.draft, name, Follower(lead.joint, _along(own, drive)))
+            self._helpers[key] = name
+        return self._helpers[key], Line(1.0, 0.0)
+
+    def _geom(self, path: str, around: Around) -> str:
+        key = (around.body, around.kind, around.radius, around.length, *around.frame.ravel().tolist())
+        if key not in self._geoms:
+            name = self._geoms[key] = self.draft.name("geom", f"{path}/{around.name or 'around'}")
+            size = [around.radius] if around.kind == "sphere" else [around.radius, 0.5 * around.length]
+            element = self.draft.bodies[around.body]
+            look: dict[str, Value] = {"contype": 0, "conaffinity": 0, "group": WRAPS, "rgba": (0.0, 1.0, 1.0, 0.3)}
+            add(element, "geom", name=name, type=around.kind, size=size, **pose(around.frame), **look)
+        return self._geoms[key]
+
+
+def _along(line: Line, polynomial: Array) -> tuple[float, ...]:
+    """The polynomial of a line, in powers of what the line is of."""
+    whole: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
+    return tuple(whole.coef.tolist())
+
+
+def _straight(slides: Array) -> Iterator[tuple[Array, Array]]:
+    """Axes (3,) and polynomials along them whose sum the places (3, 5) are; a single one where all is on one line."""
+    axes, sizes, rows = np.linalg.svd(slides, full_matrices=False)
+    if sizes[1] <= 1e-12 * sizes[0]:
+        yield axes[:, 0], sizes[0] * rows[0]
+        return
+    for axis, row in zip(np.eye(3), slides, strict=True):
+        if row.any():
+            yield axis, row

@@ -1,0 +1,128 @@
+"""Random poses of a model, and what its paths do in them: what tendons are chosen by, fitted to and measured with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.paths import Paths
+
+Places = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground.
+
+    Attributes:
+        q: values of the coordinates (P, n).
+        moving: places (m,) of the coordinates that move by themselves: neither locked nor coupled.
+        rotations: of the bodies in ground (b + 1, P, 3, 3).
+        origins: of the bodies in ground (b + 1, P, 3), m.
+        jacobians: (b + 1, P, 6, m) from the speeds of those coordinates, all that must move with them included, to the
+            angular velocity and the velocity of the origin of each body.
+        rates: of all coordinates (P, n, m) by these speeds.
+    """
+
+    q: Array
+    moving: Array
+    rotations: Array
+    origins: Array
+    jacobians: Array
+    rates: Array
+
+    def seen_by(self, columns: Sequence[int]) -> Poses:
+        """The same with some of the moving coordinates, by their places in `moving`."""
+        own = list(columns)
+        return Poses(
+            self.q,
+            self.moving[own],
+            self.rotations,
+            self.origins,
+            self.jacobians[..., own],
+            self.rates[..., own],
+        )
+
+    def points(self, body: int, station: Array) -> Array:
+        """Places in ground (P, 3) of a station of a body, (3,) or one for each pose (P, 3)."""
+        placed: Array = self.origins[body] + np.einsum(
+            "pij,pj->pi", self.rotations[body], np.broadcast_to(station, (len(self.q), 3))
+        )
+        return placed
+
+    def points_at(self, body: int, stations: Array, at: Places) -> Array:
+        """Places in ground (k, 3) of stations of a body (k, 3), each in one of the poses, by their places (k,)."""
+        placed: Array = self.origins[body][at] + np.einsum("pij,pj->pi", self.rotations[body][at], stations)
+        return placed
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a path does in P poses.
+
+    Attributes:
+        lengths: (P,), m.
+        arms: moment arms (P, m) about the coordinates that move by themselves, m or 1.
+        nodes: numbers and places (3,) in ground of what the path runs through, see :meth:`Paths.points`.
+    """
+
+    lengths: Array
+    arms: Array
+    nodes: Sequence[Sequence[tuple[int, Array]]]
+
+
+def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:
+    """Values (count, n) of the coordinates, spread evenly over the ranges of those that move by themselves."""
+    coupled = [item for item in mechanism.constraints if isinstance(item, Coupler)]
+    values = np.tile(mechanism.values({}), (count, 1))
+    for place in free_coordinates(mechanism):
+        low, high = mechanism.coordinates[place].range
+        values[:, place] = np.random.default_rng((seed, place)).uniform(low, high, count)
+    for item in coupled:
+        values[:, item.dependent] = [item.function.evaluate(row[list(item.independent)])[0] for row in values]
+    return values
+
+
+def free_coordinates(mechanism: Mechanism) -> list[int]:
+    """Places of the coordinates that are neither locked, prescribed nor coupled to others."""
+    coupled = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
+    return [
+        place
+        for place, info in enumerate(mechanism.coordinates)
+        if not info.locked and info.prescribed is None and place not in coupled
+    ]
+
+
+def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, Truth]]:
+    """Random poses, and what each path does in them."""
+    mechanism = paths.mechanism
+    values, moving = random_values(mechanism, count, seed), np.array(free_coordinates(mechanism), dtype=int)
+    states = [mechanism.at(row) for row in values]
+    rates = np.nan_to_num(np.stack([paths.coupling(row)[:, moving] for row in values]))
+    poses = Poses(
+        values,
+        moving,
+        np.stack([state.rotations for state in states], axis=1),
+        np.stack([state.origins for state in states], axis=1),
+        np.stack([state.jacobians @ own for state, own in zip(states, rates, strict=True)], axis=1),
+        rates,
+    )
+    names = [mechanism.coordinates[place].path for place in moving]
+    lengths = [paths.lengths(row) for row in values]
+    arms = [paths.moment_arms(row) for row in values]
+    nodes = [paths.points(row) for row in values]
+    truth = {
+        path: Truth(
+            np.array([row[path] for row in lengths]),
+            np.nan_to_num(np.array([[row[path].get(name, 0.0) for name in names] for row in arms]).reshape(count, -1)),
+            [row.get(path, ()) for row in nodes],
+        )
+        for path in paths.names
+    }
+    return poses, truth

@@ -1,0 +1,318 @@
+"""From the paths of a model to tendons: what MuJoCo has exactly, and the nearest that it has to the rest.
+
+What OpenSim decides in each pose (on which side of a surface a path passes, between which points it touches, whether a
+point counts) is decided here once: every way to say it that MuJoCo has is measured in many poses, and the best taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, combinations, groupby, pairwise, product
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array, rotation_about, transform
+from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
+from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
+from osimlite.translate.mjcf.moving import composition
+from osimlite.translate.mjcf.poses import Places, Poses, Truth
+from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
+
+DIRECTIONS = 12
+"""So many directions around a surface are tried as sides."""
+RADII = (0.001, 0.004, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04)
+"""Radii (m) of the cylinders that are tried for points that come and go."""
+SPECK = 1e-5
+"""Radius (m) of the sphere that stands for such a point where it need not be fitted."""
+
+
+Choose = Callable[[Sequence[Tendon]], Tendon]
+"""Takes the best of several ways to say a part of a tendon."""
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Where a path touches a surface, in the k of the poses in which it does.
+
+    Attributes:
+        poses: their places (k,).
+        first: tangent points (k, 3) in the body of the surface, m.
+        second: the others (k, 3).
+        after: numbers of the path points before them (k,).
+    """
+
+    poses: Places
+    first: Array
+    second: Array
+    after: Places
+
+
+class Router:
+    """Finds the tendon that is nearest to a path.
+
+    Args:
+        route: the path.
+        truth: what it does in the poses.
+        poses: many.
+        version: of MuJoCo, 3 or 4.
+    """
+
+    def __init__(self, route: ThroughPoints, truth: Truth, poses: Poses, version: int) -> None:
+        columns = np.flatnonzero(np.abs(truth.arms).max(0, initial=0.0) > 1e-9)
+        self.route, self.truth, self.poses, self.version = route, truth, poses.seen_by(columns.tolist()), version
+        self.wanted = np.concatenate((truth.lengths[:, None], truth.arms[:, columns]), axis=1)
+        self.touches = [self._touch(number) for number in range(len(route.surfaces))]
+
+    def residuals(self, tendon: Tendon) -> Array:
+        """What is wrong with the lengths and moment arms of a tendon: (P, 1 + m), m."""
+        return self._own(tendon) - self.wanted
+
+    def error(self, tendon: Tendon) -> float:
+        """One number for how wrong a tendon is: the root of the sum of the mean squares, m."""
+        return float(np.sqrt((self.residuals(tendon) ** 2).mean(0).sum()))
+
+    def best(self) -> Tendon:
+        """The tendon with the least error among those that can be made of the path's own points and surfaces."""
+        slots: list[Tendon] = []
+        settle: dict[int, Callable[[Choose], Tendon]] = {}
+        points = list(enumerate(self.route.points))
+        for comes_and_goes, group in groupby(points, lambda item: item[1].kind == CONDITIONAL):
+            numbers = [number for number, _ in group]
+            for run in [numbers] if comes_and_goes else [[number] for number in numbers]:
+                own = tuple(spot(self.route.points[number]) for number in run)
+                if comes_and_goes:
+                    each = [[(point,), (), *self._switch(number)] for point, number in zip(own, run, strict=True)]
+                    ways = [*map(_joined, product(*each)), *self._cylinder(run)]
+                    settle[len(slots)] = partial(_choose_of, ways)
+                slots.append(own)
+                if between := [k for k, touch in enumerate(self.touches) if np.isin(touch.after, run).any()]:
+                    settle[len(slots)] = partial(self._around, between)
+                    slots.append(())
+        for _ in range(2 if len(settle) > 1 else 1):
+            for place, choice in settle.items():
+                parts = _joined(slots[:place]), slots[place], _joined(slots[place + 1 :])
+                slots[place] = choice(partial(self._least, *parts))
+        return _joined(slots)
+
+    def _least(self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]) -> Tendon:
+        """The option for a part of a tendon with which the whole has the least error."""
+        head, tail = before[_last_spot(before) :], after[: len(after) - _last_spot(after[::-1])]
+        rest = self.residuals((*before, *now, *after)) - self._own((*head, *now, *tail))
+        errors = [
+            np.square(rest + self._own(piece)).mean(0).sum() if _is_tendon(piece) else np.inf
+            for piece in ((*head, *option, *tail) for option in options)
+        ]
+        return options[int(np.argmin(errors))]
+
+    def _own(self, tendon: Tendon) -> Array:
+        """Lengths and moment arms (P, 1 + m) of a tendon."""
+        lengths, arms = measured(tendon, self.poses, self.version)
+        return np.concatenate((lengths[:, None], arms), axis=1)
+
+    def _touch(self, number: int) -> Touch:
+        one = len(self.route.points) + 2 * number
+        body, found = self.route.surfaces[number].tangent.body, []
+        for pose, nodes in enumerate(self.truth.nodes):
+            last = 0
+            for (node, place), (_, after) in pairwise(nodes):
+                last = node if node < len(self.route.points) else last
+                if node == one:
+                    found.append((pose, place, after, last))
+        poses, first, second, before = zip(*found, strict=True) if found else ((), (), (), ())
+        at = np.array(poses, dtype=int)
+        return Touch(
+            at, self._in_body(body, at, np.array(first)), self._in_body(body, at, np.array(second)), np.array(before)
+        )
+
+    def _in_body(self, body: int, at: Places, places: Array) -> Array:
+        """Places in ground (k, 3) in some of the poses, in the frame of a body."""
+        found: Array = np.einsum(
+            "pji,pj->pi", self.poses.rotations[body][at], places.reshape(-1, 3) - self.poses.origins[body][at]
+        )
+        return found
+
+    # ----------------------------------------------------------------------------------------------- options
+    def _around(self, numbers: Sequence[int], choose: Choose) -> Tendon:
+        """What a tendon goes around between two points: nothing, a surface, or two with a site between them."""
+        best: dict[int, Around] = {}
+        options: list[Tendon]
+        for number in sorted(numbers, key=lambda number: np.mean(self._turn(number, numbers))):
+            options = [
+                (each.sided(side),)
+                for each in self._stand_ins(number)
+                for side in self._sides(number, each, DIRECTIONS)
+            ]
+            (found,) = choose(options)
+            assert isinstance(found, Around)
+            best[number] = found
+        options = [(), *((each,) for each in best.values())]
+        for (one, first), (two, second) in combinations(best.items(), 2):
+            for middle in self._between(one, two):
+                sides = product(self._sides(one, first, 0), self._sides(two, second, 0))
+                options += [(first.sided(side), middle, second.sided(other)) for side, other in sides]
+        return choose(options)
+
+    def _stand_ins(self, number: int) -> Iterator[Around]:
+        """Spheres and cylinders in the place of a surface."""
+        surface = self.route.surfaces[number]
+        own = Around(surface.tangent.body, surface.tangent.frame, "sphere", 0.0, name=surface.tangent.name)
+        sizes = surface.numbers[4:]
+        match surface.law:
+            case "wrap_sphere":
+                yield replace(own, radius=sizes[0])
+            case "wrap_cylinder":
+                yield replace(own, kind="cylinder", radius=sizes[0], length=sizes[1])
+            case "wrap_ellipsoid":
+                touched = self._touched(number)
+                for radius in {*sizes, float(np.linalg.norm(touched, axis=1).mean())}:
+                    yield replace(own, radius=radius)
+                for axis in range(3):
+                    across = np.delete(touched, axis, axis=1)
+                    turned = own.frame @ transform(_z_to(np.eye(3)[axis]))
+                    for radius in {*np.delete(sizes, axis).tolist(), float(np.linalg.norm(across, axis=1).mean())}:
+                        yield replace(own, kind="cylinder", frame=turned, radius=radius, length=2.0 * sizes[axis])
+            case "wrap_torus":
+                # OpenSim's path bends around the tube where that is nearest.
+                tube, ring = sizes
+                x, y, _ = self._touched(number).mean(0)
+                out = np.array((x, y, 0.0)) / np.hypot(x, y)
+                turned = transform(_z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
+                yield replace(own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube)
+
+    def _touched(self, number: int) -> Array:
+        """The tangent points (2 k, 3) on a surface, in its own frame."""
+        touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
+        found: Array = (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
+        return found
+
+    def _sides(self, number: int, around: Around, directions: int) -> Iterator[Array | None]:
+        """No side, the side of the quadrant, the side that is touched, and directions all around."""
+        surface, touch = self.route.surfaces[number], self.touches[number]
+        turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
+        axis, sign = int(surface.numbers[0]), surface.numbers[1]
+        yield None
+        if sign:
+            yield turned @ (sign * np.eye(3)[axis])
+        middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
+        yield (middles / np.linalg.norm(middles, axis=1, keepdims=True)).mean(0)
+        for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
+            yield np.array((np.cos(turn), np.sin(turn), 0.0))
+        if directions and around.kind == "sphere":
+            yield from (np.array((0.0, 0.0, 1.0)), np.array((0.0, 0.0, -1.0)))
+
+    def _turn(self, number: int, numbers: Sequence[int]) -> list[int]:
+        """Where a surface stands in the order of those that the path touches, in each pose."""
+        points = len(self.route.points)
+        found = []
+        for pose in self.touches[number].poses:
+            order = [(node - points) // 2 for node, _ in self.truth.nodes[pose] if node >= points]
+            found.append([k for k in dict.fromkeys(order) if k in numbers].index(number))
+        return found
+
+    def _between(self, one: int, two: int) -> Iterator[Spot]:
+        """Sites between two surfaces: in the body of either, halfway between the points where they are touched."""
+        first, second = self.touches[one], self.touches[two]
+        both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
+        if not len(both):
+            return
+        bodies = [self.route.surfaces[number].tangent.body for number in (one, two)]
+        leaves = self.poses.points_at(bodies[0], first.second[at_one], both)
+        enters = self.poses.points_at(bodies[1], second.first[at_two], both)
+        for body in dict.fromkeys(bodies):
+            yield Spot(body, self._in_body(body, both, 0.5 * (leaves + enters)).mean(0))
+
+    def _switch(self, number: int) -> Iterator[Tendon]:
+        """A speck that the path runs through while its side site is inside, which is while the coordinate is in range.
+
+        The side site leaves the middle with the square of the distance of the coordinate from the middle of the range,
+        in a direction in which the speck then is not in the way: to the point before or after.
+        """
+        point, node = spot(self.route.points[number]), self.route.points[number]
+        low, high = node.range
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        parabola = SPECK / half**2 * np.array((middle**2, -2.0 * middle, 1.0, 0.0, 0.0))
+        for other in (number - 1, number + 1):
+            if not 0 <= other < len(self.route.points):
+                continue
+            at = spot(self.route.points[other])
+            there = self.poses.points(at.body, at.place)
+            toward = self._in_body(point.body, np.arange(len(there)), there).mean(0) - point.place
+            direction = toward / np.linalg.norm(toward)
+            side = Spot(point.body, point.place, node.coordinate, np.eye(5)[1], np.outer(direction, parabola))
+            yield (Around(point.body, transform(None, point.place), "sphere", SPECK, side, name=point.name),)
+
+    def _cylinder(self, run: Sequence[int]) -> Iterator[Tendon]:
+        """Cylinders that points which come and go are on, over whose edge the path bends."""
+        ways = []
+        for pose, nodes in enumerate(self.truth.nodes):
+            at = [k for k, (node, _) in enumerate(nodes) if node in run]
+            if at and at[0] > 0 and at[-1] + 1 < len(nodes):
+                before, first, last, after = (nodes[k][1] for k in (at[0] - 1, at[0], at[-1], at[-1] + 1))
+                ways.append((pose, first - before, after - last))
+        points = [spot(self.route.points[number]) for number in run]
+        body = points[0].body
+        if not ways or any(point.body != body for point in points):
+            return
+        poses, before, after = (np.array(column) for column in zip(*ways, strict=True))
+        turning = np.cross(_unit(before), _unit(after))
+        normal, into = (
+            np.einsum("pji,pj->pi", self.poses.rotations[body][poses], way).mean(0)
+            for way in (turning, _unit(after) - _unit(before))
+        )
+        frame = transform(_z_to(normal))
+        chord = frame[:3, :3].T @ (points[-1].place - points[0].place)
+        into = np.array((*(frame[:3, :3].T @ into)[:2], 0.0))
+        if len(run) > 1:
+            into = np.array((-chord[1], chord[0], 0.0)) * np.sign(chord[0] * into[1] - chord[1] * into[0])
+        into /= np.linalg.norm(into)
+        frame[:3, 3] = 0.5 * (points[0].place + points[-1].place)
+        half = 0.5 * float(np.hypot(*chord[:2]))
+        for radius in RADII:
+            if radius > half:
+                placed = frame @ transform(None, np.sqrt(radius**2 - half**2) * into)
+                around = Around(body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name)
+                for turn in np.linspace(-1.0, 1.0, 5):
+                    yield (around.sided(rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into),)
+
+
+def spot(point: Node) -> Spot:
+    """The site of a path point; where it moves, along quartics of its coordinate."""
+    place = point.frame[:3, :3] @ point.location + point.frame[:3, 3]
+    if point.kind != MOVING:
+        return Spot(point.body, place, name=point.name)
+    drive, slides = composition(point.functions, point.range)
+    return Spot(point.body, place, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name)
+
+
+def _z_to(axis: Array) -> Array:
+    """A rotation that takes z to a direction."""
+    z = axis / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x /= np.linalg.norm(x)
+    return np.stack((x, np.cross(z, x), z), axis=1)
+
+
+def _choose_of(options: Sequence[Tendon], choose: Choose) -> Tendon:
+    return choose(options)
+
+
+def _unit(vectors: Array) -> Array:
+    found: Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return found
+
+
+def _is_tendon(tendon: Tendon) -> bool:
+    """Whether there is a site at both ends and between any two surfaces."""
+    ends = isinstance(tendon[0], Spot) and isinstance(tendon[-1], Spot)
+    return ends and not any(isinstance(a, Around) and isinstance(b, Around) for a, b in pairwise(tendon))
+
+
+def _last_spot(tendon: Tendon) -> int:
+    """Place of the last site; 0 if there is none."""
+    return max((place for place, part in enumerate(tendon) if isinstance(part, Spot)), default=0)
+
+
+def _joined(slots: Sequence[Tendon]) -> Tendon:
+    return tuple(chain.from_iterable(slots))
