@@ -1,8 +1,8 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
-Everything public is here: ``read``, ``read_document``, ``write``, ``to_text``, ``validate``, ``mechanism``, ``paths``,
-``to_urdf``, ``to_mjcf``, ``simulate``, the errors, and every component class under OpenSim's own name
-(``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
+Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
+``mechanism``, ``paths``, ``to_urdf``, ``to_mjcf``, ``simulate``, the errors, and every component class under OpenSim's
+own name (``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from osimlite.document.plugins import classes_in as classes_in
     from osimlite.document.printer import to_text as to_text
     from osimlite.document.printer import write as write
     from osimlite.document.reader import read as read
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     __all__ = [
         "Model",
         "OsimliteError",
+        "classes_in",
         "mechanism",
         "paths",
         "read",
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     ]
 
 _FUNCTIONS = {
+    "classes_in": "osimlite.document.plugins",
     "read": "osimlite.document.reader",
     "read_document": "osimlite.document.reader:read_any",
     "read_text": "osimlite.document.reader",

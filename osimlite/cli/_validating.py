@@ -37,6 +37,7 @@ def run(
     baseline: str | None = None,
     write_baseline: str | None = None,
     geometry: Sequence[Path] = (),
+    classes: Sequence[str] = (),
     statistics: bool = False,
     cached: bool = True,
     everything: bool = False,
@@ -49,7 +50,10 @@ def run(
     if format not in FORMATS:
         raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{format}'")
     given = Config(
-        checked_words(select), checked_words(ignore), mesh_paths=tuple(str(path.resolve()) for path in geometry)
+        checked_words(select),
+        checked_words(ignore),
+        mesh_paths=tuple(str(path.resolve()) for path in geometry),
+        classes=tuple(map(os.path.abspath, classes)),
     )
     if "-" in paths and (fix or unsafe_fixes) and not diff:
         raise OsimliteError("standard input cannot be mended in place; use --diff")

@@ -49,6 +49,10 @@ def validate(
         str | None, typer.Option(help="Write all findings to this file and stop.", metavar="FILE", show_default=False)
     ] = None,
     geometry: options.Geometry = None,
+    classes: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="A file that declares classes of a plug-in.", show_default=False),
+    ] = None,
     everything: Annotated[
         bool, typer.Option("--all", help="Print every finding; else the first stands for those that are like it.")
     ] = False,
@@ -87,6 +91,7 @@ def validate(
             baseline=baseline,
             write_baseline=write_baseline,
             geometry=options.named_folders(geometry),
+            classes=classes or (),
             statistics=statistics,
             cached=not no_cache,
             everything=everything,

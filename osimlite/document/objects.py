@@ -18,7 +18,7 @@ from osimlite.schema.base import Object, Unknown
 from osimlite.schema.fields import Held, ObjectList
 from osimlite.schema.layout import Home, Include, Layout, Remark
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for
+from osimlite.schema.registry import by_tags, class_for
 from osimlite.schema.specs import FieldSpec, defaults, field_specs
 
 Read = TypeVar("Read", bound=Object)
@@ -382,7 +382,7 @@ class ObjectReader:
         return taken
 
 
-@cache
+@by_tags
 def _accepted(tag: Any, accepts: type[Object] | None) -> type[Object] | None:
     """The class of a tag if it is one that a property for `accepts` may hold; a comment's tag is a function."""
     cls = class_for(as_written(tag)) if isinstance(tag, str) else None

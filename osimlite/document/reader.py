@@ -30,6 +30,7 @@ from osimlite.schema.registry import class_for, tags
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
+    from osimlite.document.plugins import Paths
     from osimlite.document.upgrade import Change, Refusal, Upgraded
 
 OLDEST = 10500
@@ -92,27 +93,46 @@ class Document:
         return [] if self.upgraded is None else self.upgraded.changes
 
 
-def read(path: str | Path) -> Model:
+def read(path: str | Path, *, classes: Paths = ()) -> Model:
     """Read a model file.
+
+    Args:
+        path: the file.
+        classes: files that declare the classes of plug-ins; without them objects of such classes are kept as text.
 
     Raises:
         DocumentError: the file is missing or is not an OpenSim model document; with line and column.
+        OsimliteError: a class is declared wrongly; with file and line.
     """
-    return read_document(Source.of_file(path)).model
+    from osimlite.document.plugins import used
+
+    with used(classes):
+        return read_document(Source.of_file(path)).model
 
 
-def read_any(path: str | Path) -> Object:
+def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
     """Read a document of any kind: a model, the setup of a tool, a set of tasks, of markers, of loads.
+
+    Args:
+        path: the file.
+        classes: files that declare the classes of plug-ins.
 
     Raises:
         DocumentError: the file is missing or is not an OpenSim document; with line and column.
+        OsimliteError: a class is declared wrongly; with file and line.
     """
-    return read_document(Source.of_file(path), of=Object).top
+    from osimlite.document.plugins import used
+
+    with used(classes):
+        return read_document(Source.of_file(path), of=Object).top
 
 
-def read_text(text: str | bytes) -> Model:
-    """Read a model from the text of a document; DocumentError if it is none."""
-    return read_document(Source(text) if isinstance(text, bytes) else Source.of_characters(text)).model
+def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
+    """Read a model from the text of a document, with `classes` as for `read`; DocumentError if it is none."""
+    from osimlite.document.plugins import used
+
+    with used(classes):
+        return read_document(Source(text) if isinstance(text, bytes) else Source.of_characters(text)).model
 
 
 def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = False) -> Document:

@@ -13,6 +13,7 @@ from osimlite.lint.suffixes import project_files
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from osimlite.document.plugins import Paths
     from osimlite.document.source import Source
     from osimlite.lint.engine import all_rules
     from osimlite.schema.model import Model
@@ -25,6 +26,7 @@ def validate(
     *,
     select: tuple[str, ...] | list[str] | str | None = None,
     ignore: tuple[str, ...] | list[str] | str | None = None,
+    classes: Paths = (),
     config: Config | None = None,
 ) -> Report:
     """Check a model, a setup, a table, or all that is in a folder against every rule.
@@ -34,26 +36,31 @@ def validate(
             column.
         select: codes, beginnings of codes, or names of rules to run; all if not given.
         ignore: the same, of rules to leave out.
-        config: everything that can be set; `select` and `ignore` take its place.
+        classes: files that declare the classes of plug-ins.
+        config: everything that can be set; `select`, `ignore` and `classes` take its place.
 
     Raises:
         MissingFileError: the file is missing or cannot be read. What is wrong inside a file is a finding.
-        OsimliteError: no rule has a code in `select` or `ignore`.
+        OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared wrongly.
     """
+    from osimlite.document.plugins import used
     from osimlite.document.source import Source
     from osimlite.lint.engine import check_model, check_source
     from osimlite.schema.model import Model
 
     if config is None:
         meshes = tuple(map(str, named_mesh_folders()))
-        config = Config(checked_words(select), checked_words(ignore), mesh_paths=meshes)
-    if isinstance(model, Model):
-        return check_model(model, config)
-    if not isinstance(model, Source) and os.path.isdir(model):
-        from osimlite.lint.many import check_files
+        named = [classes] if isinstance(classes, str | os.PathLike) else classes
+        files = tuple(map(os.path.abspath, named))
+        config = Config(checked_words(select), checked_words(ignore), mesh_paths=meshes, classes=files)
+    with used(config.classes):
+        if isinstance(model, Model):
+            return check_model(model, config)
+        if not isinstance(model, Source) and os.path.isdir(model):
+            from osimlite.lint.many import check_files
 
-        return check_files(project_files([model]), config, cached=False)
-    return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
+            return check_files(project_files([model]), config, cached=False)
+        return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
 
 
 def assert_valid(model: Model | str | Path, *, ignore: tuple[str, ...] | list[str] | str | None = None) -> None:

@@ -16,6 +16,7 @@ from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
+from osimlite.schema.registry import forgotten_with_classes
 from osimlite.schema.tree import Tree
 
 T = TypeVar("T")
@@ -28,6 +29,7 @@ def while_unchanged(size: int) -> Callable[[Callable[[str], T]], Callable[[str],
 
     def decorated(make: Callable[[str], T]) -> Callable[[str], T | None]:
         kept: dict[str, tuple[int, T]] = {}
+        forgotten_with_classes(kept.clear)
 
         @wraps(make)
         def made(path: str) -> T | None:

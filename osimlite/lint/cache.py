@@ -19,7 +19,7 @@ from zlib import crc32
 
 from osimlite import __version__
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file
+from osimlite.files import read_file, stamped
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Severity
 
 if TYPE_CHECKING:
@@ -128,7 +128,10 @@ def key_of(file: str, config: Config) -> str:
     """What an entry holds for: the path as it was given, the configuration, and the code that checks."""
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
-    setting = (_code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds)
+    setting = (
+        _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
+        [(path, stamped(path)) for path in config.classes],
+    )  # fmt: skip
     return blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16).hexdigest()
 
 

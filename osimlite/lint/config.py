@@ -30,7 +30,7 @@ class Config:
     `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of rules
     (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a rule. `mesh_paths` are
     folders where meshes are looked for besides OpenSim's own places. `thresholds` are numbers by the names that
-    ``osimlite rule CODE`` shows.
+    ``osimlite rule CODE`` shows. `classes` are files that declare the classes of plug-ins.
     """
 
     select: tuple[str, ...] = ()
@@ -38,6 +38,7 @@ class Config:
     severity: Mapping[str, Severity] = field(default_factory=dict)
     mesh_paths: tuple[str, ...] = ()
     thresholds: Mapping[str, float] = field(default_factory=dict)
+    classes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the names and numbers of the thresholds; OsimliteError if one makes no sense."""

@@ -27,6 +27,7 @@ from osimlite.lint.suppressions import Suppression
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
+from osimlite.schema.registry import let_count
 from osimlite.text import brief
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
@@ -198,6 +199,7 @@ def check_source(source: Source, config: Config | None = None) -> Report:
 
 def subject_in(source: Source, config: Config | None = None) -> Checked:
     """A text to check; what it is, the name of its file tells."""
+    _use_classes(config)
     if source.file is not None and is_table(source.file):
         return Table(source.data, source.file, config)
     return _subject_of(survey(source, of=_class_in(source.file)), config)
@@ -205,10 +207,21 @@ def subject_in(source: Source, config: Config | None = None) -> Checked:
 
 def subject_of(file: str, config: Config | None = None) -> Checked:
     """A file to check; MissingFileError if there is none. What it is, its name tells."""
+    _use_classes(config)
     if is_table(file):
         with suppress(SpecialFileError):
             return Table(read_file(file), file, config)
     return _subject_of(survey_file(file, of=_class_in(file)), config)
+
+
+def _use_classes(config: Config | None) -> None:
+    """Let the classes of plug-ins count that a configuration names, and no others."""
+    if config is None or not config.classes:
+        let_count({})
+        return
+    from osimlite.document.plugins import use
+
+    use(config.classes)
 
 
 def _class_in(file: str | None) -> type[Object]:

@@ -18,6 +18,7 @@ from osimlite.text import did_you_mean, listed
 
 _KNOWN = (
     "select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds", "largest-file",
+    "classes",
 )  # fmt: skip
 
 
@@ -33,6 +34,7 @@ class Settings:
     mesh_paths: tuple[str, ...] = ()
     fail_on: Severity | None = None
     thresholds: Mapping[str, float] = field(default_factory=dict)
+    classes: tuple[str, ...] = ()
 
     def config_for(self, path: str | Path, overriding: Config) -> Config:
         """The configuration of one file; what `overriding` says comes before what the project says."""
@@ -42,6 +44,7 @@ class Settings:
             {**self.severity, **overriding.severity},
             (*overriding.mesh_paths, *self.mesh_paths, *map(str, named_mesh_folders())),
             {**self.thresholds, **overriding.thresholds},
+            (*self.classes, *overriding.classes),
         )
 
     def _ignored_in(self, path: Path) -> tuple[str, ...]:
@@ -87,6 +90,7 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
             tuple(str(file.parent.resolve() / path) for path in _words(table, "mesh-paths")),
             _severity(table["fail-on"]) if "fail-on" in table else None,
             Config(thresholds=_mapping(table, "thresholds")).thresholds,
+            tuple(str(file.parent.resolve() / path) for path in _words(table, "classes")),
         )
     except OsimliteError as error:
         raise OsimliteError(error.message, file=str(file)) from None

@@ -94,7 +94,7 @@ def outputs_of(cls: type[Component]) -> dict[str, Output]:
     """The outputs of a class by name."""
     found: dict[str, Output] = {}
     for base in cls.__mro__:
-        for word in _OUTPUTS.get(base.__name__, "").split():
+        for word in _OUTPUTS.get(base.__name__, base.__dict__.get("declared_outputs", "")).split():
             name, _, kind = word.partition(":")
             found[name.removesuffix("[]")] = Output(kind or "double", name.endswith("[]"))
     return found

@@ -6,10 +6,14 @@ table to the classes that exist.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
+from typing import TypeVar
 
 from osimlite.schema.base import Object
+
+T = TypeVar("T")
 
 _AREAS = {
     "actuators": (
@@ -175,9 +179,42 @@ MODULES = {name: f"osimlite.schema.{area}" for area, names in _AREAS.items() for
 """The module of every class, by class name."""
 
 
-@cache
+_further: dict[str, type[Object]] = {}
+_forget: list[Callable[[], None]] = []
+
+
+def further_classes() -> Mapping[str, type[Object]]:
+    """The classes of plug-ins that count now, by their tags."""
+    return _further.copy()
+
+
+def let_count(classes: Mapping[str, type[Object]]) -> None:
+    """Let tags stand for further classes from now on, and no more for those that counted before."""
+    if classes != _further:
+        _further.clear()
+        _further.update(classes)
+        for forget in _forget:
+            forget()
+
+
+def forgotten_with_classes(forget: Callable[[], None]) -> None:
+    """Call a function whenever other classes count than before."""
+    _forget.append(forget)
+
+
+def by_tags(function: Callable[..., T]) -> Callable[..., T]:
+    """Keep what a function makes of tags as long as these stand for the same classes."""
+    kept = cache(function)
+    forgotten_with_classes(kept.cache_clear)
+    return kept
+
+
+@by_tags
 def class_for(tag: str) -> type[Object] | None:
     """The class that an XML element `tag` stands for, or None if no class has it."""
+    further = _further.get(tag)
+    if further is not None:
+        return None if further.abstract else further
     module = MODULES.get(_TAGS.get(tag, tag))
     if module is None:
         return None
@@ -185,9 +222,9 @@ def class_for(tag: str) -> type[Object] | None:
     return None if found.abstract or found.tag != tag else found
 
 
-@cache
+@by_tags
 def tags() -> tuple[str, ...]:
     """Every tag that stands for a class in a file, sorted."""
     renamed = {name: tag for tag, name in _TAGS.items()}
-    known = (renamed.get(name, name) for name in MODULES)
+    known = (renamed.get(name, name) for name in (*MODULES, *_further))
     return tuple(sorted(tag for tag in known if class_for(tag) is not None))

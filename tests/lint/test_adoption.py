@@ -160,6 +160,7 @@ def test_the_settings_of_the_guide_are_settings(guide: str, tmp_path: Path, fixt
     (block,) = blocks(guide, "toml")
     assert tomllib.loads(block)
     (tmp_path / "pyproject.toml").write_text(block)
+    (tmp_path / "my_classes.json").write_text('{"classes": {}}')
     settings = settings_for(tmp_path)
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
     other = settings.config_for(tmp_path / "walker.osim", Config())

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 from lxml import etree
 
 from osimlite.document.lexical import Unclean, real, split
 from osimlite.document.names import as_written
-from osimlite.schema.registry import class_for
+from osimlite.schema.registry import by_tags, class_for
 
 Element = etree._Element
 
@@ -104,7 +104,7 @@ def step(*, below: int, order: int | None = None) -> Callable[[Callable[[Draft],
     return register
 
 
-@cache
+@by_tags
 def families(tag: str) -> frozenset[str]:
     """The names of the class that a tag stands for and of its bases; none for a tag that is no class."""
     cls = class_for(as_written(tag))

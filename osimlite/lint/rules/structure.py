@@ -102,7 +102,8 @@ def unknown_class(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the object out. Of a
-    plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same.
+    plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same. With the file
+    that the setting `classes` names, osimlite knows the classes of a plug-in as well.
 
     ## Example
     ```xml
