@@ -80,6 +80,12 @@ class Setup(Subject):
             found.setdefault(type(item), []).append(item)
         return found
 
+    def having(self, *properties: str) -> Iterator[Any]:
+        """Every object whose class has these properties, class by class."""
+        for cls, items in self.by_class.items():
+            if all(name in cls.model_fields for name in properties):
+                yield from items
+
     def owner(self, item: Object) -> Any:
         """The object itself: there is no tree of components."""
         return item
@@ -289,8 +295,8 @@ def is_of(item: Object, target: str) -> bool:
 def _model_named_by(top: Object) -> str | None:
     """The file of the model that a tool works on; None of what is no tool."""
     for item in top.walk():
-        if hasattr(item, "model_file"):
-            return str(item.model_file)
+        if "model_file" in vars(item):
+            return str(vars(item)["model_file"])
         if is_of(item, "ModelProcessor"):
             return str(getattr(item, "filepath", ""))
     return None

@@ -14,11 +14,10 @@ from osimlite.text import listed
 
 def _marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
     """Every part of a tool that fits markers, with its data."""
-    for item in setup.items:
-        if hasattr(item, "ik_task_set") and hasattr(item, "marker_file"):
-            table = setup.table(item.marker_file)
-            if table is not None and table.labels:
-                yield item, table
+    for item in setup.having("ik_task_set", "marker_file"):
+        table = setup.table(item.marker_file)
+        if table is not None and table.labels:
+            yield item, table
 
 
 @rule("OSIM841", "marker-not-measured", severity=WARNING, about="document")
@@ -162,9 +161,7 @@ def missing_column(setup: Setup, found: Found) -> None:
                 "OpenSim leaves the column out",
                 item, tag="states_file",
             )  # fmt: skip
-    for user in setup.items:
-        if not hasattr(user, "ik_task_set"):
-            continue
+    for user in setup.having("ik_task_set"):
         for task in user.ik_task_set.objects:
             if is_of(task, "IKCoordinateTask") and task.apply and task.value_type == "from_file":
                 values = setup.table(user.coordinate_file)
@@ -206,9 +203,9 @@ def _is_bound(setup: Setup, name: str) -> bool:
 
 def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
     """Every tool that is given a motion as coordinates, with the property and the table."""
-    for item in setup.items:
-        for tag in ("coordinates_file", "desired_kinematics_file"):
-            table = setup.table(getattr(item, tag, ""))
+    for tag in ("coordinates_file", "desired_kinematics_file"):
+        for item in setup.having(tag):
+            table = setup.table(getattr(item, tag))
             if table is not None and table.labels and not table.is_markers:
                 yield item, tag, table
 

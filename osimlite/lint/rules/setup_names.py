@@ -119,7 +119,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
             continue
         if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):
             continue
-        if id(item) in off or not getattr(item, "on", True) or not getattr(item, "apply", True):
+        if id(item) in off or not vars(item).get("on", True) or not vars(item).get("apply", True):
             continue
         reference = kind if kind.rule != "body-name-or-com" else Reference("body-name", "Body")
         if tree.lookup(reference, text, model).target is not None:

@@ -47,8 +47,8 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
-    for item in setup.items:
-        count = len(getattr(item, "time_range", (0, 0)))
+    for item in setup.having("time_range"):
+        count = len(item.time_range)
         if count != 2 and getattr(item, "apply", True):
             found(f"a range has two times, this one {count}: OpenSim fails", item, tag="time_range", severity=ERROR)
     for item, tag, motion in motions(setup):
@@ -87,15 +87,13 @@ def time_outside_data(setup: Setup, found: Found) -> None:
 
 
 def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
-    for item in setup.items:
-        if getattr(item, "apply", True) is False:
-            continue
-        if hasattr(item, "time_range"):
-            if len(item.time_range) == 2:
-                yield item, ("time_range",), *item.time_range
-        elif hasattr(item, "final_time"):
-            yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
-        elif is_of(item, "Analysis") and item.start_time > item.end_time:
+    for item in setup.having("time_range"):
+        if len(item.time_range) == 2 and getattr(item, "apply", True):
+            yield item, ("time_range",), *item.time_range
+    for item in setup.having("initial_time", "final_time"):
+        yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
+    for item in setup.named("Analysis"):
+        if item.start_time > item.end_time:
             yield item, ("start_time", "end_time"), item.start_time, item.end_time
 
 
