@@ -23,6 +23,9 @@ def named_mesh_folders() -> tuple[Path, ...]:
     return tuple(Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name)
 
 
+TABLES = (".sto", ".mot", ".trc")
+"""How tables over time are called."""
+
 unsaved: dict[str, bytes] = {}
 """What is read in place of files: their texts in an editor, not written yet, by real path."""
 

@@ -1,4 +1,4 @@
-"""``osimlite diff``: what changed between two models, or two other documents, in meaning."""
+"""``osimlite diff``: what changed between two models, setups or tables, in meaning."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def diff(
         bool, typer.Option("--git", help="Take the seven arguments that git gives an external diff program.")
     ] = False,
 ) -> None:
-    """Show what changed between two models or setup files: component, property, old and new value.
+    """Show what changed between two models or setups: component, property, old and new value.
 
-    Layout, order, comments and number formats do not count, nor does writing a default down. Exits with 1 if they
-    differ.
+    Layout, order, comments and number formats do not count, nor does writing a default down. Of two tables (.sto, .mot)
+    it shows which columns went and came, and where each of the others differs most. Exits with 1 if they differ.
 
     As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in .gitattributes the
     line: *.osim diff=osim
@@ -30,6 +30,7 @@ def diff(
     from osimlite.cli._console import complain, say
     from osimlite.document.reader import read_any
     from osimlite.errors import OsimliteError
+    from osimlite.lint.suffixes import is_table
     from osimlite.schema.difference import differences
     from osimlite.schema.model import Model
 
@@ -43,20 +44,24 @@ def diff(
     else:
         raise OsimliteError("diff takes two files")
     try:
-        read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
-        kind = next((type(top) for top in read if top is not None), Model)
-        tops = [kind() if top is None else top for top in read]
+        if all(is_table(str(file)) for file in (old, new) if str(file) != "/dev/null"):
+            from osimlite.cli._table_diff import table_differences
+
+            lines = table_differences(old, new)
+        else:
+            read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
+            kind = next((type(top) for top in read if top is not None), Model)
+            lines = described(differences(*(kind() if top is None else top for top in read)))
     except OsimliteError as error:
         # 1 says that the models differ.
         complain(error)
         raise typer.Exit(2) from None
-    found = differences(tops[0], tops[1])
     if git:
         say(f"--- {title}")
         say(f"+++ {title}")
-    for line in described(found):
+    for line in lines:
         say(line)
-    if found and not git:
+    if lines and not git:
         raise typer.Exit(1)
 
 

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from osimlite.cli import _options as options
-
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
     from osimlite.schema.custom_joint import CustomJoint
@@ -20,18 +18,20 @@ if TYPE_CHECKING:
 
 
 def info(
-    file: options.File,
-    every_class: Annotated[bool, typer.Option("--all", help="List every component class, however rare.")] = False,
+    file: Annotated[Path, typer.Argument(help="A model, a setup or a table.", show_default=False)],
+    everything: Annotated[bool, typer.Option("--all", help="List every class, or every column of a table.")] = False,
 ) -> None:
     """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
 
-    It also says what of it cannot be simulated. Of a setup file it shows what the tool reads and writes.
+    It also says what of it cannot be simulated. Of a setup it shows what the tool reads and writes, of a table its
+    times, units and columns.
 
     Example: osimlite info gait2392.osim
     """
     from osimlite.cli._console import say
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
+    from osimlite.lint.suffixes import is_table
     from osimlite.lint.words import times
     from osimlite.schema.base import Object
     from osimlite.schema.coordinates import Coordinate
@@ -39,13 +39,16 @@ def info(
     from osimlite.schema.model import Model
     from osimlite.schema.tree import is_a
 
+    if is_table(str(file)):
+        _table(file, everything)
+        return
     document = read_document(Source.of_file(file), of=Object)
     model = document.top
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
     if not isinstance(model, Model):
         rows = [(model.tag, model.name), ("file", size), ("document version", str(document.version))]
-        _facts([*rows, *_files(model), ("remarks of the reader", str(len(document.notes)))])
-        _classes([*model.walk()], every_class)
+        _facts([*rows, *_files(model, file.parent), ("remarks of the reader", str(len(document.notes)))])
+        _classes([*model.walk()], everything)
         return
     components = list(model.components())
     muscles = [component for component in components if is_a(component, "Muscle")]
@@ -87,7 +90,7 @@ def info(
         for line in _muscles(muscles):
             say(line)
 
-    _classes(components, every_class)
+    _classes(components, everything)
 
 
 def _facts(rows: Sequence[tuple[str, str]]) -> None:
@@ -104,33 +107,66 @@ def _facts(rows: Sequence[tuple[str, str]]) -> None:
     plain_console().print(facts)
 
 
-def _files(top: Object) -> Iterator[tuple[str, str]]:
-    """The properties of a document that name files and folders, with what they say."""
+def _table(file: Path, everything: bool) -> None:
+    from osimlite.files import read_file
+    from osimlite.lint.table import Table
+
+    table = Table(read_file(file), str(file))
+    said = {key: entry.value.text for key, entry in table.entries.items()}
+    kind = "markers" if table.is_markers else f"storage, version {table.form}"
+    rows = len(table.rows.times)
+    facts = [
+        ("table", kind + (f", each cell a {said['DataType']}" if table.parts > 1 else "")),
+        ("file", f"{file} ({len(table.data) / 1000:.0f} kB)"),
+        ("rows", str(rows)),
+        ("markers" if table.is_markers else "columns beside the time", str(len(table.columns))),
+    ]
+    if table.span is not None:
+        first, last = table.span
+        # Times have few digits; their mean step has more.
+        rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
+        facts.append(("time", f"{first:g} to {last:g} s{rate}"))
+    unit = "Units" if table.is_markers else "inDegrees"
+    facts.append((unit, said.get(unit, "not said")))
+    _facts(facts)
+    _listed("Markers" if table.is_markers else "Columns", table.columns, everything)
+
+
+def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
+    """The properties of a document that name files and folders, with what they say and whether that is there."""
     from osimlite.schema.fields import Reference
     from osimlite.schema.specs import reference_specs
 
     for item in top.walk():
         for spec in reference_specs(type(item)):
             value = getattr(item, spec.name)
-            said = " ".join(value) if isinstance(value, tuple) else value
-            is_file = isinstance(spec.kind, Reference) and spec.kind.target.endswith(("file", "folder"))
-            if is_file and said not in ("", None, "Unassigned"):
-                yield spec.name if item is top else f"{item.name or item.tag}: {spec.name}", said
+            if not isinstance(spec.kind, Reference) or not spec.kind.target.endswith(("file", "folder")):
+                continue
+            for name in value if isinstance(value, tuple) else (value,):
+                if name not in ("", None, "Unassigned"):
+                    lost = spec.kind.rule == "file" and not (folder / name.strip()).is_file()
+                    fate = " (not there)" if lost else " (written)" if spec.kind.rule.startswith("output") else ""
+                    yield spec.name if item is top else f"{item.name or item.tag}: {spec.name}", f"{name}{fate}"
 
 
-def _classes(objects: Sequence[Object], every_class: bool) -> None:
+def _classes(objects: Sequence[Object], everything: bool) -> None:
     """Print how many there are of each class."""
+    counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in objects)
+    _listed("Classes", [f"{count} {name}" for name, count in counts.most_common()], everything)
+
+
+def _listed(title: str, items: Sequence[str], everything: bool) -> None:
+    """Print some items, or the first of them."""
     from osimlite.cli._console import plain_console, say, show
     from osimlite.text import visible
 
-    counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in objects)
-    shown = counts.most_common(None if every_class else 15)
-    # A count stays with its class.
-    listed = ", ".join(f"{count}\0{visible(name)}" for name, count in shown)
-    text = textwrap.fill(f"Classes: {listed}", plain_console().width, subsequent_indent="  ", break_long_words=False)
-    show("\n" + text.replace("\0", " ") + "\n")
-    if len(counts) > len(shown):
-        say(f"and {len(counts) - len(shown)} classes more (--all lists them)")
+    shown = items if everything else items[:15]
+    # The words of an item stay together.
+    text = f"{title}: " + ", ".join(visible(item).replace(" ", "\0") for item in shown)
+    lines = textwrap.fill(text, plain_console().width, subsequent_indent="  ", break_long_words=False)
+    show("\n" + lines.replace("\0", " ") + "\n")
+    if len(items) > len(shown):
+        say(f"and {len(items) - len(shown)} more (--all lists them)")
 
 
 def _coordinates(model: Model) -> Iterator[str]:

@@ -22,7 +22,7 @@ from osimlite.document.objects import Included, ObjectReader, layout_of, remembe
 from osimlite.document.source import Source
 from osimlite.document.syntax import expect_plain_doctype, place_of, plain_words
 from osimlite.errors import DocumentError, MissingFileError, NotWellFormedError, SpecialFileError, VersionError
-from osimlite.files import expect_size
+from osimlite.files import TABLES, expect_size
 from osimlite.schema.base import Object
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
@@ -285,6 +285,8 @@ def _not_well_formed(source: Source, line: int, column: int, message: str) -> No
     """The error for what the parser says of a place in the text that it was given."""
     line, column, _ = place_of(source, line, column, message)
     words = plain_words(message) if "<" in source.text else "there is no element in it"
+    if source.file is not None and source.file.lower().endswith(TABLES):
+        words += "; of tables, 'validate', 'info' and 'diff' know more"
     return NotWellFormedError(f"not well-formed XML: {words}", file=source.file, line=line, column=column)
 
 

@@ -8,9 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
+from osimlite.files import TABLES as TABLES
 
-TABLES = (".sto", ".mot", ".trc")
-"""Tables over time."""
 DOCUMENTS = (".xml", ".omoco")
 """Setups of tools and what they consist of."""
 PROJECT = (".osim", *DOCUMENTS, *TABLES)

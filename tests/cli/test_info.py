@@ -28,8 +28,43 @@ def test_info_breaks_no_name_and_says_units():
 def test_info_of_a_setup_file_names_its_files(fixtures):
     rows = [line.split(None, 1) for line in run("info", fixtures / "documents" / "analyze.xml").out.splitlines()]
     assert ["AnalyzeTool", "walk"] in [[word.strip() for word in row] for row in rows]
-    assert ["force_set_files", "residuals.xml reserves.xml"] in [[word.strip() for word in row] for row in rows]
+    files = [row[1].strip() for row in rows if row and row[0] == "force_set_files"]
+    assert files == ["residuals.xml (not there)", "reserves.xml (not there)"]
     assert any("1 StaticOptimization" in row[-1] for row in rows if row)
+
+
+def test_info_of_tables(fixtures):
+    said = run("info", fixtures / "setups" / "coords.mot").out
+    rows = dict(line.split("  ", 1) for line in said.splitlines() if "  " in line.strip())
+    assert (rows["rows"].strip(), rows["time"].strip(), rows["inDegrees"].strip()) == (
+        "61",
+        "0 to 1 s, 60 Hz",
+        "yes",
+    )
+    assert "Columns: pelvis_tilt, " in said and "--all" not in said
+    said = run("info", fixtures / "setups" / "walk.trc", "--all").out
+    assert "markers" in said and "mm" in said and "R.ASIS" in said and "--all" not in said
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_diff_of_tables(fixtures, tmp_path):
+    old, new = fixtures / "setups" / "coords.mot", tmp_path / "new.mot"
+    head, _, rows = old.read_text().replace("inDegrees=yes", "inDegrees=no").partition("pelvis_tilt")
+    first, *others = rows.splitlines(keepends=True)
+    words = others[6].split("\t")
+    words[2] = "1.5"
+    new.write_text(f"{head}tilt{first}{''.join(others[:6])}" + "\t".join(words) + "".join(others[7:-1]))
+    done = run("diff", old, new)
+    assert done.code == 1 and done.out.splitlines()[:4] == [
+        "- pelvis_tilt", "+ tilt", "  inDegrees: yes -> no", "  rows: 61 -> 60",
+    ]  # fmt: skip
+    assert done.out.splitlines()[5:] == [
+        "  pelvis_tx: 0.62331989 -> 1.5 at 0.1 s, where it differs most; 1 of 60 rows differ"
+    ]
+    assert (run("diff", old, old).code, run("diff", old, old).out) == (0, "")
+    said = run("format", old).err
+    assert "no element in it; of tables, 'validate', 'info' and 'diff' know more" in said
+    assert run("diff", "--git", "a.mot", "/dev/null", "0", "0", old, "0", "0").out.splitlines()[2] == "+ pelvis_tilt"
 
 
 def test_format_and_diff_of_setup_files(fixtures, tmp_path):
