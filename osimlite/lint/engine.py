@@ -75,7 +75,10 @@ _MODULES = (
     "setup_files",
     "setup_names",
     "setup_columns",
+    "setup_markers",
+    "setup_loads",
     "setup_times",
+    "setup_tasks",
     "setup_tools",
     "moco",
 )

@@ -32,6 +32,8 @@ def one_trial(draft: Draft) -> None:
         trials = tool.find("IKTrialSet")
         found = [] if trials is None else trials.findall("objects/IKTrial")
         if trials is None or not found:
+            if draft.version != 10500:
+                draft.refuse(tool, tool, "an InverseKinematicsTool without an IKTrialSet, which old versions had")
             continue
         for child in list(found[0]):
             if is_element(child):
