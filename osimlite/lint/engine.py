@@ -78,6 +78,7 @@ _MODULES = (
     "setup_markers",
     "setup_loads",
     "setup_times",
+    "setup_sensors",
     "setup_tasks",
     "setup_tools",
     "moco",

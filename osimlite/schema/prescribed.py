@@ -7,7 +7,7 @@ from osimlite.schema.functions import FunctionSet
 from osimlite.schema.references import (
     ExpressedInFrame,
     FrameName,
-    LegacyFileName,
+    LegacyInputTable,
     MaybeColumnName,
     PhysicalFrameSocket,
 )
@@ -57,5 +57,5 @@ class ExternalLoads(ModelComponentSet):
     """The forces, each with its columns of the file."""
     groups: LegacyMany[ObjectGroup] = none()
     """Named selections of the forces; the mechanics ignore them."""
-    datafile: LegacyFileName = ""
+    datafile: LegacyInputTable = ""
     """File of the columns (.sto, .mot); it replaces what the forces name as their source."""

@@ -15,7 +15,10 @@ _IDENTIFIERS = {
 def external_forces(draft: Draft) -> None:
     """A PrescribedForce among ExternalLoads is an ExternalForce in ground."""
     for loads in draft.tagged("ExternalLoads"):
-        for force in [member for member in members(loads) if member.tag == "PrescribedForce"]:
+        for force in list(members(loads)):
+            if force.tag != "PrescribedForce":
+                draft.refuse(loads, force, f"{force.tag} is not known among ExternalLoads of a version before 20301")
+                continue
             body = force.find("body")
             draft.add(force, "applied_to_body", "" if body is None else plain(body), source=force)
             for frame in ("force", "point"):

@@ -158,6 +158,8 @@ def unknown_choice(subject: Subject, found: Found) -> None:
                             item,
                             tag=spec.tag,
                             word=str(word) if isinstance(value, tuple) else None,
+                            # Some properties take any letter case.
+                            severity=WARNING if str(word).lower() in choices else None,
                             suggestion=nearest(str(word), map(str, choices)),
                         )
 

@@ -6,6 +6,7 @@ import os
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import NOTHING, UNGIVEN, Naming, Setup, is_of
+from osimlite.lint.suffixes import is_table
 from osimlite.lint.words import called
 from osimlite.schema.fields import Reference
 
@@ -134,12 +135,12 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
                     f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(endings)})",
                     naming.item, tag=naming.spec.tag,
                 )  # fmt: skip
-        elif wanted[:1].isupper() and naming.name.lower().endswith((".xml", ".osim")):
-            top = setup.document(naming.name)
-            if top is not None and not is_of(top, wanted):
+        elif wanted[:1].isupper():
+            top = None if is_table(naming.name) else setup.document(naming.name)
+            held = "a table" if top is None else f"a {type(top).__name__}"
+            if is_table(naming.name) or (top is not None and not is_of(top, wanted)):
                 found(
-                    f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds a "
-                    f"{type(top).__name__}",
+                    f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds {held}",
                     naming.item, tag=naming.spec.tag,
                 )  # fmt: skip
 

@@ -10,6 +10,7 @@ from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Unknown
 from osimlite.schema.fields import Reference
 from osimlite.schema.states import variables
+from osimlite.text import listed
 
 _IN_MODEL = {
     "coordinate-name": "coordinate",
@@ -41,6 +42,8 @@ _WORDS = {
     "express_body": {"center_of_mass", "-1"},
 }
 """What a property takes besides names."""
+_SETS = {"Marker": "/markerset", "Force": "/forceset"}
+"""Where in the model stands what a tool adds to it; relative paths start there."""
 _SILENT = {
     "muscle_list",
     "moment_arm_coordinate_list",
@@ -110,7 +113,11 @@ def unknown_name(setup: Setup, found: Found) -> None:
         what = _IN_MODEL.get(kind.rule)
         if what == "":
             what = kind.target
-        if kind.rule == "socket" and text.startswith(("/bodyset/", "/jointset/")):
+        if kind.rule == "socket" and kind.target.endswith("Frame"):
+            # Relative paths start where the model has what is added to it.
+            base = next((f"{path}/{item.name}" for cls, path in _SETS.items() if is_of(item, cls)), "")
+            if not (base or text.startswith("/")) or tree.walk(text, base, kind.target).target is not None:
+                continue
             what = "component"
         elif kind.rule == "socket" and is_of(item, "Controller"):
             what = "actuator"
@@ -149,14 +156,26 @@ def unknown_name(setup: Setup, found: Found) -> None:
             attribute="name" if of_name else None, severity=WARNING if silent else None,
             suggestion="all" if more else nearest_name(text, sorted(names)),
         )  # fmt: skip
-    if setup.tool is not None and type(setup.tool[1]).__name__ in ("AnalyzeTool", "ForwardTool"):
-        actuators = setup.names_of("Actuator")
-        for control in setup.named("Control"):
-            name = control.name.removesuffix(".excitation").rpartition("/")[2]
-            if actuators and name not in actuators and name not in unknown:
+    if setup.tool is not None and is_of(setup.tool[1], "AbstractTool"):
+        # Of tools that follow a motion these are bounds, and go by the whole name.
+        follows = hasattr(setup.tool[1], "desired_kinematics_file")
+        fate = "OpenSim leaves it out" if follows else "OpenSim refuses it"
+        plain = setup.names_of("Actuator") | unknown
+        actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
+        for control in setup.named("Control") if plain else ():
+            if control.name not in actuators:
                 found(
-                    f"the model has no actuator '{name}' for {called(control)}: OpenSim refuses it",
-                    control, attribute="name", suggestion=nearest_name(name, sorted(actuators)),
+                    f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
+                    severity=WARNING if follows else None, suggestion=nearest_name(control.name, sorted(actuators)),
+                )  # fmt: skip
+        for controller in setup.named("ControlSetController") if plain else ():
+            table = setup.table(controller.controls_file)
+            lost = [column for column in table.columns if column not in actuators] if table is not None else []
+            if lost:
+                found(
+                    f"the model has no actuator for the columns {listed(map(repr, lost))} of "
+                    f"'{controller.controls_file}': OpenSim refuses it",
+                    controller, tag="controls_file",
                 )  # fmt: skip
 
 

@@ -13,13 +13,17 @@ from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 
+_FIRST_STATES = 0.03
+"""For how long computed muscle control runs to find the states of muscles at the start, s."""
+
 
 @rule("OSIM844", "time-outside-data", severity=WARNING, about="document")
 def time_outside_data(setup: Setup, found: Found) -> None:
     """A tool runs over times that its data do not have, or that make no sense.
 
     ## What it does
-    Compares the times of a tool with those of the tables that it reads: markers, coordinates, loads.
+    Compares the times of a tool with those of the tables that it reads: markers, coordinates, sensors. Computed muscle
+    control needs 0.03 s and the time of one window.
 
     ## Why is this bad
     Inverse kinematics cuts the times to the data without a word. Loads that end before the motion go on as their spline
@@ -50,7 +54,8 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     for item in setup.having("time_range"):
         count = len(item.time_range)
         if count != 2 and getattr(item, "apply", True):
-            found(f"a range has two times, this one {count}: OpenSim fails", item, tag="time_range", severity=ERROR)
+            fate, severity = ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
+            found(f"a range has two times, this one {count}: OpenSim {fate}", item, tag="time_range", severity=severity)
     for item, tag, motion in motions(setup):
         if 0 < motion.rows.count < 6:
             found(
@@ -59,7 +64,10 @@ def time_outside_data(setup: Setup, found: Found) -> None:
             )  # fmt: skip
     for item, tags, first, last in _ranges(setup):
         if any(number != number for number in (first, last)):
-            found(f"a time of {called(item)} is no number: OpenSim refuses it", item, tag=tags[0], severity=ERROR)
+            fate, severity = (
+                ("takes all times", WARNING) if is_of(item, "IMUInverseKinematicsTool") else ("refuses it", ERROR)
+            )
+            found(f"a time of {called(item)} is no number: OpenSim {fate}", item, tag=tags[0], severity=severity)
             continue
         if first > last:
             found(
@@ -67,6 +75,13 @@ def time_outside_data(setup: Setup, found: Found) -> None:
                 item, tag=tags[-1], severity=ERROR,
             )  # fmt: skip
             continue
+        needed = _FIRST_STATES + getattr(item, "cmc_time_window", math.nan)
+        if last - first < needed:
+            found(
+                f"{called(item)} runs for {last - first:.4g} s and needs {needed:g} s for its first controls: OpenSim "
+                "fails",
+                item, tag=tags[-1], severity=ERROR,
+            )  # fmt: skip
         for name, kind in _data_of(item):
             table = setup.table(name)
             span = table.span if table is not None and not table.rows.of("order", "time") else None
@@ -88,8 +103,8 @@ def time_outside_data(setup: Setup, found: Found) -> None:
 
 def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
     for item in setup.having("time_range"):
-        if len(item.time_range) == 2 and getattr(item, "apply", True):
-            yield item, ("time_range",), *item.time_range
+        if len(item.time_range) > 1 and getattr(item, "apply", True):
+            yield item, ("time_range",), *item.time_range[:2]
     for item in setup.having("initial_time", "final_time"):
         yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
     for item in setup.named("Analysis"):
@@ -99,10 +114,13 @@ def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, floa
 
 def _data_of(item: Any) -> Iterator[tuple[str, str]]:
     """The tables that a tool reads over its times, with what happens where they end."""
-    for tag in ("marker_file", "coordinates_file", "desired_kinematics_file", "coordinate_file"):
+    for tag in ("marker_file", "coordinates_file", "desired_kinematics_file", "coordinate_file", "orientations_file"):
         if is_of(item, "ForwardTool") or (tag == "coordinate_file" and is_of(item, "MarkerPlacer")):
             continue
-        yield getattr(item, tag, ""), ": OpenSim takes what there is" if tag == "marker_file" else ""
+        yield (
+            getattr(item, tag, ""),
+            ": OpenSim takes what there is" if tag in ("marker_file", "orientations_file") else "",
+        )
 
 
 @rule("OSIM845", "loads-end-early", severity=WARNING, about="document")

@@ -72,6 +72,12 @@ def tool_setting(setup: Setup, found: Found) -> None:
                 "the forces of force_set_files replace those of the model: its muscles are gone",
                 tool, tag="replace_force_set", severity=WARNING,
             )  # fmt: skip
+        if is_of(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
+            found(
+                "the muscles of the model are left in it, and OpenSim crashes: the forces of force_set_files are to "
+                "replace them",
+                tool, tag="replace_force_set",
+            )  # fmt: skip
         if is_of(tool, "AnalyzeTool") and not tool.analysis_set.objects:
             found(f"{called(tool)} has no analysis: OpenSim refuses it", tool)
     names = Counter(item.name for item in setup.named("Analysis"))

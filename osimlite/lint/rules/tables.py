@@ -239,7 +239,11 @@ def table_setting(table: Table, found: Found) -> None:
     for key, entry in entries.items():
         right = next((known for known in ("inDegrees", "version", *COUNTS) if known.lower() == key.lower()), key)
         if right != key and right not in entries:
-            found(f"OpenSim does not know '{key}' and leaves it out", at=entry.key.at, suggestion=right)
+            # Without a version a table is read as one of version 1.
+            severity = WARNING if right == "version" else None
+            found(
+                f"OpenSim does not know '{key}' and leaves it out", at=entry.key.at, suggestion=right, severity=severity
+            )
     degrees = entries.get("inDegrees")
     if degrees is not None and degrees.value.text.lower() not in ("yes", "y", "no", "n"):
         meant = {"true": "yes", "1": "yes", "false": "no", "0": "no"}.get(degrees.value.text.lower())

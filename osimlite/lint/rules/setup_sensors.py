@@ -1,0 +1,102 @@
+"""OSIM848: inertial sensors, in their tables and in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.setup import Setup
+from osimlite.lint.table import Table
+from osimlite.lint.words import called, nearest_name
+from osimlite.text import listed
+
+
+def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
+    """Every tool that reads orientations: the property, what the names of sensors add to those of frames, the table."""
+    for kind, tag, ending in (
+        ("IMUInverseKinematicsTool", "orientations_file", ""),
+        ("IMUPlacer", "orientation_file_for_calibration", "_imu"),
+    ):
+        for item in setup.named(kind):
+            table = setup.table(getattr(item, tag))
+            if table is not None and table.labels:
+                yield item, tag, ending, table
+
+
+@rule("OSIM848", "sensor-without-frame", severity=WARNING, about="document")
+def sensor_without_frame(setup: Setup, found: Found) -> None:
+    """A measured sensor has no frame in the model, or a sensor that a tool names was not measured.
+
+    ## What it does
+    Compares the columns of measured orientations with the frames of the model: inverse kinematics takes those that are
+    called as a frame is, the placer of sensors those that are called as a frame with the ending `_imu`. Looks for the
+    sensors that the tool names among the columns. The table must be one of quaternions.
+
+    ## Why is this bad
+    OpenSim leaves out sensors without a frame, with no more than the number of those that are left; if none is left, it
+    refuses the table.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <IMUPlacer name="placer">
+            <model_file>leg.osim</model_file>
+            <base_imu_label>thigh</base_imu_label>
+            <base_heading_axis>x</base_heading_axis>
+            <orientation_file_for_calibration>leg_imu.sto</orientation_file_for_calibration>
+            <output_model_file>calibrated.osim</output_model_file>
+        </IMUPlacer>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <IMUPlacer name="placer">
+            <model_file>leg.osim</model_file>
+            <base_imu_label>thigh_imu</base_imu_label>
+            <base_heading_axis>x</base_heading_axis>
+            <orientation_file_for_calibration>leg_imu.sto</orientation_file_for_calibration>
+            <output_model_file>calibrated.osim</output_model_file>
+        </IMUPlacer>
+    </OpenSimDocument>
+    ```
+    """
+    for item, tag, ending, table in _orientations(setup):
+        file = getattr(item, tag)
+        held = table.entries.get("DataType")
+        if held is None or held.value.text != "Quaternion":
+            found(f"'{file}' must say DataType=Quaternion: OpenSim refuses it", item, tag=tag, severity=ERROR)
+        base = getattr(item, "base_imu_label", "")
+        if base and base not in table.columns:
+            found(
+                f"'{file}' has no sensor '{base}': OpenSim refuses the setup", item, tag="base_imu_label",
+                severity=ERROR, suggestion=nearest_name(base, table.columns),
+            )  # fmt: skip
+        for weight in getattr(getattr(item, "orientation_weights", None), "objects", ()):
+            if weight.name not in table.columns:
+                found(
+                    f"'{file}' has no sensor '{weight.name}': {called(weight)} is the weight of none", weight,
+                    attribute="name", suggestion=nearest_name(weight.name, table.columns),
+                )  # fmt: skip
+        frames = {name + ending for name in setup.names_of("PhysicalFrame")}
+        lost = [column for column in table.columns if column not in frames]
+        if not frames:
+            continue
+        if len(lost) == len(table.columns):
+            wanted = f", as '{min(frames)}' is" if ending else ""
+            found(
+                f"no column of '{file}' is called as a frame of the model{wanted}: OpenSim refuses it",
+                item,
+                tag=tag,
+                severity=ERROR,
+            )
+        elif lost:
+            near = [f"'{name}' for '{column}'" for column in lost if (name := nearest_name(column, sorted(frames)))]
+            hint = f"; is it {listed(near)}?" if near else ""
+            found(
+                f"the model has no frame for {listed([repr(column) for column in lost])} of '{file}': OpenSim leaves "
+                f"them out{hint}",
+                item, tag=tag,
+            )  # fmt: skip

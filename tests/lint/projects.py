@@ -1,0 +1,132 @@
+"""Single faults at random in whole projects: a model with the setups and the tables that fit it.
+
+A fault knows the lines in which it may be found: those that it changes, and those of other files that name what it
+changes. It is `sure` if it is a fault whatever the project is; of the others OpenSim must say whether they are.
+"""
+
+from __future__ import annotations
+
+import gzip
+import random
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.oracle.structural_edits import Text
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+
+Place = tuple[str, int]
+
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(inf|infinity|nan)", re.IGNORECASE)
+_NAMED = re.compile(r'<(\w+) name="([^"]+)"')
+
+
+class Fault(NamedTuple):
+    """What is done to a project: the files that it changes (None: taken away), and where it may be found."""
+
+    kind: str
+    what: str
+    file: str
+    texts: dict[str, str | None]
+    places: frozenset[Place]
+    sure: bool
+
+
+class Change(NamedTuple):
+    """A changed text of a file, with the lines of it, and the words, that the change is about."""
+
+    file: str
+    what: str
+    text: str | None
+    lines: tuple[int, ...]
+    words: tuple[str, ...] = ()
+    sure: bool = False
+
+
+class Table:
+    """The lines of a table."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name = name
+        self.lines = text.split("\n")
+        self.is_markers = name.endswith(".trc")
+        self.label_line = 3 if self.is_markers else self.lines.index("endheader") + 1
+        self.labels = self.lines[self.label_line].split("\t")
+        self.rows = [k for k, line in enumerate(self.lines) if k > self.label_line and line[:1].isdigit()]
+        self.time = int(self.is_markers)
+        self.old = "version=1" in self.lines
+
+    def cells(self, line: int) -> list[str]:
+        return self.lines[line].split("\t")
+
+    def with_cells(self, line: int, cells: list[str]) -> str:
+        return "\n".join([*self.lines[:line], "\t".join(cells), *self.lines[line + 1 :]])
+
+    def with_lines(self, line: int, *new: str, instead_of: int = 1) -> str:
+        return "\n".join([*self.lines[:line], *new, *self.lines[line + instead_of :]])
+
+
+class Project:
+    """The texts of a folder by file, and what connects them."""
+
+    def __init__(self, texts: dict[str, str]) -> None:
+        self.texts = texts
+        self.documents = {name: Text(text) for name, text in texts.items() if name.endswith((".xml", ".omoco"))}
+        self.tables = {
+            name: Table(name, text) for name, text in texts.items() if name.endswith((".trc", ".mot", ".sto"))
+        }
+        self.components: dict[str, str] = {name: tag for tag, name in _NAMED.findall(texts["model.osim"])}
+        labels = {label for table in self.tables.values() for label in table.labels[1:] if label}
+        self.names = sorted({*self.components, "ground", *labels, *(label[:-1] for label in labels)})
+
+    def users(self, file: str) -> dict[str, int]:
+        """Every document that names a file, or names one that names it, with the line."""
+        found: dict[str, int] = {}
+        for name, document in self.documents.items():
+            for line, text in enumerate(document.text.split("\n"), 1):
+                if name != file and re.search(rf"[>\s]{re.escape(file)}[<\s]", text):
+                    found |= {name: line, **{user: at for user, at in self.users(name).items() if user not in found}}
+        return found
+
+    def places_of(self, word: str) -> set[Place]:
+        """Every line of a document that names something."""
+        whole = re.compile(rf"""(?<![^\s<>"'/]){re.escape(word)}(?![^\s<>"'/.])""")
+        return {
+            (name, line)
+            for name, document in self.documents.items()
+            for line, text in enumerate(document.text.split("\n"), 1)
+            if whole.search(text)
+        }
+
+
+_MISSPELT: tuple[Callable[[random.Random, str], str], ...] = (
+    lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at + 1 :],
+    lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at] + word[at:],
+    lambda draw, word: word[: (at := draw.randrange(len(word)))] + draw.choice("abcxyz_1") + word[at + 1 :],
+    lambda draw, word: word.swapcase(),
+    lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at:].swapcase(),
+)
+
+
+def misspelt(draw: random.Random, word: str) -> str:
+    """A word with a letter lost, doubled, changed, or in the other case."""
+    return draw.choice(_MISSPELT)(draw, word)
+
+
+def walking() -> Project:
+    """Gait: scaling, inverse kinematics, inverse dynamics, analyses, residual reduction, muscle control."""
+    texts = {
+        file.name: file.read_text()
+        for folder in ("setups", "pipelines/walking")
+        for file in sorted((FIXTURES / folder).iterdir())
+        if file.suffix != ".gz"
+    }
+    texts["model.osim"] = gzip.decompress((FIXTURES / "setups" / "model.osim.gz").read_bytes()).decode()
+    return Project(texts)
+
+
+def pendulum() -> Project:
+    """A double pendulum with sensors: they are placed, and followed; a Moco study."""
+    return Project({file.name: file.read_text() for file in sorted((FIXTURES / "pipelines" / "pendulum").iterdir())})

@@ -1,0 +1,90 @@
+"""Whole projects with one fault at random: it is found on its line, in the right file.
+
+Three hundred by default; ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` asks for others. What OpenSim says of them is asked
+in ``tests/oracle/test_random_faults.py``.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from osimlite.lint.diagnostic import Finding
+from osimlite.lint.engine import run, subject_of
+from tests.lint.project_faults import faults, harmless
+from tests.lint.projects import Fault, Project, pendulum, walking
+
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", "300"))
+SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
+
+
+class Folder:
+    """A project in files, in which one may be changed at a time."""
+
+    def __init__(self, path: Path, project: Project) -> None:
+        self.path = path
+        self.project = project
+        for name, text in project.texts.items():
+            (path / name).write_bytes(text.encode())
+        self.now = 0
+
+    def check(self, *files: str) -> list[Finding]:
+        """What is found in files, of those that are there."""
+        return [f for name in files if (self.path / name).exists() for f in run(subject_of(str(self.path / name)))]
+
+    def put(self, texts: dict[str, str | None]) -> None:
+        # Files of one length that are written within one tick of the clock look the same.
+        self.now += 1
+        for name, text in texts.items():
+            if text is None:
+                (self.path / name).unlink()
+            else:
+                (self.path / name).write_bytes(text.encode())
+                os.utime(self.path / name, (self.now, self.now))
+
+    def found(self, fault: Fault) -> list[Finding]:
+        """What is found in the project with a fault: in the file that it changes, and in those that use it."""
+        self.put(fault.texts)
+        files = {fault.file, *self.project.users(fault.file), *(file for file, _ in fault.places)}
+        try:
+            # Of the model, whose meshes are not there, what is wrong with its text.
+            return [f for f in self.check(*sorted(files)) if f.code != "OSIM701"]
+        finally:
+            self.put({name: self.project.texts[name] for name in fault.texts})
+
+
+@pytest.fixture(scope="module", params=[walking, pendulum], ids=["walking", "pendulum"])
+def folder(request, tmp_path_factory):
+    return Folder(tmp_path_factory.mktemp("project"), request.param())
+
+
+def in_place(fault: Fault, findings: list[Finding]) -> list[Finding]:
+    """The findings that are where the fault is."""
+    return [f for f in findings if (Path(str(f.file)).name, f.line) in fault.places]
+
+
+def test_the_project_is_without_findings(folder):
+    assert folder.check(*(name for name in sorted(folder.project.texts) if not name.endswith(".osim"))) == []
+
+
+def test_a_fault_is_found_where_it_is(folder):
+    missed = []
+    for fault in islice((f for f in faults(folder.project, random.Random(SEED)) if f.sure), WANTED // 2):
+        findings = folder.found(fault)
+        if not in_place(fault, findings):
+            missed.append(
+                f"{fault.kind} {fault.what}\n  {sorted(fault.places)}\n  " + "\n  ".join(map(str, findings[:3]))
+            )
+    assert not missed, f"{len(missed)} of {WANTED // 2}:\n" + "\n".join(missed)
+
+
+def test_what_changes_nothing_is_not_found(folder):
+    wrong = []
+    for fault in islice(harmless(folder.project, random.Random(SEED)), WANTED // 6):
+        findings = folder.found(fault)
+        wrong += [f"{fault.what}\n  {findings[0]}"] if findings else []
+    assert not wrong, "\n".join(wrong)

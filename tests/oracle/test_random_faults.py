@@ -1,0 +1,152 @@
+"""Whole projects with one fault at random: OpenSim runs the tools, and osimlite says what it says.
+
+Twenty by default, ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others. What OpenSim refuses, or crashes on, must
+have a finding where the fault is; what it takes, with results of the same numbers, must not be told to be refused.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.lint.project_faults import faults
+from tests.lint.projects import Fault, Project, pendulum, walking
+from tests.lint.test_random_faults import Folder, in_place
+from tests.oracle.opensim_tools import LOG
+
+pytestmark = pytest.mark.oracle
+
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", "20"))
+SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
+VERDICTS = ("hangs", "crashes", "raises", "false", "changes", "tells", "nothing")
+"""What OpenSim may do, the worst first."""
+
+OTHER_PROJECTS = {
+    "number_out_of_range", "count_of_numbers", "other_bool", "element_twice", "element_moved", "element_gone",
+    "value_gone", "column_gone", "columns_swapped", "other_units", "version",
+}  # fmt: skip
+"""Kinds of faults that, unless they are sure, may leave a project in which nothing shows that it was another."""
+
+TOLD = re.compile(r"OpenSim (ignores|keeps|takes|reads)|no class of OpenSim")
+"""What an error says that a part of a text is lost, of which nobody knows whether it was needed."""
+
+Ask = Callable[[Path, str, str], dict[str, Any]]
+
+
+@pytest.fixture(scope="session")
+def opensim_runs() -> Iterator[Ask]:
+    """Runs a tool in a folder, given its class and its setup."""
+    command = [sys.executable, "-W", "ignore", "-m", "tests.oracle.opensim_tools"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None and process.stdout is not None
+
+        def ask(folder: Path, kind: str, setup: str) -> dict[str, Any]:
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(json.dumps({"folder": str(folder), "kind": kind, "setup": setup}) + "\n")
+            process.stdin.flush()
+            answer: dict[str, Any] = json.loads(process.stdout.readline())
+            return answer
+
+        yield ask
+        process.stdin.close()
+
+
+class Tools:
+    """The tools of a project, run by OpenSim; how each ends without a fault."""
+
+    def __init__(self, path: Path, project: Project, ask: Ask) -> None:
+        self.path, self.project, self.ask = path, project, ask
+        path.mkdir()
+        self.kinds = {
+            name: text.elements[1].tag
+            for name, text in project.documents.items()
+            if re.fullmatch(r"\w*Tool|IMUPlacer|MocoStudy", text.elements[1].tag)
+        }
+        self.faultless = {name: self.run(name, project.texts) for name in self.kinds}
+        assert all(answer["end"] == "done" for answer, _ in self.faultless.values()), self.faultless
+
+    def run(self, setup: str, texts: dict[str, str | None] | dict[str, str]) -> tuple[dict[str, Any], dict[str, str]]:
+        """What OpenSim says, and the files that it writes."""
+        for file in sorted(self.path.rglob("*"), reverse=True):
+            file.rmdir() if file.is_dir() else file.unlink()
+        for name, text in texts.items():
+            if text is not None:
+                (self.path / name).write_bytes(text.encode())
+        answer = self.ask(self.path, self.kinds[setup], setup)
+        files = (file for file in self.path.rglob("*") if file.is_file() and file.name != LOG)
+        written = {str(file.relative_to(self.path)): file.read_text(errors="replace") for file in files}
+        return answer, {name: text for name, text in written.items() if texts.get(name) != text}
+
+    def verdict(self, fault: Fault, draw: random.Random) -> tuple[str, str]:
+        """The worst that OpenSim does with a fault, and what it says to it."""
+        asked = [name for name in self.kinds if name == fault.file or name in self.project.users(fault.file)]
+        ends = []
+        for setup in draw.sample(asked, min(2, len(asked))):
+            answer, written = self.run(setup, {**self.project.texts, **fault.texts})
+            before, results = self.faultless[setup]
+            told = [line for line in answer["log"] if line not in before["log"]]
+            end, said = answer["end"], answer["message"] or "; ".join(told)
+            if end == "done":
+                end = "changes" if not same_results(results, written) else "tells" if told else "nothing"
+            ends.append((VERDICTS.index(end), f"{setup}: {said}"))
+        if not ends:
+            return "nothing", "no tool uses it"
+        worst, said = min(ends)
+        return VERDICTS[worst], said
+
+
+def same_results(before: dict[str, str], after: dict[str, str]) -> bool:
+    """Whether files hold the same words and numbers, headers of tables left aside."""
+    return before.keys() == after.keys() and all(_same(before[name], after[name]) for name in before)
+
+
+def _same(before: str, after: str) -> bool:
+    words, others = (text.rpartition("endheader")[2].split() for text in (before, after))
+    return len(words) == len(others) and all(map(_close, words, others))
+
+
+def _close(word: str, other: str) -> bool:
+    if word == other:
+        return True
+    try:
+        return abs(float(word) - float(other)) <= 1e-6 * max(1.0, abs(float(word)))
+    except ValueError:
+        return False
+
+
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("project", [walking, pendulum], ids=["walking", "pendulum"])
+def test_what_opensim_refuses_is_found(project, opensim_runs, tmp_path):
+    (tmp_path / "lint").mkdir()
+    folder = Folder(tmp_path / "lint", project())
+    tools = Tools(tmp_path / "opensim", folder.project, opensim_runs)
+    draw = random.Random(SEED)
+    counts: Counter[tuple[str, str, str]] = Counter()
+    wrong = []
+    for fault in islice(faults(folder.project, draw), WANTED // 2):
+        verdict, said = tools.verdict(fault, draw)
+        findings = folder.found(fault)
+        found = in_place(fault, findings)
+        worst = "error" if any(f.severity == "error" for f in found) else "finding" if found else "none"
+        counts[fault.kind, verdict, worst] += 1
+        refused = verdict in ("hangs", "crashes", "raises", "false")
+        if (refused or (verdict == "changes" and (fault.sure or fault.kind not in OTHER_PROJECTS))) and not found:
+            wrong.append(f"MISSED {verdict} {fault.kind} {fault.what}\n  {said[:300]}\n  {sorted(fault.places)}")
+            wrong += [f"  elsewhere: {f}" for f in findings[:2]]
+        alarms = [f for f in found if f.severity == "error" and not TOLD.search(f.message)]
+        if verdict == "nothing" and alarms and fault.file != "model.osim":
+            wrong.append(f"ALARM {fault.kind} {fault.what}\n  {said[:300]}")
+            wrong += [f"  {f}" for f in alarms]
+    print(*(f"{number:5d} {' '.join(key)}" for key, number in sorted(counts.items())), sep="\n")
+    assert not wrong, f"{counts}\n" + "\n".join(wrong)
