@@ -12,7 +12,11 @@ import typer
 
 def rule(
     code: Annotated[
-        str | None, typer.Argument(help="Code or name of a rule; without it, all rules are listed.", show_default=False)
+        str | None,
+        typer.Argument(
+            help="Code or name of a rule; the beginning of codes (OSIM8) or a family (data) lists several.",
+            show_default=False,
+        ),
     ] = None,
 ) -> None:
     """Print what a rule finds, why that is bad, and an example with its mend.
@@ -26,19 +30,19 @@ def rule(
 
     rules = all_rules()
     columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80
-    if code is None:
-        width = max(len(known.name) for known in rules)
-        for known in rules:
+    found = [known for known in rules if code is None or known.matches(code)]
+    if code is not None and not found:
+        names = [word for known in rules for word in (known.code, known.name)]
+        raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)}; 'osimlite rule' lists all rules")
+    if len(found) > 1:
+        width = max(len(known.name) for known in found)
+        for known in found:
             head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
             show(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)) + "\n")
         return
-    found = next((known for known in rules if code.upper() == known.code or code == known.name), None)
-    if found is None:
-        names = [word for known in rules for word in (known.code, known.name)]
-        raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)}; 'osimlite rule' lists all rules")
     from osimlite.lint.pages import page_of
 
-    show(_wrapped(page_of(found), columns) + "\n")
+    show(_wrapped(page_of(found[0]), columns) + "\n")
 
 
 def _wrapped(page: str, columns: int) -> str:

@@ -101,6 +101,8 @@ def test_what_cannot_be_carried_out_is_exit_2_and_one_sentence(arguments, words)
 
 
 def test_the_table_and_the_page_of_a_rule():
+    some = run("rule", "osim86").out
+    assert "OSIM861" in some and "OSIM301" not in some and "OSIM80" in run("rule", "data").out
     table = run("rule").out
     assert "OSIM301  unresolved-reference" in table
     page = run("rule", "osim301").out
