@@ -40,11 +40,11 @@ PASSES: tuple[Callable[[Draft], None], ...] = (
     add_coordinates,
     add_constraints,
     add_contacts,
+    add_paths,
     add_forces,
     add_shapes,
     add_markers,
     add_frames,
-    add_paths,
     add_keyframe,
 )
 """What makes a file of a model, in this order: bodies and joints come before what is fixed to them or acts on them."""

@@ -1,4 +1,4 @@
-"""Forces and actuators other than muscles and paths: what each class becomes, if MuJoCo has its law."""
+"""Forces and actuators: what each class becomes, if MuJoCo has its law."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from osimlite.schema.forces import Force
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf import coordinate_forces as on_coordinates
 from osimlite.translate.mjcf import frame_forces as on_frames
+from osimlite.translate.mjcf import path_forces as on_paths
 from osimlite.translate.mjcf.draft import Draft, Unsayable
+from osimlite.translate.mjcf.muscles import MUSCLES, muscle
 
 MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
     "CoordinateActuator": on_coordinates.actuator,
@@ -23,6 +25,11 @@ MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
     "PointActuator": on_frames.point_actuator,
     "BodyActuator": on_frames.body_actuator,
     "BushingForce": on_frames.bushing,
+    "PathActuator": on_paths.actuator,
+    "PathSpring": on_paths.spring,
+    "Ligament": on_paths.ligament,
+    "Blankevoort1991Ligament": on_paths.ligament,
+    **{kind.__name__: muscle for kind in MUSCLES},
 }
 """By class, what adds a force to a draft and tells what it became; it raises `Unsayable` where that cannot be."""
 

@@ -30,7 +30,7 @@ CHOOSING, FITTING, HELD_OUT = 64, 200, 100
 EXACT = 1e-9
 """Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
 PULLED = 0.1
-"""Inertia (kg) of helpers along their own axes: muscles pull at them, and the equalities that hold them are soft."""
+"""Inertia (kg, kg·m²) of helpers: muscles pull at them, and the equalities that hold them are soft."""
 WRAPS = 4
 """Group of the geoms that tendons go around, and of their sites."""
 
@@ -40,7 +40,7 @@ def add_paths(draft: Draft) -> None:
     owners: dict[str, AbstractGeometryPath] = {
         path: owner.geometry_path
         for owner, path in draft.components(Force)
-        if isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
+        if owner.appliesForce and isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
     }
     if not owners:
         return
@@ -164,8 +164,9 @@ class _Writer:
         if key not in self._helpers:
             name = self.draft.name("joint", f"{self.draft.mechanism.coordinates[coordinate].name}_helper")
             speck = add(self.draft.section("worldbody"), "body", name=self.draft.name("body", name))
-            add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
-            add(speck, "joint", name=name, type="slide", axis=(1.0, 0.0, 0.0), armature=PULLED)
+            # Of such a body MuJoCo weighs equalities by its own inertia, whatever the armature.
+            add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, PULLED))
+            add(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
             follow(self.draft, name, Follower(lead.joint, _along(own, drive)))
             self._helpers[key] = name
         return self._helpers[key], Line(1.0, 0.0)

@@ -1,0 +1,51 @@
+"""What a force along a path pulls with while nothing moves, by its own law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import SimulationError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.frames import Body
+from osimlite.schema.functions import LinearFunction
+from osimlite.schema.joints import SliderJoint
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.system import System
+
+
+def isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) -> Array:
+    """Tension (A, L), N, of a force along a path at activations (A,) and lengths of the path (L,), m.
+
+    NaN where a muscle has no equilibrium. The force is put between ground and a block on a slide, which stands still.
+    """
+    model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
+    block = model.add(Body(name="block", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(SliderJoint(name="slide").between(model.ground, block))
+    path = GeometryPath(name="path")
+    for name, frame in (("a", "/ground"), ("b", "/bodyset/block")):
+        path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
+    model.add(force.copy_deep().model_copy(update={"name": "force", "geometry_path": path}))
+    if isinstance(force, Muscle):
+        # The control, which is the activation of muscles that have no state of it, is the time.
+        brain = PrescribedController(name="brain", socket_actuators=("/forceset/force",))
+        brain.ControlFunctions.objects.append(LinearFunction(coefficients=(1.0, 0.0)))
+        model.add(brain)
+    mechanism = build_mechanism(model)
+    system = System(mechanism, force_elements(model, mechanism))
+    found = np.full((len(activations), len(lengths)), np.nan)
+    for row, activation in zip(found, activations, strict=True):
+        start = [activation if variable.path.endswith("/activation") else 0.1 for variable in system.state.variables]
+        for place, length in enumerate(lengths.tolist()):
+            with suppress(SimulationError):
+                state = system.equilibrated(activation, [length, 0.0, *start])
+                row[place] = system.force_records(activation, state)[0]
+    return found

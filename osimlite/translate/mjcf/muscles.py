@@ -1,0 +1,187 @@
+"""Muscles as MuJoCo's: a rigid tendon in series with fibers whose curves are parabolas.
+
+Length range and range say the tendon slack length LT and the optimal fiber length along the tendon L0, as MuJoCo reads
+them: (length - LT) / L0 is its normalized length. These stay the model's own to the last digit unless forces are
+fitted. What MuJoCo has no number for, the ends of the active curve and the height of the passive one, is always the
+best there is for the isometric tension of the muscle in equilibrium with its elastic tendon.
+
+Source: MuJoCo's manual (Modeling, Muscles) and the public code of `mju_muscleGainLength` and `mju_muscleBias`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.schema.muscles import (
+    DeGrooteFregly2016Muscle,
+    MeyerFregly2016Muscle,
+    Millard2012AccelerationMuscle,
+    Millard2012EquilibriumMuscle,
+    Muscle,
+    RigidTendonMuscle,
+    Thelen2003Muscle,
+)
+from osimlite.schema.old_muscles import (
+    Delp1990Muscle_Deprecated,
+    Schutte1993Muscle_Deprecated,
+    Thelen2003Muscle_Deprecated,
+)
+from osimlite.translate.fidelity import Error
+from osimlite.translate.mjcf.draft import Draft, Unsayable, add
+from osimlite.translate.mjcf.isometric import isometric_tension
+
+MUSCLES = (
+    Thelen2003Muscle,
+    Millard2012EquilibriumMuscle,
+    Millard2012AccelerationMuscle,
+    DeGrooteFregly2016Muscle,
+    MeyerFregly2016Muscle,
+    RigidTendonMuscle,
+    Thelen2003Muscle_Deprecated,
+    Schutte1993Muscle_Deprecated,
+    Delp1990Muscle_Deprecated,
+)
+ACTIVATIONS = (0.01, 0.5, 1.0)
+"""At which isometric tensions are compared."""
+LENGTHS = 24
+"""So many lengths, evenly spread over those that occur."""
+LEAST, GREATEST = (0.0, 1.05, 0.0), (0.95, 4.0, 20.0)
+"""Bounds of the ends of the active curve and of the height of the passive one."""
+SCALE = 200.0
+"""MuJoCo's default of a number that does not count where the force is given."""
+FREE = 0.25
+"""Parts by which a fit to forces may change tendon, fibers and strength."""
+
+
+class Curves(NamedTuple):
+    """What MuJoCo knows of a muscle, but for its rates.
+
+    Attributes:
+        tendon: length of the tendon, m.
+        fiber: optimal length of the fibers along the tendon, m.
+        force: at the optimal length, fully active and at rest, N.
+        lmin: normalized length below which there is no active force.
+        lmax: that above which there is none; the passive force is a line from halfway between 1 and here.
+        fpmax: twice the passive force there, halfway, over `force`.
+    """
+
+    tendon: float
+    fiber: float
+    force: float
+    lmin: float = 0.5
+    lmax: float = 1.6
+    fpmax: float = 1.3
+
+    def tension(self, lengths: Array, activation: float) -> Array:
+        """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
+        x = (lengths - self.tendon) / self.fiber
+        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        inner = np.where(x <= 1.0, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
+        outer = np.where(x <= 1.0, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high))
+        active = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
+        active = np.where((x < self.lmin) | (x > self.lmax), 0.0, active)
+        stretch = np.maximum(x - 1.0, 0.0) / (high - 1.0)
+        passive = self.fpmax * np.where(x <= high, 0.5 * stretch**2, stretch - 0.5)
+        found: Array = self.force * (activation * active + passive)
+        return found
+
+    def tensions(self, lengths: Array) -> Array:
+        """Tensions (A, L) at the activations that are compared."""
+        return np.stack([self.tension(lengths, activation) for activation in ACTIVATIONS])
+
+
+def muscle(draft: Draft, force: Muscle, path: str) -> str:
+    """A muscle on the tendon of its path."""
+    tied = draft.tendons.get(path)
+    if tied is None:
+        raise Unsayable("its path is no tendon")
+    cos = math.cos(force.pennation_angle_at_optimal)
+    own = Curves(force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos)
+    if not (own.fiber > 0.0 and own.force > 0.0 and own.tendon >= 0.0):
+        raise Unsayable("its lengths or its force are not positive")
+    fits = draft.options.fit == "force"
+    try:
+        curves = _fitted(own, *_isometric(force, tied.lengths), free=fits)
+        lengths, tensions = _isometric(force, tied.held_out)
+    except OsimliteError as error:
+        raise Unsayable(f"its tension cannot be computed: {error.message}") from error
+    name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
+    rise, fall = (getattr(force, f"{word}_time_constant", 0.0) for word in ("activation", "deactivation"))
+    lags = rise > 0.0 and fall > 0.0 and not force.ignore_activation_dynamics
+    numbers = (0.0, 1.0, curves.force, SCALE, curves.lmin, curves.lmax, *_rates(force, cos, curves.fpmax))
+    add(
+        draft.section("actuator"),
+        "general",
+        name=name,
+        tendon=tied.name,
+        lengthrange=(curves.tendon, curves.tendon + curves.fiber),
+        dyntype="muscle" if lags else "none",
+        dynprm=(rise, fall, 0.0) if lags else None,
+        gaintype="muscle",
+        gainprm=numbers,
+        biastype="muscle",
+        biasprm=numbers,
+        ctrlrange=limits if limits[0] < limits[1] else None,
+    )
+    if lags:
+        draft.activations[name] = getattr(force, "default_activation", 0.0)
+    draft.account(path, f"actuator {name}")
+    off = (curves.tensions(lengths) - tensions) / force.max_isometric_force
+    draft.fidelity.add(
+        "muscle",
+        path,
+        f"a {type(force).__name__}: an elastic tendon, fibers at a changing angle, curves that are no parabolas",
+        "a muscle of MuJoCo's, "
+        + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths"),
+        f"actuator {name}",
+        {"isometric force": Error.of(off[np.isfinite(off)], "Fmax")} if np.isfinite(off).any() else {},
+    )
+    return f"actuator {name}"
+
+
+def _isometric(force: Muscle, lengths: Array) -> tuple[Array, Array]:
+    """Lengths (L,) spread as those that occur, and the muscle's tensions (A, L) there."""
+    spread = np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS))
+    return spread, isometric_tension(force, spread, ACTIVATIONS)
+
+
+def _rates(force: Muscle, cos: float, fpmax: float) -> tuple[float, float, float]:
+    """MuJoCo's vmax, fpmax and fvmax; the first is measured along the tendon."""
+    curve = getattr(force, "force_velocity_curve", None)
+    strongest = getattr(curve, "max_eccentric_velocity_force_multiplier", getattr(force, "Flen", 1.4))
+    return getattr(force, "Vmax", force.max_contraction_velocity) / cos**2, fpmax, strongest
+
+
+def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
+    """The curves nearest to tensions (A, L) at lengths (L,), with tendon, fibers and strength too if `free`."""
+    known = np.isfinite(tensions)
+    if not known.any():
+        return own
+    search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
+
+    def curves(x: Array) -> Curves:
+        lmin, lmax, fpmax, *rest = x.tolist()
+        tendon, fiber, strength = rest or (0.0, 0.0, 0.0)
+        moved = own.tendon + tendon * own.fiber, own.fiber * (1.0 + fiber), own.force * (1.0 + strength)
+        return Curves(*moved, lmin, lmax, fpmax)
+
+    def off(x: Array) -> Array:
+        found: Array = ((curves(x).tensions(lengths) - tensions) / own.force)[known]
+        return found
+
+    start, low, high = [own.lmin, own.lmax, own.fpmax], list(LEAST), list(GREATEST)
+    if free:
+        start, low, high = [*start, 0.0, 0.0, 0.0], [*low, *[-FREE] * 3], [*high, *[FREE] * 3]
+    best = min((search(off, each, bounds=(low, high)) for each in _starts(start)), key=lambda found: found.cost)
+    return curves(best.x)
+
+
+def _starts(start: list[float]) -> list[list[float]]:
+    """Several places to seek from: the curves have kinks."""
+    return [[lmin, lmax, *start[2:]] for lmin in (start[0], 0.2) for lmax in (start[1], 2.2)]
