@@ -93,17 +93,14 @@ def _model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolut
     return tree.walk(text, "", target) if text else Resolution(None, "empty")
 
 
-def _path_or_member(set_path: str) -> Callable[[Tree, str, Component, str], Resolution]:
-    """First a path from the model, then OpenSim appends the text to the path of the set."""
+def _path_or_member(*set_paths: str) -> Callable[[Tree, str, Component, str], Resolution]:
+    """First a path from the model, then OpenSim appends the text to the paths of the sets."""
 
     def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
         if not text:
             return Resolution(None, "empty")
-        first = tree.walk(text, "", target)
-        if first.target is not None:
-            return first
-        second = tree.walk(f"{set_path}/{text}", "", target)
-        return second if second.target is not None or second.failure == "wrong-type" else first
+        tried = [tree.walk(f"{path}{text}", "", target) for path in ("", *(f"{path}/" for path in set_paths))]
+        return min(tried, key=lambda each: (each.target is None, each.failure != "wrong-type"))
 
     return rule
 
@@ -166,6 +163,7 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "marker-name": _bare(lambda tree, owner, target: tree.members("/markerset", "Marker")),
     "set-member": _bare(lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Component")),
     "frame-path-or-body-name": _path_or_member("/bodyset"),
+    "frame-path-or-member": _path_or_member("/bodyset", "/jointset"),
     "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),
     "input": nothing_to_resolve,
     "file": nothing_to_resolve,

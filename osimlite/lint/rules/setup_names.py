@@ -21,6 +21,7 @@ _IN_MODEL = {
     "muscle-name": "muscle",
     "marker-name": "marker",
     "frame-path-or-body-name": "frame",
+    "frame-path-or-member": "frame",
     "model-path": "",
     "state-path": "",
     "pattern": "",
@@ -122,6 +123,8 @@ def unknown_name(setup: Setup, found: Found) -> None:
         elif kind.rule == "socket" and is_of(item, "Controller"):
             what = "actuator"
             text = text.rpartition("/")[2]
+        elif what == "output" and kind.rule == "state-path" and not text.startswith("/"):
+            text = f"/{text}"
         if what is None or not text or text in _WORDS.get(tag, ()) or text.lower() == "unassigned":
             continue
         if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):

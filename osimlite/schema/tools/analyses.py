@@ -116,7 +116,7 @@ class JointReaction(Analysis):
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
     """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
     express_in_frame: Annotated[
-        Names, Reference("frame-path-or-body-name", "Frame", "list", required=False, legacy=True)
+        Names, Reference("frame-path-or-member", "Frame", "list", required=False, legacy=True)
     ] = ("ground",)
     """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
 
