@@ -110,13 +110,17 @@ def _facts(rows: Sequence[tuple[str, str]]) -> None:
 def _table(file: Path, everything: bool) -> None:
     from osimlite.files import read_file
     from osimlite.lint.table import Table
+    from osimlite.tables import StorageHeader
 
     table = Table(read_file(file), str(file))
     said = {key: entry.value.text for key, entry in table.entries.items()}
-    kind = "markers" if table.is_markers else f"storage, version {table.form}"
+    header = table.header
+    kind = f"storage, version {header.form}" if isinstance(header, StorageHeader) else "markers"
+    if isinstance(header, StorageHeader) and header.parts > 1:
+        kind += f", each cell a {header.kind}"
     rows = len(table.rows.times)
     facts = [
-        ("table", kind + (f", each cell a {said['DataType']}" if table.parts > 1 else "")),
+        ("table", kind),
         ("file", f"{file} ({len(table.data) / 1000:.0f} kB)"),
         ("rows", str(rows)),
         ("markers" if table.is_markers else "columns beside the time", str(len(table.columns))),

@@ -59,11 +59,11 @@ def suppressions(source: Source) -> list[Suppression]:
     return found
 
 
-def suppressions_in_header(lines: list[bytes]) -> list[Suppression]:
+def suppressions_in_header(lines: list[str]) -> list[Suppression]:
     """Every ignoring line in the header of a storage file, which OpenSim passes over; it speaks of the whole file."""
     found = []
     for number, line in enumerate(lines, 1):
-        match = _LINE.match(line.decode("utf-8", "replace")) if b"osimlite:" in line else None
+        match = _LINE.match(line)
         if match:
             found.append(Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE))
     return found

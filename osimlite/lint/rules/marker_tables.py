@@ -6,8 +6,9 @@ from math import hypot
 
 from osimlite.document.source import Position
 from osimlite.lint.engine import INFO, WARNING, Found, rule
-from osimlite.lint.table import METRES, Table
+from osimlite.lint.table import Table
 from osimlite.lint.words import times
+from osimlite.tables import METRES
 
 _LARGEST, _SMALLEST = 8.0, 0.02
 """Between these, m, is how far the markers of one frame are spread."""

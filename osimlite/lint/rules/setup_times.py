@@ -12,6 +12,7 @@ from osimlite.lint.rules.setup_columns import motions
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
+from osimlite.tables import MarkerHeader
 
 _FIRST_STATES = 0.03
 """For how long computed muscle control runs to find the states of muscles at the start, s."""
@@ -257,10 +258,8 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
     ```
     """
     for item, tag, table in motions(setup):
-        said = table.entries.get("inDegrees")
-        if (said is not None and said.value.text.lower() in ("yes", "y")) or setup.tree is None:
-            continue
-        if table.form < 1 and (table.file.lower().endswith(".mot") or "Angles" in table.entries):
+        header = table.header
+        if isinstance(header, MarkerHeader) or header.in_degrees or setup.tree is None:
             continue
         angles = _angles(setup)
         largest, label = max(

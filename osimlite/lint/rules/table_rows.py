@@ -46,7 +46,7 @@ def no_rows(table: Table, found: Found) -> None:
     """
     if table.labels and "," not in table.labels[0].text and not table.rows.count and not table.rows.faults:
         fate = "looks for one for ever" if table.is_markers else "refuses the table"
-        found(f"there are no rows: OpenSim {fate}", at=Position(table.label_line, 1))
+        found(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
 
 
 def _more(fault: Fault, noun: str) -> str:
@@ -118,7 +118,7 @@ _BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?=\s*\S)", re.MULTILINE)
 def _without_last_tabs(table: Table, width: int) -> Fix | None:
     """The mend that takes out what ends rows of markers beyond their cells; None if that is more than tabs."""
     edits = []
-    for match in _LAST_TABS.finditer(table.data, table.line_start(table.label_line + 2)):
+    for match in _LAST_TABS.finditer(table.data, table.line_start(table.header.label_line + 2)):
         start = table.data.rfind(b"\n", 0, match.start()) + 1
         surplus = min(table.data.count(b"\t", start, match.end()) - (width - 1), len(match[0]))
         if surplus > 0:

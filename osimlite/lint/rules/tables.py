@@ -7,7 +7,8 @@ from collections import Counter
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.table import COUNTS, MARKER_KEYS, Table
+from osimlite.lint.table import Table
+from osimlite.tables import COUNTS, MARKER_KEYS, MarkerHeader
 from osimlite.text import nearest
 
 
@@ -47,32 +48,32 @@ def table_header(table: Table, found: Found) -> None:
     0.1 0.6
     ```
     """
-    start = Position(1, 1)
+    start, header = Position(1, 1), table.header
     if not table.data or table.data.isspace():
         found("the file is empty: OpenSim refuses it", at=start)
-    elif table.is_markers:
-        _marker_header(table, found)
-    elif not table.ends_header:
+    elif isinstance(header, MarkerHeader):
+        _marker_header(table, header, found)
+    elif header.end.text != "endheader":
         words = table.data[:100].lstrip()
         if words.startswith(b"PathFileType"):
             found("these are markers over time; a file of them is called .trc", at=start)
-        elif not table.end_line.line > 1:
+        elif header.end.at.line == 1:
             found("there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it", at=start)
-        elif table.ends_header_otherwise:
+        elif header.end.text:
             found(
                 "the header must end with 'endheader' in small letters: OpenSim takes all that follows for header",
-                at=table.end_line, suggestion="endheader",
+                at=header.end.at, suggestion="endheader",
             )  # fmt: skip
         else:
             found(
-                "no line 'endheader' stands before the labels: OpenSim refuses the table", at=table.end_line,
-                fix=table.inserting(table.label_line, "endheader"),
+                "no line 'endheader' stands before the labels: OpenSim refuses the table", at=header.end.at,
+                fix=table.inserting(header.label_line, "endheader"),
             )  # fmt: skip
     elif not table.is_strict:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
                 near = nearest(key, table.entries, cutoff=75)
-                at = table.entries[near].key.at if near else table.end_line
+                at = table.entries[near].key.at if near else header.end.at
                 found(
                     f"the header does not say '{key}': OpenSim refuses the table",
                     at=at, suggestion=near and key, certain=True,
@@ -80,18 +81,18 @@ def table_header(table: Table, found: Found) -> None:
                 )  # fmt: skip
 
 
-def _marker_header(table: Table, found: Found) -> None:
+def _marker_header(table: Table, header: MarkerHeader, found: Found) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
         why = "starts with a byte order mark; save it as UTF-8 without one" if mark else "must start with PathFileType"
         found(
             f"a marker file {why}: OpenSim refuses it", at=Position(1, 1), fix=Fix((Edit(0, 3, ""),)) if mark else None
         )
-    if len(table.head) < 4:
+    if len(header.lines) < 4:
         ends = ": its lines end with CR alone" if b"\r" in table.data else ""
-        found(f"a marker file has five lines before its rows, this has {len(table.head)}{ends}", at=Position(1, 1))
+        found(f"a marker file has five lines before its rows, this has {len(header.lines)}{ends}", at=Position(1, 1))
         return
-    keys, values = table.words(2), table.words(3)
+    keys, values = header.words(2), header.words(3)
     for key, right in zip(keys, MARKER_KEYS, strict=False):
         if key.text != right:
             meant = right if len(keys) == len(MARKER_KEYS) else None
@@ -108,16 +109,16 @@ def _marker_header(table: Table, found: Found) -> None:
                 f"there are {len(values)} values of the {len(keys)} keys above them: OpenSim refuses the file",
                 at=Position(3, 1),
             )
-    subscripts = [word.text for word in table.words(5)] if len(table.head) > 4 else []
+    subscripts = [word.text for word in header.words(5)] if len(header.lines) > 4 else []
     count = len(table.labels)
     wanted = [f"{axis}{number}" for number in range(1, count + 1) for axis in "XYZ"]
     if subscripts[: 3 * count] != wanted:
         wrong = next((k for k, word in enumerate(wanted) if subscripts[k : k + 1] != [word]), 0)
-        place = table.words(5)[wrong].at if wrong < len(subscripts) else Position(5, 1)
+        place = header.words(5)[wrong].at if wrong < len(subscripts) else Position(5, 1)
         line = "\t\t" + "\t".join(wanted)
         fix: Fix | None = table.inserting(5, line)
         if any(word.startswith(("X", "Y", "Z")) for word in subscripts):
-            fix = table.replacing(Position(5, 1, len(table.head[4].rstrip())), None, line, certain=True)
+            fix = table.replacing(Position(5, 1, len(header.lines[4].rstrip())), None, line, certain=True)
         found(f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file", at=place, fix=fix)
 
 
@@ -301,9 +302,9 @@ def column_label(table: Table, found: Found) -> None:
     0.1 0.6 0.1
     ```
     """
-    labels = table.labels
-    if table.is_markers:
-        for word, right in zip(table.words(4) if len(table.head) > 3 else [], ("Frame#", "Time"), strict=False):
+    labels, header = table.labels, table.header
+    if isinstance(header, MarkerHeader):
+        for word, right in zip(header.words(4), ("Frame#", "Time"), strict=False):
             if word.text != right:
                 found(
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
@@ -313,8 +314,8 @@ def column_label(table: Table, found: Found) -> None:
             if " " in label.text:
                 found(f"the marker '{label.text}' has a blank in its name, which no marker of a model has", at=label.at)
     elif not labels:
-        if table.ends_header:
-            found("the table ends before its labels", at=table.end_line)
+        if header.end.text:
+            found("the table ends before its labels", at=header.end.at)
         return
     elif labels[0].text != "time":
         first, at = labels[0]

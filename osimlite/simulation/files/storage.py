@@ -14,7 +14,8 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.files import written_atomically
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.files.table_stream import TableStream, suffixes
+from osimlite.simulation.files.table_stream import TableStream
+from osimlite.tables import suffixes
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class StoTable:
         columns: labels of the m columns besides the time, in order; OpenSim itself writes some labels twice.
         rows: (n, m).
         in_degrees: whether rotational values are in degrees.
-        header: every ``key=value`` line of the header.
+        header: the first word of every line of the header, with the rest of the line.
         kind: what the file holds; where it is not ``double``, a value has several columns.
         file: where it was read from.
     """

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from osimlite.files import written_atomically
 from osimlite.simulation.files.storage import number_text
+from osimlite.tables import MARKER_KEYS
 
 
 def write_trc(
@@ -42,19 +43,10 @@ def _lines(
     count = len(times)
     span = times[-1] - times[0] if count > 1 else 0.0
     rate = number_text((count - 1) / span) if span > 0.0 else "1"
-    header = {
-        "DataRate": rate,
-        "CameraRate": rate,
-        "NumFrames": str(count),
-        "NumMarkers": str(len(markers)),
-        "Units": units,
-        "OrigDataRate": rate,
-        "OrigDataStartFrame": "1",
-        "OrigNumFrames": str(count),
-    }
+    values = (rate, rate, count, len(markers), units, rate, 1, count)
     yield f"PathFileType\t4\t(X/Y/Z)\t{name}"
-    yield "\t".join(header)
-    yield "\t".join(header.values())
+    yield "\t".join(MARKER_KEYS)
+    yield "\t".join(map(str, values))
     yield "Frame#\tTime\t" + "".join(f"{marker}\t\t\t" for marker in markers)
     yield "\t\t" + "".join(f"{axis}{number + 1}\t" for number in range(len(markers)) for axis in "XYZ")
     yield ""
