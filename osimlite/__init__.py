@@ -1,8 +1,9 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
-``mechanism``, ``paths``, ``to_urdf``, ``to_mjcf``, ``simulate``, the errors, and every component class under OpenSim's
-own name (``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
+``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, the errors, and every component
+class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that importing
+osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from osimlite.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
+    from osimlite.simulation.muscle_curves import muscle_curves as muscle_curves
     from osimlite.simulation.paths import paths as paths
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
         "OsimliteError",
         "classes_in",
         "mechanism",
+        "muscle_curves",
         "paths",
         "read",
         "read_document",
@@ -57,6 +60,7 @@ _FUNCTIONS = {
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",
+    "muscle_curves": "osimlite.simulation.muscle_curves",
     "paths": "osimlite.simulation.paths",
     "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",

@@ -29,6 +29,7 @@ COMMANDS = (
     "optimize",
     "gait",
     "find-gait",
+    "muscles",
     "kinematics",
     "inverse-dynamics",
     "lsp",

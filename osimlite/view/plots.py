@@ -138,12 +138,12 @@ def _coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> A
             held.append(f"{name} is locked at {column[0]:.4g} {unit}".rstrip())
         else:
             kinds.setdefault(label, {})[name] = column
-    panels = [(label, part) for label, lines in kinds.items() for part in _shared_out(lines)]
-    figure, axes = _sheet("Coordinates", [3.0] * max(1, len(panels)))
+    panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
+    figure, axes = sheet("Coordinates", [3.0] * max(1, len(panels)))
     for panel, (label, lines) in zip(axes, panels, strict=False):
-        _lines(panel, times, lines)
+        lines_in(panel, times, lines)
         panel.set_ylabel(label)
-    _finish(axes, times, "; ".join(held))
+    finish(axes, times, "; ".join(held))
     return figure
 
 
@@ -153,12 +153,12 @@ def _states(times: Array, states: Mapping[str, Array]) -> Any:
         owner, _, kind = path.rpartition("/")
         label = kind.replace("_", " ") + _UNITS.get(kind, "")
         kinds.setdefault(label, {})[owner.rpartition("/")[2]] = column
-    panels = [(label, part) for label, lines in kinds.items() for part in _shared_out(lines)]
-    figure, axes = _sheet("States of muscles and other forces", [3.0] * len(panels))
+    panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
+    figure, axes = sheet("States of muscles and other forces", [3.0] * len(panels))
     for panel, (label, lines) in zip(axes, panels, strict=True):
-        _lines(panel, times, lines)
+        lines_in(panel, times, lines)
         panel.set_ylabel(label)
-    _finish(axes, times, "")
+    finish(axes, times, "")
     return figure
 
 
@@ -176,8 +176,8 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     sizes = {f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1) for force in forces}
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
     acting = {label: size for label, size in sizes.items() if size.max() > threshold}
-    figure, (above, below) = _sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
-    _lines(above, times, acting)
+    figure, (above, below) = sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
+    lines_in(above, times, acting)
     above.set_ylabel("force (N)")
     above.set_ylim(bottom=0.0)
     for row, size in enumerate(acting.values()):
@@ -187,43 +187,49 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     below.set_ylim(len(acting) - 0.5, -0.5)
     below.set_ylabel("in contact")
     idle = [label.split(" on ")[0] for label in sizes if label not in acting]
-    _finish((above, below), times, f"never in contact: {', '.join(idle)}" if idle else "")
+    finish((above, below), times, f"never in contact: {', '.join(idle)}" if idle else "")
     return figure
 
 
 def _alike(times: Array, title: str, unit: str, lines: Mapping[str, Array], note: str = "") -> Any:
-    parts = _shared_out(lines)
-    figure, axes = _sheet(title, [3.0] * len(parts))
+    parts = shared_out(lines)
+    figure, axes = sheet(title, [3.0] * len(parts))
     for panel, part in zip(axes, parts, strict=True):
-        _lines(panel, times, part)
+        lines_in(panel, times, part)
         panel.set_ylabel(unit)
-    _finish(axes, times, note)
+    finish(axes, times, note)
     return figure
 
 
 def _energy(times: Array, parts: Mapping[str, Array]) -> Any:
-    figure, (panel,) = _sheet("Energy", [3.6])
-    _lines(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
+    figure, (panel,) = sheet("Energy", [3.6])
+    lines_in(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
     panel.set_ylabel("energy (J)")
     note = "gravity: zero at the origin of the ground"
     if STORED not in parts:
         note += "; energy stored in contacts and limit springs is not in the sum"
-    _finish((panel,), times, note)
+    finish((panel,), times, note)
     return figure
 
 
-def _sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
-    """A figure with panels of these heights (inches) above each other, and its panels."""
-    figures = require("matplotlib.figure", extra="plot", purpose="a picture of a simulation")
-    require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture of a simulation")
-    figure = figures.Figure(figsize=(9.0, 0.7 + sum(heights)), layout="constrained")
+def figure_of(title: str, size: tuple[float, float]) -> Any:
+    """An empty figure (width and height in inches)."""
+    figures = require("matplotlib.figure", extra="plot", purpose="a picture")
+    require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
+    figure = figures.Figure(figsize=size, layout="constrained")
     figure.suptitle(title, fontsize=13, x=0.02, ha="left", fontweight="bold")
+    return figure
+
+
+def sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
+    """A figure with panels of these heights (inches) above each other, and its panels."""
+    figure = figure_of(title, (9.0, 0.7 + sum(heights)))
     grid = {"height_ratios": list(heights)}
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]
     return figure, panels
 
 
-def _shared_out(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
+def shared_out(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
     """The lines of each panel: as many in one as in another, and no more than a reader can follow."""
     items = list(lines.items())
     size = ceil(len(items) / ceil(len(items) / LINES_IN_PANEL))
@@ -235,23 +241,26 @@ def _style(number: int) -> dict[str, Any]:
     return {"color": COLORS[number % len(COLORS)], "ls": style, "lw": 1.6}
 
 
-def _lines(panel: Any, times: Array, lines: Mapping[str, Array]) -> None:
+def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any) -> None:
+    """Draw lines over times, or whatever is across; with a style of their own they are not in the legend."""
     for number, (label, column) in enumerate(lines.items()):
         # Matplotlib leaves a label that begins with an underscore out of the legend.
-        panel.plot(times, column, label=f" {label}" if label.startswith("_") else label, **_style(number))
+        shown = f" {label}" if label.startswith("_") else label
+        panel.plot(across, column, label=None if style else shown, **(_style(number) | style))
     # Beside the panel, where it covers no data.
     panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9)
 
 
-def _finish(panels: Sequence[Any], times: Array, note: str) -> None:
+def finish(panels: Sequence[Any], across: Array, note: str, label: str = "time (s)") -> None:
+    """Give panels their grids, the lowest its label, and a note below."""
     for panel in panels:
         panel.grid(True, color="0.9", lw=0.8)
         panel.set_axisbelow(True)
         panel.spines[["top", "right"]].set_visible(False)
         panel.margins(x=0.0)
-    if times[-1] > times[0]:
-        panels[-1].set_xlim(times[0], times[-1])
-    panels[-1].set_xlabel("time (s)")
+    if across[-1] > across[0]:
+        panels[-1].set_xlim(across[0], across[-1])
+    panels[-1].set_xlabel(label)
     if note:
         style = {"fontsize": 8, "color": "0.35", "va": "top"}
         note = textwrap.fill(note, 110, break_on_hyphens=False)

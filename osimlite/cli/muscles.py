@@ -1,0 +1,211 @@
+"""``osimlite muscles``: lengths, moment arms and forces of muscles over coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from osimlite.cli import _options as options
+
+if TYPE_CHECKING:
+    from osimlite.multibody.mechanism import Mechanism
+    from osimlite.simulation.muscle_curves import MuscleCurves
+
+
+def muscles(
+    file: options.File,
+    coordinate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--coordinate",
+            metavar="NAME[=LOW:HIGH]",
+            help="Sweep a coordinate (rad, m, or -120deg:0), over its range if no other is given; twice: two at once.",
+            show_default="the default pose alone",
+        ),
+    ] = None,
+    muscle: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--muscle", metavar="NAME", help="Only this one; may be repeated.", show_default="all that move with it"
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option(min=2, help="How many values of each coordinate.", show_default="50, of two coordinates 15"),
+    ] = None,
+    activation: Annotated[float, typer.Option(help="Of all muscles, 0 to 1.")] = 1.0,
+    compare: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Another model, side by side: scaled, or converted.", show_default=False),
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw every quantity: PNG files beside the table.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write all numbers: .csv or .parquet, SI units.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Tell lengths, moment arms, fiber lengths and forces of muscles over a coordinate, as OpenSim's plotter does.
+
+    Fibers are in equilibrium with their tendons at the activation, and the model is at rest. Prints what is least and
+    greatest of each muscle; -o has every number.
+
+    Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
+    """
+    from osimlite.cli._console import say
+    from osimlite.cli._progress import progress_bar
+    from osimlite.document.reader import read
+    from osimlite.errors import SettingError
+    from osimlite.multibody import build_mechanism
+    from osimlite.simulation.muscle_curves import muscle_curves
+
+    if output is not None and output.suffix not in (".csv", ".parquet"):
+        raise SettingError(f"a table of muscles is written as .csv or .parquet, not '{output.name}'")
+    if len(coordinate or ()) > 2:
+        raise SettingError("muscles are told over one coordinate or two")
+    if plot and not coordinate:
+        raise SettingError("--plot needs a --coordinate to draw over")
+    model = read(file)
+    mechanism = build_mechanism(model)
+    values = _swept(mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50))
+    found: dict[str, MuscleCurves] = {}
+    for path in (file, *((compare,) if compare is not None else ())):
+        with progress_bar(f"muscles of {path.name}", None) as advance:
+            curves = muscle_curves(
+                model if path is file else read(path),
+                values,
+                muscle or (),
+                activation=activation,
+                folder=path.parent,
+                progress=advance,
+            )
+        found[str(path)] = curves if muscle else curves.of(curves.crossing)
+    first, *others = found.values()
+    if others:
+        first, second = _common(first, others[0])
+        found = dict(zip(found, (first, second), strict=True))
+    _print(list(found.values()), file, compare)
+    if output is not None:
+        _write(found, output)
+        say(f"wrote {output}")
+    if plot:
+        from osimlite.view.muscle_plots import plot_muscles
+
+        folder = output.parent / output.stem if output is not None else Path(f"{file.stem}-muscles")
+        written = plot_muscles(first, mechanism, folder, second if others else None)
+        say(f"wrote {len(written)} pictures into {folder}")
+
+
+def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str, list[float]]:
+    """Values of each coordinate that is swept."""
+    from math import isfinite
+
+    from osimlite.errors import SettingError
+    from osimlite.simulation.start import in_units_of
+
+    found = {}
+    for word in words:
+        name, equals, given = (part.strip() for part in word.partition("="))
+        low, high = mechanism.coordinates[mechanism.coordinate_index(name)].range
+        if equals:
+            parts = given.split(":")
+            if len(parts) != 2:
+                raise SettingError(f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{word}'")
+            low, high = (in_units_of(mechanism, name, part) for part in parts)
+        if not (isfinite(low) and isfinite(high) and low < high):
+            raise SettingError(f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1")
+        found[name] = [low + (high - low) * k / (points - 1) for k in range(points)]
+    return found
+
+
+def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, MuscleCurves]:
+    """Both with the muscles whose names both have."""
+    from osimlite.cli._console import say
+    from osimlite.errors import ModelError
+    from osimlite.text import listed
+
+    names = [[path.rpartition("/")[2] for path in curves.muscles] for curves in (first, second)]
+    both = [name for name in names[0] if name in names[1]]
+    alone = [name for name in dict.fromkeys(names[0] + names[1]) if name not in both]
+    if not both:
+        raise ModelError("the two models have no muscle of the same name")
+    if alone:
+        say(f"of one model only: {listed(alone)}")
+    one, other = (
+        curves.of([own.index(name) for name in both]) for curves, own in zip((first, second), names, strict=True)
+    )
+    return one, other
+
+
+def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> None:
+    """A table that fits a terminal: what is least and greatest, or the largest differences."""
+    import numpy as np
+    from rich.table import Table
+
+    from osimlite.cli._console import add_row, plain_console
+
+    first = curves[0]
+    arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
+    lengths = {"length": "length (mm)"} if len(arms) < 2 else {}
+    shown = {**lengths, **arms, "normalized_fiber_length": "fiber / optimal", "tendon_force": "tendon (N)"}
+    title = f"Largest differences of {compare.name} from {file.name}" if compare is not None else None
+    table = Table("Muscle", title=title, box=None, pad_edge=False, header_style="bold", title_justify="left")
+    for label in shown.values():
+        table.add_column(label, justify="right")
+    for place, path in enumerate(first.muscles):
+        cells = []
+        for name, label in shown.items():
+            factor, digits = (1000.0, 1) if label.endswith("(mm)") else (1.0, 0 if label.endswith("(N)") else 3)
+            numbers = factor * first.columns[name][:, place]
+            if compare is not None:
+                numbers = np.abs(factor * curves[1].columns[name][:, place] - numbers)
+                cells.append(f"{np.nanmax(numbers):.{digits}f}" if np.isfinite(numbers).any() else "-")
+            elif not np.isfinite(numbers).any():
+                cells.append("-")
+            else:
+                low, high = (f"{bound(numbers):.{digits}f}" for bound in (np.nanmin, np.nanmax))
+                cells.append(low if low == high else f"{low} to {high}")
+        add_row(table, path.rpartition("/")[2], *cells)
+    plain_console().print(table)
+    unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
+    if unsettled:
+        from osimlite.cli._console import say
+
+        say("'-' and gaps in the table: fibers and tendon have no equilibrium there")
+
+
+def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
+    """One row for each model, pose and muscle."""
+    import io
+
+    from osimlite.files import write_atomically
+
+    columns: dict[str, list[Any]] = {}
+    for file, curves in found.items():
+        poses, muscles_ = len(curves.poses), len(curves.muscles)
+        columns.setdefault("model", []).extend([file] * (poses * muscles_))
+        columns.setdefault("muscle", []).extend(list(curves.muscles) * poses)
+        for place, name in enumerate(curves.coordinates):
+            columns.setdefault(name, []).extend(curves.poses[:, place].repeat(muscles_).tolist())
+        for name, rows in curves.columns.items():
+            columns.setdefault(name, []).extend(rows.ravel().tolist())
+    if output.suffix == ".parquet":
+        from osimlite._require import require
+
+        arrow = require("pyarrow", extra="sweep", purpose="a .parquet table")
+        parquet = require("pyarrow.parquet", extra="sweep", purpose="a .parquet table")
+        out = io.BytesIO()
+        parquet.write_table(arrow.table(columns), out)
+        write_atomically(output, out.getvalue())
+        return
+    import csv
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    write_atomically(output, text.getvalue().encode())

@@ -1,0 +1,181 @@
+"""Muscles over coordinates: lengths, moment arms, and the forces of muscles at rest and in equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.errors import ModelError, SettingError, SimulationError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.functions import Constant
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.paths import Paths
+from osimlite.simulation.system import System
+from osimlite.text import did_you_mean
+
+Progress = Callable[[int, int], None]
+
+QUANTITIES = {
+    "length": "m",
+    "fiber_length": "m",
+    "normalized_fiber_length": "",
+    "tendon_length": "m",
+    "tendon_force": "N",
+    "active_fiber_force": "N",
+    "passive_fiber_force": "N",
+}
+"""What is told of a muscle besides its moment arms, with units; forces of fibers are those along the tendon."""
+
+
+@dataclass(frozen=True, eq=False)
+class MuscleCurves:
+    """Muscles in p poses, at rest.
+
+    Attributes:
+        muscles: paths of the m muscles, in the order of the model.
+        coordinates: names of the k coordinates that are swept, as they were given.
+        poses: their values (p, k), rad or m.
+        columns: numbers (p, m) by the names of :data:`QUANTITIES`, and ``moment_arm_<coordinate>`` for each of the
+            coordinates (m); NaN where a muscle has no equilibrium.
+    """
+
+    muscles: tuple[str, ...]
+    coordinates: tuple[str, ...]
+    poses: Array
+    columns: Mapping[str, Array]
+
+    def of(self, places: Sequence[int]) -> MuscleCurves:
+        """The same of some of the muscles, by their places."""
+        columns = {name: rows[:, list(places)] for name, rows in self.columns.items()}
+        return MuscleCurves(tuple(self.muscles[k] for k in places), self.coordinates, self.poses, columns)
+
+    @property
+    def crossing(self) -> list[int]:
+        """Places of the muscles that have a moment arm about a coordinate anywhere; all if none is swept."""
+        arms = [self.columns[f"moment_arm_{name}"] for name in self.coordinates]
+        return [k for k in range(len(self.muscles)) if not arms or any(rows[:, k].any() for rows in arms)]
+
+
+def muscle_curves(
+    model: Model,
+    values: Mapping[str, Sequence[float]],
+    muscles: Sequence[str] = (),
+    *,
+    activation: float = 1.0,
+    folder: str | Path | None = None,
+    progress: Progress | None = None,
+) -> MuscleCurves:
+    """Lengths, moment arms and forces of muscles while coordinates are swept, as OpenSim's plotter has them.
+
+    The other coordinates have their default values, but for those that constraints move along. Fibers are in
+    equilibrium with their tendons at an activation, the model is at rest.
+
+    Args:
+        model: whose muscles.
+        values: of coordinates by name or path, rad or m; of several all combinations, the last one changing first.
+        muscles: names or paths; all if there are none.
+        activation: of all muscles, 0 to 1.
+        folder: where the model's file is, and those that it names.
+        progress: called with the number of poses done and of all.
+
+    Raises:
+        ModelError: there is no such coordinate or muscle, or the model is no mechanism.
+        UnsupportedError: a muscle, a joint or a constraint of an unknown class.
+        SimulationError: no pose fulfils the constraints.
+        SettingError: the activation is not from 0 to 1.
+    """
+    if not 0.0 <= activation <= 1.0:
+        raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
+    mechanism = build_mechanism(model)
+    places = [mechanism.coordinate_index(name) for name in values]
+    forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
+    tree = model.tree()
+    optimal = {tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)}
+    named = _chosen(list(optimal), muscles)
+    found = {element.path: element for element in forces.elements if isinstance(element, DeclaredForce)}
+    missing = [path for path in named if path not in found]
+    if missing:
+        # Says of which class it is, and why it cannot be computed.
+        force_elements(model, mechanism, folder=folder)
+    controls = Controls(forces.controls.names, ((Constant(activation),),) * len(forces.controls.names))
+    free = mechanism.released()
+    alone = [
+        _Muscle(found[path], System(free, Forces((found[path],), (), controls)), activation, optimal[path])
+        for path in named
+    ]
+    paths = Paths(model)
+    rows = list(product(*values.values()))
+    poses = np.array(rows, dtype=float).reshape(len(rows), len(values))
+    names = [*QUANTITIES, *(f"moment_arm_{name}" for name in values)]
+    columns = {name: np.full((len(poses), len(named)), np.nan) for name in names}
+    start = mechanism.default_state()[0]
+    for number, pose in enumerate(poses):
+        q = start.copy()
+        q[places] = pose
+        q = mechanism.assemble(q, kept=places)
+        arms = paths.moment_arms(q)
+        for place, (path, muscle) in enumerate(zip(named, alone, strict=True)):
+            for name, value in muscle.at(q).items():
+                columns[name][number, place] = value
+            for name, coordinate in zip(values, places, strict=True):
+                arm = arms[path].get(mechanism.coordinates[coordinate].path, 0.0)
+                columns[f"moment_arm_{name}"][number, place] = arm
+        if progress is not None:
+            progress(number + 1, len(poses))
+    return MuscleCurves(tuple(named), tuple(values), poses, columns)
+
+
+def _chosen(paths: list[str], names: Sequence[str]) -> list[str]:
+    """The paths that are named, in the order of the model."""
+    known = {key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)}
+    for name in names:
+        if name not in known:
+            raise ModelError(f"the model has no muscle '{name}'{did_you_mean(name, known)}")
+    wanted = {known[name] for name in names}
+    return [path for path in paths if path in wanted or not names]
+
+
+class _Muscle(NamedTuple):
+    """A muscle with the mechanism alone: one without an equilibrium hides no other."""
+
+    element: DeclaredForce
+    system: System
+    activation: float
+    optimal: float
+
+    def at(self, q: Array) -> dict[str, float]:
+        """Numbers of :data:`QUANTITIES`, as far as there are any, at values q (n,) of the coordinates."""
+        element, system = self.element, self.system
+        y = system.state.pack(q.tolist(), [0.0] * len(q))
+        for place, path in enumerate(system.state.paths, 2 * len(system.order)):
+            if path.endswith("/activation"):
+                y[place] = self.activation
+        try:
+            y = system.equilibrated(0.0, y)
+            is_settled = system.realize(0.0, y, layout.FORCE_STAGE) == layout.OK
+        except SimulationError:
+            is_settled = False
+        known = {name: system.recorded(element.path, place) for name, place in element.kind.recorded.items()}
+        found = {"length": known["length"]}
+        if is_settled:
+            cos, fibers = known["cos_pennation"], known["fiber_length"]
+            found |= {
+                "fiber_length": fibers,
+                "normalized_fiber_length": fibers / self.optimal,
+                "tendon_length": known["length"] - fibers * cos,
+                "tendon_force": known["tension"],
+                "active_fiber_force": known["active_fiber_force"] * cos,
+                "passive_fiber_force": known["passive_fiber_force"] * cos,
+            }
+        return found
