@@ -38,6 +38,7 @@ def run(
     write_baseline: str | None = None,
     geometry: Sequence[Path] = (),
     classes: Sequence[str] = (),
+    target_version: str = "",
     statistics: bool = False,
     cached: bool = True,
     everything: bool = False,
@@ -54,6 +55,7 @@ def run(
         checked_words(ignore),
         mesh_paths=tuple(str(path.resolve()) for path in geometry),
         classes=tuple(map(os.path.abspath, classes)),
+        target_version=target_version,
     )
     if "-" in paths and (fix or unsafe_fixes) and not diff:
         raise OsimliteError("standard input cannot be mended in place; use --diff")

@@ -53,6 +53,12 @@ def validate(
         list[str] | None,
         typer.Option(metavar="FILE", help="A file that declares classes of a plug-in.", show_default=False),
     ] = None,
+    target_version: Annotated[
+        str,
+        typer.Option(
+            metavar="RELEASE", help="The OpenSim that is to read the files: 4.0 to 4.6 (OSIM113).", show_default="4.6"
+        ),
+    ] = "",
     everything: Annotated[
         bool, typer.Option("--all", help="Print every finding; else the first stands for those that are like it.")
     ] = False,
@@ -92,6 +98,7 @@ def validate(
             write_baseline=write_baseline,
             geometry=options.named_folders(geometry),
             classes=classes or (),
+            target_version=target_version,
             statistics=statistics,
             cached=not no_cache,
             everything=everything,

@@ -130,7 +130,7 @@ def key_of(file: str, config: Config) -> str:
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
         _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
-        [(path, stamped(path)) for path in config.classes],
+        [(path, stamped(path)) for path in config.classes], config.target_version,
     )  # fmt: skip
     return blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16).hexdigest()
 

@@ -30,7 +30,8 @@ class Config:
     `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of rules
     (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a rule. `mesh_paths` are
     folders where meshes are looked for besides OpenSim's own places. `thresholds` are numbers by the names that
-    ``osimlite rule CODE`` shows. `classes` are files that declare the classes of plug-ins.
+    ``osimlite rule CODE`` shows. `classes` are files that declare the classes of plug-ins,
+    `target_version` the release of OpenSim that is to read the files, 4.6 if it is empty.
     """
 
     select: tuple[str, ...] = ()
@@ -39,9 +40,14 @@ class Config:
     mesh_paths: tuple[str, ...] = ()
     thresholds: Mapping[str, float] = field(default_factory=dict)
     classes: tuple[str, ...] = ()
+    target_version: str = ""
 
     def __post_init__(self) -> None:
-        """Check the names and numbers of the thresholds; OsimliteError if one makes no sense."""
+        """Check the thresholds and the version; OsimliteError if one makes no sense."""
+        if self.target_version:
+            from osimlite.lint.history import later_than
+
+            later_than(self.target_version)
         if self.thresholds:
             _check_thresholds(self.thresholds)
 

@@ -50,6 +50,7 @@ _MODULES = (
     "markup",
     "structure",
     "leftovers",
+    "versions",
     "values",
     "domains",
     "relations",

@@ -18,7 +18,7 @@ from osimlite.text import did_you_mean, listed
 
 _KNOWN = (
     "select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds", "largest-file",
-    "classes",
+    "classes", "target-version",
 )  # fmt: skip
 
 
@@ -35,6 +35,7 @@ class Settings:
     fail_on: Severity | None = None
     thresholds: Mapping[str, float] = field(default_factory=dict)
     classes: tuple[str, ...] = ()
+    target_version: str = ""
 
     def config_for(self, path: str | Path, overriding: Config) -> Config:
         """The configuration of one file; what `overriding` says comes before what the project says."""
@@ -45,6 +46,7 @@ class Settings:
             (*overriding.mesh_paths, *self.mesh_paths, *map(str, named_mesh_folders())),
             {**self.thresholds, **overriding.thresholds},
             (*self.classes, *overriding.classes),
+            overriding.target_version or self.target_version,
         )
 
     def _ignored_in(self, path: Path) -> tuple[str, ...]:
@@ -91,6 +93,7 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
             _severity(table["fail-on"]) if "fail-on" in table else None,
             Config(thresholds=_mapping(table, "thresholds")).thresholds,
             tuple(str(file.parent.resolve() / path) for path in _words(table, "classes")),
+            Config(target_version=str(table.get("target-version", ""))).target_version,
         )
     except OsimliteError as error:
         raise OsimliteError(error.message, file=str(file)) from None

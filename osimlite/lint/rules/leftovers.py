@@ -14,7 +14,7 @@ from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called
+from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value
 from osimlite.schema.forces import Force
@@ -339,34 +339,3 @@ _BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")
 
 def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:
     return [(note, note.owner) for note in subject.notes if note.kind == kind and note.owner is not None]
-
-
-@rule("OSIM113", "newer-class", severity=ERROR)
-def newer_class(subject: Subject, found: Found) -> None:
-    """An object is of a class that OpenSim has only after 4.6.
-
-    ## What it does
-    Reports objects of classes that later versions of OpenSim have added, and says which version. They keep the number
-    of the format, so that the file does not tell.
-
-    ## Why is this bad
-    In a set (bodies, joints, forces ...) OpenSim 4.6 refuses to load the file; elsewhere it leaves the object out.
-    Where all who read the file have the later version, leave the rule out: `ignore = ["OSIM113"]`.
-
-    ## Example
-    ```xml
-    <CoordinateLinearStopForce name="stop">
-        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <stiffness>100</stiffness>
-    </CoordinateLinearStopForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <SpringGeneralizedForce name="stop">
-        <coordinate>knee_angle</coordinate> <stiffness>100</stiffness>
-    </SpringGeneralizedForce>
-    ```
-    """
-    for item in subject.each(Object):
-        if item.since:
-            found(f"{called(item)}: OpenSim has {a(type(item).tag)} from version {item.since} on; 4.6 refuses it", item)

@@ -1,0 +1,67 @@
+"""What releases of OpenSim have added: ``schemas/history.py`` reads it from their sources."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from osimlite.errors import OsimliteError
+from osimlite.schema.base import Object
+from osimlite.schema.model import CURRENT_VERSION
+from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.text import listed
+
+NEWEST = "4.6"
+"""The release whose classes osimlite has."""
+
+
+class Later(NamedTuple):
+    """What came after a release.
+
+    `format` is the newest version of documents that the release writes. `classes` has the first release of each class
+    by its tag; `properties`, by class and tag, that of each property and the name that it had before, if it had one.
+    """
+
+    format: int
+    classes: dict[str, str]
+    properties: dict[str, list[str]]
+
+
+class NewProperty(NamedTuple):
+    """A property that came after a release, the release that has it first, and what it was called before."""
+
+    spec: FieldSpec
+    since: str
+    before: str
+
+
+@cache
+def later_than(release: str) -> Later:
+    """What came after a release; OsimliteError if nothing is known of it."""
+    if release == NEWEST:
+        return Later(CURRENT_VERSION, {}, {})
+    import json
+
+    known: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
+    if release not in known["formats"]:
+        raise OsimliteError(f"of OpenSim '{release}' nothing is known; known are {listed(known['formats'], most=20)}")
+    numbers = _numbers(release)
+    return Later(
+        known["formats"][release],
+        {tag: first for tag, first in known["classes"].items() if _numbers(first) > numbers},
+        {name: told for name, told in known["properties"].items() if _numbers(told[0]) > numbers},
+    )
+
+
+@cache
+def new_properties(cls: type[Object], release: str) -> list[NewProperty]:
+    """The properties of a class that came after a release."""
+    later = later_than(release).properties
+    names = {spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}") for tag, spec in field_specs(cls).items()}
+    told = ((spec, later.get(base) or later.get(own)) for spec, (base, own) in names.items())
+    return [NewProperty(spec, found[0], "".join(found[1:])) for spec, found in told if found is not None]
+
+
+def _numbers(release: str) -> tuple[int, ...]:
+    return tuple(map(int, release.split(".")))

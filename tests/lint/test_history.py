@@ -1,0 +1,115 @@
+"""The version of OpenSim that is aimed at: what it has not is told, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from osimlite.errors import OsimliteError
+from osimlite.lint import Config, validate
+from osimlite.lint.history import NEWEST, later_than
+from osimlite.schema.registry import class_for
+from tests.cli.command import run
+
+REPO = Path(__file__).resolve().parents[2]
+CLONE = REPO.parent / ".mirror" / "opensim-org+opensim-core" / "repo"
+TABLE = json.loads((REPO / "osimlite" / "lint" / "history.json").read_text())
+
+
+def told(text: str, target: str, tmp_path: Path, name: str = "m.xml") -> list[tuple[int | None, str, str]]:
+    """Line, severity and message of what is said of a version."""
+    path = tmp_path / name
+    path.write_text(text)
+    report = validate(path, config=Config(("OSIM113",), target_version=target))
+    return [(each.line, each.severity.value, each.message) for each in report]
+
+
+STUDY = """<OpenSimDocument Version="40000">
+<MocoStudy name="s">
+<MocoProblem name="problem"> <MocoPhase name="phases">
+<goals>
+<MocoContactImpulseTrackingGoal name="impulse" />
+<MocoControlGoal name="effort">
+<divide_by_duration>true</divide_by_duration>
+<divide_by_mass>false</divide_by_mass>
+<weight>2</weight>
+</MocoControlGoal>
+</goals>
+</MocoPhase> </MocoProblem>
+</MocoStudy>
+</OpenSimDocument>
+"""
+
+
+def test_classes_and_properties_that_came_later_are_told_with_their_line(tmp_path):
+    assert told(STUDY, "", tmp_path) == told(STUDY, "4.6", tmp_path) == told(STUDY, "4.5", tmp_path) == []
+    goal = (5, "error", "MocoContactImpulseTrackingGoal 'impulse': OpenSim has a MocoContactImpulseTrackingGoal from "
+            "version 4.4.1 on; 4.3 refuses it")  # fmt: skip
+    divided = "MocoControlGoal 'effort': OpenSim has divide_by_{} from version 4.5 on; {} drops it"
+    properties = [(7, "error", divided.format("duration", "{}")), (8, "info", divided.format("mass", "{}"))]
+    assert told(STUDY, "4.4.1", tmp_path) == [(line, bad, text.format("4.4.1")) for line, bad, text in properties]
+    assert told(STUDY, "4.3", tmp_path) == [goal, *((line, bad, text.format("4.3")) for line, bad, text in properties)]
+    # Of what is no longer a class nothing is said of its properties.
+    assert {line for line, _, _ in told(STUDY, "4.1", tmp_path)} == {2, 3, 5, 6}
+
+
+def controller(version: int, tag: str, value: str) -> str:
+    return (
+        f'<OpenSimDocument Version="{version}">\n<ControllerSet name="c"> <objects>\n<ControlSetController name="c">\n'
+        f"<{tag}>{value}</{tag}>\n</ControlSetController>\n</objects> </ControllerSet>\n</OpenSimDocument>\n"
+    )
+
+
+def test_a_new_name_is_told_with_the_old_and_an_old_one_in_an_old_file_is_none(tmp_path):
+    new, old = controller(40600, "socket_actuators", "/forceset/a"), controller(40000, "actuator_list", "a")
+    name = "ControlSetController 'c': OpenSim has socket_actuators from version 4.5.1 on; 4.5 drops it; before it was "
+    assert told(new, "4.5", tmp_path) == [
+        (1, "info", "the file has the format 40600, OpenSim 4.5 writes 40500 and takes it for that"),
+        (4, "error", name + "called actuator_list"),
+    ]
+    assert told(new, "4.5.1", tmp_path) == told(old, "4.5", tmp_path) == []
+
+
+def test_a_model_made_in_python_is_checked_too():
+    from osimlite import Body, ConstantCurvatureJoint, Model
+
+    model = Model(name="m")
+    model.body_set.objects.append(Body(name="b", mass=1))
+    model.joint_set.objects.append(ConstantCurvatureJoint(name="j"))
+    found = validate(model, config=Config(("OSIM113",), target_version="4.4"))
+    assert [each.component for each in found] == ["/jointset/j"]
+
+
+def test_a_release_that_is_not_known_is_refused_with_those_that_are(tmp_path):
+    with pytest.raises(OsimliteError, match=r"of OpenSim '3.3' nothing is known; known are 4\.0, 4\.1.* and 4\.6"):
+        Config(target_version="3.3")
+    model = REPO / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+    done = run("validate", model, "--target-version", "4.7")
+    assert done.code == 2 and "known are 4.0" in done.err
+    (tmp_path / "osimlite.toml").write_text("target-version = 4.5\n")
+    (tmp_path / "m.xml").write_text(controller(40600, "socket_actuators", "/forceset/a"))
+    done = run("validate", tmp_path, "--no-cache", "--format", "concise")
+    assert "4.5 drops it" in done.out and done.code == 1
+    assert run("validate", tmp_path, "--target-version", "4.6").code == 0
+
+
+def test_the_table_speaks_of_classes_and_properties_that_exist():
+    assert list(TABLE["formats"])[-1] == NEWEST
+    assert later_than(NEWEST).format == TABLE["formats"][NEWEST] and not later_than(NEWEST).classes
+    for tag in TABLE["classes"]:
+        assert class_for(tag) is not None, tag
+    assert {first for first, *_ in TABLE["properties"].values()} | set(TABLE["classes"].values()) < set(
+        TABLE["formats"]
+    )
+
+
+def test_the_table_is_what_the_script_makes_of_the_releases(tmp_path):
+    if not CLONE.is_dir():
+        pytest.skip(f"needs a clone of opensim-core with its tags at {CLONE}")
+    script = REPO / "schemas" / "history.py"
+    subprocess.run([sys.executable, script, CLONE, tmp_path / "made.json"], check=True, timeout=120)
+    assert json.loads((tmp_path / "made.json").read_text()) == TABLE
