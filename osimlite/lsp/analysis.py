@@ -56,9 +56,13 @@ class Analysis:
     def __init__(self, text: Text, file: str) -> None:
         self.text = text
         self.file = file
-        self.source = Source.of_characters(text.content, file)
         self.is_table = is_table(file)
-        self.is_foreign = file.lower().endswith(".xml") and not is_ours(self.source.data[:4000])
+        self.is_foreign = file.lower().endswith(".xml") and not is_ours(text.content[:4000].encode("utf-8", "replace"))
+
+    @cached_property
+    def source(self) -> Source:
+        """The text as the reader takes it."""
+        return Source.of_characters(self.text.content, self.file)
 
     @property
     def markup(self) -> str:

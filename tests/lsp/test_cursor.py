@@ -20,8 +20,10 @@ from osimlite.lsp.cursor import cursor_at
 from osimlite.lsp.findings import diagnostics
 from osimlite.lsp.hover import hover
 from osimlite.lsp.navigation import folds, outline
+from osimlite.lsp.project import Project
 from osimlite.lsp.text import Text
 
+SETUPS = Path(__file__).resolve().parents[2] / "fixtures" / "setups"
 WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 TEXT = WALKER.read_text()
 
@@ -65,9 +67,23 @@ def test_a_part_is_told_by_the_name_of_its_property() -> None:
 @settings(max_examples=40)
 @given(st.integers(0, len(TEXT)), st.integers(0, 60), st.sampled_from(["", "<", "</", "&", "-->", '"', "<Body", "é"]))
 def test_no_question_about_a_damaged_text_fails(offset: int, cut: int, put: str) -> None:
-    text = TEXT[:offset] + put + TEXT[offset + cut :]
-    analysis = Analysis(Text(text), "walker.osim")
-    place = min(offset + len(put), len(text))
+    _ask("walker.osim", TEXT[:offset] + put + TEXT[offset + cut :], offset + len(put))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(["ik.xml", "scale.xml", "id.xml", "loads.xml", "so.xml", "controls.xml", "grf.mot", "walk.trc"]),
+    st.floats(0, 1), st.integers(0, 60), st.sampled_from(["", "<", "</", "&", "-->", '"', "<IKMarkerTask", "é", "\t"]),
+)  # fmt: skip
+def test_no_question_about_a_damaged_setup_or_table_fails(name: str, part: float, cut: int, put: str) -> None:
+    text = (SETUPS / name).read_text()
+    offset = int(part * min(len(text), 2000))
+    _ask(str(SETUPS / name), text[:offset] + put + text[offset + cut :], offset + len(put))
+
+
+def _ask(file: str, text: str, place: int) -> None:
+    analysis = Analysis(Text(text), file)
+    place = min(place, len(text))
     hover(analysis, place)
     completions(analysis, analysis if analysis.is_certain else None, place)
     diagnostics(analysis)
@@ -77,5 +93,6 @@ def test_no_question_about_a_damaged_text_fails(offset: int, cut: int, put: str)
     if target is not None:
         try:
             analysis.references(target)
+            Project().location(target)
         except OsimliteError as error:  # pragma: no cover
             pytest.fail(str(error))
