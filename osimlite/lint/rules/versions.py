@@ -7,6 +7,7 @@ from osimlite.lint.history import NEWEST, later_than, new_properties
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Object
+from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec
 
 
@@ -41,7 +42,8 @@ def newer_class(subject: Subject, found: Found) -> None:
     """
     target = subject.config.target_version or NEWEST
     later = later_than(target)
-    if subject.source is not None and subject.version is not None and subject.version > later.format:
+    # What is newer than all is told by OSIM004.
+    if subject.source is not None and later.format < (subject.version or 0) <= CURRENT_VERSION:
         found(
             f"the file has the format {subject.version}, OpenSim {target} writes {later.format} and takes it for that",
             number=0, attribute="Version", severity=INFO,
