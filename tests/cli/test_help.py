@@ -18,6 +18,7 @@ MEANINGS = {
     "--accuracy": "the step map of gait takes a finer one",
     "--set": "where a motion starts, but the pose that view shows",
     "--diff": "of mends, or of layout",
+    "--plot": "a motion, or muscles",
     "--measure": "to keep of a run, or in the history of a search",
     "--resume": "a sweep, or a search",
     "--pictures": "of a basin, or of a walk",
