@@ -31,23 +31,23 @@ def add_bodies(draft: Draft) -> None:
     robot = draft.robot
     carriers = {joint.child: joint for joint in robot.joints}
     bodies = {path: index for index, path in enumerate(body.path for body in draft.mechanism.bodies)} | {"/ground": -1}
-    elements: dict[str, _Element] = {}
     for link in robot.links:
         if not link.bodies:
             continue
         (path,) = link.bodies
         if path == "/ground":
             element = draft.section("worldbody")
+            draft.frames[link.name] = element, np.eye(4)
             draft.fidelity.translated[path] = "worldbody"
         else:
             chain: list[RobotJoint] = []
-            while not chain or chain[0].parent not in elements:
+            while not chain or chain[0].parent not in draft.frames:
                 chain.insert(0, carriers[chain[0].parent if chain else link.name])
-            element = _add_chain(elements[chain[0].parent], chain, link.name)
+            element = _add_chain(draft, chain, link.name)
             _add_inertia(draft, element, link, path, moves=any(part.kind != "fixed" for part in chain))
             if path in draft.tree.by_path:
                 draft.fidelity.translated[path] = f"body {element.get('name')}"
-        elements[link.name] = draft.bodies[bodies[path]] = element
+        draft.bodies[bodies[path]] = element
     for component, path in draft.components(Joint):
         names = [part.name for part in robot.moving if part.source == path]
         draft.fidelity.translated[path] = f"joints {' '.join(names)}" if names else "welded"
@@ -62,20 +62,26 @@ def add_frames(draft: Draft) -> None:
             draft.fidelity.translated[path] = f"site {draft.site(path, *draft.mechanism.frames[path], group=FRAMES)}"
 
 
-def _add_chain(parent: _Element, chain: list[RobotJoint], name: str) -> _Element:
+def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     """The element of the body at the end of a chain of joints, in the body that carries it."""
+    parent, start = draft.frames[chain[0].parent]
     moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
     if len(moving) > MOST_JOINTS:
         cut = moving[MOST_JOINTS]
-        parent = _add_chain(parent, chain[:cut], f"{name}_carrier")
-        add(parent, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
-        chain = chain[cut:]
-    rest, joints = np.eye(4), []
+        carrier = _add_chain(draft, chain[:cut], f"{name}_carrier")
+        add(carrier, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
+        return _add_chain(draft, chain[cut:], name)
+    rest = np.eye(4)
+    joints: list[tuple[RobotJoint, Array, Array]] = []
+    ends: dict[str, Array] = {}
     for joint in reversed(chain):
+        if not joints:
+            ends[joint.child] = inverse(rest)
         if joint.kind != "fixed":
             joints.append((joint, rest[:3, :3].T @ joint.axis, inverse(rest)[:3, 3]))
         rest = joint.origin @ rest
-    element = add(parent, "body", name=name, **pose(rest))
+    element = add(parent, "body", name=name, **pose(start @ rest))
+    draft.frames |= {link: (element, placed) for link, placed in ends.items()}
     for joint, axis, anchor in reversed(joints):
         turns, place = joint.kind == "revolute", tidy(anchor)
         anchored = place if turns and place.any() else None

@@ -49,7 +49,7 @@ def _on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     name = draft.name("joint", item.name)
     frame = np.eye(4)
     frame[:3, 3] = item.line.location
-    speck = draft.speck(name, item.line.body, frame)
+    speck = draft.speck(name, draft.bodies[item.line.body], frame)
     add(speck, "joint", name=name, type="slide", axis=item.along)
     state = draft.mechanism.at(draft.default_state[0])
     arm = state.point(*item.follower) - state.point(*item.line)

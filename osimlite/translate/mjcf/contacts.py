@@ -27,11 +27,12 @@ ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpac
 
 def add_contacts(draft: Draft) -> None:
     """Add contact surfaces, and the pairs of them that touch."""
-    if draft.options.contact == "none":
+    surfaces = list(draft.components(ContactGeometry))
+    if draft.options.contact == "none" or not surfaces:
         return
     touches = add(draft.section("default"), "default", class_="touches")
     add(touches, "geom", contype=0, conaffinity=0, group=TOUCHES, mass=0, rgba=(0.4, 0.7, 0.7, 0.4))
-    for geometry, path in draft.components(ContactGeometry):
+    for geometry, path in surfaces:
         try:
             _add_surface(draft, geometry, path)
         except (ModelError, Unsayable) as error:

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, ScapulothoracicJoint
-from osimlite.translate.mjcf.couplings import hold_joint
-from osimlite.translate.mjcf.draft import Draft
+from osimlite.translate.mjcf.draft import Draft, Follower
 
 _ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
 
@@ -32,7 +31,7 @@ def add_coordinates(draft: Draft) -> None:
             note("clamped", info.path, "that a user interface must not leave the range", "left out")
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
-            hold_joint(draft, lead.joint, lead.line.slope * start + lead.line.start)
+            draft.follow(lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,)))
             note(
                 "prescribed",
                 info.path,

@@ -12,7 +12,8 @@ from osimlite.robot.mimics import couplers
 from osimlite.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, Lead, add
-from osimlite.translate.mjcf.polynomials import DEGREE, quartic, span
+from osimlite.translate.mjcf.ellipsoids import add_ellipsoids
+from osimlite.translate.mjcf.polynomials import quartic, span
 
 
 def add_couplings(draft: Draft) -> None:
@@ -23,10 +24,13 @@ def add_couplings(draft: Draft) -> None:
         if len(joint.coordinates) == 1 and line is not None and line.slope:
             draft.leads.setdefault(joint.coordinates[0], Lead(joint.name, line))
     draft.leads |= {place: Lead(joint.name, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
+    add_ellipsoids(draft)
     drivers = coordinate_drivers(robot)
     by_coupler = {item.dependent: item.name for item in couplers(robot) if item.dependent in drivers}
     for joint in robot.moving:
         driver = joint_driver(joint, drivers)
+        if joint.name in draft.followers:
+            continue
         if driver is None:
             _hold(draft, joint)
         elif driver.coordinate is None or draft.leads.get(driver.coordinate, (None,))[0] != joint.name:
@@ -44,7 +48,7 @@ def add_couplings(draft: Draft) -> None:
 def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None:
     unit = "rad" if joint.kind == "revolute" else "m"
     if driver.coordinate is None:
-        hold_joint(draft, joint.name, driver.function.evaluate(np.zeros(1))[0])
+        draft.follow(joint.name, Follower(None, (driver.function.evaluate(np.zeros(1))[0],)))
         return
     info = draft.mechanism.coordinates[driver.coordinate]
     lead = draft.leads.get(driver.coordinate) or _argument(draft, driver.coordinate)
@@ -52,7 +56,7 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
     low, high = span(function, info.range, info.default_value)
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
     fit = quartic(function if own == (1.0, 0.0) else Composed(function, Linear(*own)), (first, last), unit)
-    follow(draft, joint.name, Follower(lead.joint, fit.coefficients))
+    draft.follow(joint.name, Follower(lead.joint, fit.coefficients))
     if fit.error is not None:
         draft.fidelity.add(
             "function",
@@ -68,7 +72,7 @@ def _argument(draft: Draft, place: int) -> Lead:
     """A joint for a coordinate that is nothing but the argument of functions: it turns a speck about its own middle."""
     info = draft.mechanism.coordinates[place]
     name = draft.mechanism.coordinate_names[place].strip("/").replace("/", ".")
-    add(draft.speck(name, GROUND, np.eye(4)), "joint", name=name, type="hinge", axis="0 0 1")
+    add(draft.speck(name, draft.bodies[GROUND], np.eye(4)), "joint", name=name, type="hinge", axis="0 0 1")
     draft.fidelity.add(
         "argument",
         info.path,
@@ -90,7 +94,7 @@ def leading(draft: Draft, place: int) -> Lead | None:
 def _hold(draft: Draft, joint: RobotJoint) -> None:
     """Hold a joint that is a function of several coordinates where the default pose has it."""
     value = joint.value(draft.default_state[0])
-    hold_joint(draft, joint.name, value)
+    draft.follow(joint.name, Follower(None, (value,)))
     places, random = list(joint.coordinates), np.random.default_rng(0)
     low, high = np.array([draft.mechanism.coordinates[place].range for place in places]).T
     off = [joint.function.evaluate(random.uniform(low, high))[0] - value for _ in range(500)]
@@ -103,17 +107,3 @@ def _hold(draft: Draft, joint: RobotJoint) -> None:
         f"joint {joint.name}",
         {"value": Error.of(off, unit)},
     )
-
-
-def hold_joint(draft: Draft, joint: str, value: float) -> None:
-    """Keep a joint at a value (rad, m)."""
-    follow(draft, joint, Follower(None, (value,)))
-
-
-def follow(draft: Draft, joint: str, follower: Follower) -> None:
-    """Add the equality that makes a joint follow another."""
-    draft.followers[joint] = follower
-    coefficients = np.zeros(DEGREE + 1)
-    coefficients[: len(follower.polynomial)] = follower.polynomial
-    name = draft.name("equality", joint)
-    add(draft.section("equality"), "joint", name=name, joint1=joint, joint2=follower.leader, polycoef=coefficients)

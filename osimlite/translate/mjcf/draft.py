@@ -97,6 +97,7 @@ class Draft:
         mesh_files: takes up the mesh files that the text names.
         root: the element ``<mujoco>``.
         bodies: the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
+        frames: element and frame (4, 4) in it of those links of the robot that stand still in an element, by name.
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
         starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
@@ -111,6 +112,7 @@ class Draft:
     mesh_files: MeshFiles
     root: _Element = field(default_factory=lambda: Element("mujoco"))
     bodies: dict[int, _Element] = field(default_factory=dict)
+    frames: dict[str, tuple[_Element, Array]] = field(default_factory=dict)
     leads: dict[int, Lead] = field(default_factory=dict)
     followers: dict[str, Follower] = field(default_factory=dict)
     tendons: dict[str, Tied] = field(default_factory=dict)
@@ -207,9 +209,17 @@ class Draft:
         add(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
 
-    def speck(self, name: str, body: int, frame: Array) -> _Element:
-        """Add a small body, which nothing weighs down, at a frame (4, 4) of a body (-1: ground)."""
-        speck = add(self.bodies[body], "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame))
+    def follow(self, joint: str, follower: Follower) -> None:
+        """Let a joint follow another, or keep it at a value."""
+        self.followers[joint] = follower
+        coefficients = np.zeros(5)
+        coefficients[: len(follower.polynomial)] = follower.polynomial
+        name = self.name("equality", joint)
+        add(self.section("equality"), "joint", name=name, joint1=joint, joint2=follower.leader, polycoef=coefficients)
+
+    def speck(self, name: str, element: _Element, frame: Array) -> _Element:
+        """Add a small body, which nothing weighs down, at a frame (4, 4) in an element."""
+        speck = add(element, "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame))
         add(speck, "inertial", pos=np.zeros(3), mass=SPECK, diaginertia=np.full(3, SPECK * SPECK))
         return speck
 

@@ -103,7 +103,7 @@ def bushing(draft: Draft, force: BushingForce, path: str) -> str:
     """
     (one, inner), second = draft.placement(force, "socket_frame1"), draft.placement(force, "socket_frame2")
     name = draft.name("bushing", path)
-    speck = draft.speck(name, one, inner)
+    speck = draft.speck(name, draft.bodies[one], inner)
     state = draft.mechanism.at(draft.default_state[0])
     apart = inverse(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
     starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])

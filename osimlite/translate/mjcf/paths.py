@@ -18,7 +18,7 @@ from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import LEFT_OUT, Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS
-from osimlite.translate.mjcf.couplings import follow, leading
+from osimlite.translate.mjcf.couplings import leading
 from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
 from osimlite.translate.mjcf.fits import fitted
 from osimlite.translate.mjcf.poses import Poses, Truth, random_poses
@@ -147,7 +147,7 @@ class _Writer:
         for axis, polynomial in _straight(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
             slide = self.draft.name("joint", f"{name}_{len(carrier)}")
             add(carrier, "joint", name=slide, type="slide", axis=axis, armature=PULLED)
-            follow(self.draft, slide, Follower(joint, _along(line, polynomial)))
+            self.draft.follow(slide, Follower(joint, _along(line, polynomial)))
         site = self.draft.name("site", path)
         add(carrier, "site", name=site, group=WRAPS)
         return site
@@ -167,7 +167,7 @@ class _Writer:
             # Of such a body MuJoCo weighs equalities by its own inertia, whatever the armature.
             add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, PULLED))
             add(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
-            follow(self.draft, name, Follower(lead.joint, _along(own, drive)))
+            self.draft.follow(name, Follower(lead.joint, _along(own, drive)))
             self._helpers[key] = name
         return self._helpers[key], Line(1.0, 0.0)
 

@@ -11,6 +11,8 @@ LOOKS, TOUCHES, MARKS, FRAMES = 2, 3, 4, 5
 
 def add_shapes(draft: Draft) -> None:
     """Add the shapes that bodies are drawn with."""
+    if not any(link.visuals for link in draft.robot.links):
+        return
     looks = add(draft.section("default"), "default", class_="looks")
     add(looks, "geom", contype=0, conaffinity=0, group=LOOKS, mass=0)
     for link, element in draft.links():

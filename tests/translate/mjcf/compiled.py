@@ -11,14 +11,22 @@ from osimlite.translate.mjcf.export import Mjcf
 
 
 class Compiled:
-    """A translation as MuJoCo has it, bodies and joints by name; impossible inertias are put back after compiling."""
+    """A translation as MuJoCo has it, bodies and joints by name.
 
-    def __init__(self, mjcf: Mjcf) -> None:
+    Args:
+        mjcf: what to compile.
+        own: give bodies the model's own inertias where they are impossible, and what is not of the model none.
+    """
+
+    def __init__(self, mjcf: Mjcf, *, own: bool = False) -> None:
         self.mjcf, self.robot = mjcf, mjcf.robot
         self.model = mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)
         self.data = mujoco.MjData(self.model)
+        for k in range(self.model.nbody if own else 0):
+            if self.model.body(k).name.endswith("_speck"):
+                self.model.body_mass[k] = self.model.body_inertia[k] = 0.0
         for record in mjcf.fidelity:
-            if record.kind == "inertia":
+            if own and record.kind == "inertia":
                 link, _ = self.robot.link_of[record.component]
                 self.model.body(link.name).inertia[:] = principal_axes(link.inertia)[0]
 

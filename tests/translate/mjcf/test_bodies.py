@@ -17,7 +17,7 @@ def test_every_real_model_has_the_bodies_and_the_mass_matrix_of_the_mechanism(co
         mjcf = to_mjcf(model, mujoco=4)
     except OsimliteError as error:
         pytest.skip(f"no mechanism: {error.message[:80]}")
-    compiled, mechanism = Compiled(mjcf), mjcf.robot.mechanism
+    compiled, mechanism = Compiled(mjcf, own=True), mjcf.robot.mechanism
     random = np.random.default_rng(1)
     free = [place for place in range(len(mechanism.coordinates)) if not mechanism.coordinates[place].locked]
     for _ in range(3):

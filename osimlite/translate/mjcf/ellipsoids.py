@@ -1,0 +1,67 @@
+"""Bodies that slide on an ellipsoid: a mechanism that keeps them there without any function of several coordinates.
+
+The body's origin is p = diag(r) n, where n is its own Z axis. A point ahead of it by h along n is at s = diag(r + h) n.
+A speck on three slides that is connected to that point reads s, and each p is r / (r + h) of its s, a straight line.
+"""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+
+from osimlite.multibody.motions import EllipsoidPoint
+from osimlite.robot.robot import RobotJoint
+from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, add, pose
+
+
+def add_ellipsoids(draft: Draft) -> None:
+    """Lead the slides of every joint whose body stays on an ellipsoid."""
+    joints = draft.robot.joints
+    slides = [place for place, joint in enumerate(joints) if isinstance(joint.function, EllipsoidPoint)]
+    for _, group in groupby(slides, key=lambda place: joints[place].source):
+        places = list(group)
+        _add(draft, [joints[place] for place in places], joints[places[-1] + 1 : places[-1] + 4])
+
+
+def _add(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) -> None:
+    radii = {}
+    for joint in slides:
+        assert isinstance(joint.function, EllipsoidPoint)
+        axis = np.eye(3)[joint.function.component]
+        if np.array_equal(joint.axis, axis):
+            radii[joint.function.component] = joint.function.radius
+    base, end = draft.frames.get(slides[0].parent), draft.frames.get(turns[-1].child) if turns else None
+    whole = {place for joint in turns for place in joint.coordinates} == set(slides[0].coordinates)
+    if len(radii) < len(slides) or base is None or end is None or not whole:
+        return
+    ahead = max(radii.values())
+    path = slides[0].source
+    name = draft.name("ellipsoid", path)
+    element, frame = base
+    speck = draft.speck(name, element, frame @ slides[0].origin)
+    state = draft.default_state[0]
+    for component, axis in enumerate(np.eye(3)):
+        reader = draft.name("joint", f"{name}_{'xyz'[component]}")
+        add(speck, "joint", name=reader, type="slide", axis=axis)
+        radius = radii.get(component, 0.0)
+        normal = EllipsoidPoint(component, 1.0).evaluate(state[list(slides[0].coordinates)])[0]
+        draft.starts[reader] = (radius + ahead) * normal
+        for slide in slides:
+            if slide.function == EllipsoidPoint(component, radius):
+                draft.follow(slide.name, Follower(reader, (0.0, radius / (radius + ahead))))
+    element, frame = end
+    point = frame.copy()
+    point[:3, 3] += ahead * frame[:3, 2]
+    sites = [draft.name("site", f"{name}_{word}") for word in ("ahead", "speck")]
+    add(element, "site", name=sites[0], **pose(point))
+    add(speck, "site", name=sites[1])
+    equality = draft.name("equality", path)
+    add(draft.section("equality"), "connect", name=equality, site1=sites[0], site2=sites[1])
+    draft.fidelity.add(
+        "ellipsoid",
+        path,
+        "a body that stays on an ellipsoid",
+        f"slides that follow a body of {SPECK:g} kg, which is connected to a point ahead of the body",
+        f"equality {equality}",
+    )

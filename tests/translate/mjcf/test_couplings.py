@@ -1,0 +1,207 @@
+"""Functions of coordinates in MuJoCo: exact where they are polynomials, else off by what their record says."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import (
+    Body,
+    Constant,
+    Coordinate,
+    CoordinateCouplerConstraint,
+    CustomJoint,
+    EllipsoidJoint,
+    LinearFunction,
+    Model,
+    MultiplierFunction,
+    PolynomialFunction,
+    SimmSpline,
+    Sine,
+    TransformAxis,
+)
+from osimlite.errors import OsimliteError
+from osimlite.translate import to_mjcf
+from tests.translate.mjcf.compiled import Compiled
+
+INERTIA = (0.1, 0.1, 0.1, 0, 0, 0)
+
+
+def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
+    """A body that turns by a coordinate, and slides by a function of it."""
+    model = Model(name="one")
+    body = model.add(Body(name="b", mass=1.0, inertia=INERTIA))
+    joint = CustomJoint(name="j", coordinates=[Coordinate(name="q", range=range, default_value=0.3)])
+    transform = joint.spatial_transform
+    transform.rotation3 = TransformAxis(coordinates=("q",), axis=(0, 0, 1), function=LinearFunction())
+    transform.translation1 = TransformAxis(coordinates=("q",), axis=(1, 0, 0), function=function)
+    model.add(joint.between(model.ground, body))
+    return model
+
+
+def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
+    """The leader and the polynomial of every joint that follows, as MuJoCo has them."""
+    model, found = compiled.model, {}
+    for k in range(model.neq):
+        if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT:
+            leader = model.eq_obj2id[k]
+            found[model.joint(model.eq_obj1id[k]).name] = (
+                model.joint(leader).name if leader >= 0 else None,
+                model.eq_data[k, :5],
+            )
+    return found
+
+
+def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:
+    """How far each following joint is from where the model has it, with all others where the model has them."""
+    values = compiled.mjcf.joint_values(q)
+    return {
+        name: float(np.polynomial.polynomial.polyval(values[leader] if leader else 0.0, polynomial)) - values[name]
+        for name, (leader, polynomial) in equalities(compiled).items()
+        if name in values and (leader is None or leader in values)
+    }
+
+
+EXACT = {
+    "line": LinearFunction(coefficients=(0.2, 0.1)),
+    "cubic": PolynomialFunction(coefficients=(0.3, -0.2, 0.1, 0.05)),
+    "quartic": PolynomialFunction(coefficients=(0.1, 0.3, -0.2, 0.1, 0.05)),
+    "scaled": MultiplierFunction(function=PolynomialFunction(coefficients=(0.3, -0.2, 0.1)), scale=0.4),
+}
+
+
+@pytest.mark.parametrize("function", EXACT.values(), ids=EXACT)
+def test_polynomials_are_written_exactly(function):
+    mjcf = to_mjcf(on_a_function(function))
+    assert not mjcf.fidelity.records
+    compiled = Compiled(mjcf)
+    for q in np.linspace(-3.0, 3.0, 7):
+        assert abs(off(compiled, np.array((q,)))["q_tx"]) < 1e-14
+
+
+FITTED = {
+    "sine": Sine(amplitude=0.3, omega=1.5, phase=0.2),
+    "spline": SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4)),
+    "of degree six": PolynomialFunction(coefficients=(0.01, 0.0, 0.0, 0.1, 0.0, 0.2, 0.1)),
+}
+
+
+@pytest.mark.parametrize("function", FITTED.values(), ids=FITTED)
+def test_other_functions_are_off_by_what_is_said(function):
+    mjcf = to_mjcf(on_a_function(function))
+    (record,) = mjcf.fidelity.records
+    compiled = Compiled(mjcf)
+    differences = [off(compiled, np.array((q,)))["q_tx"] for q in np.linspace(-1.0, 2.0, 301)]
+    error = record.errors["value"]
+    assert error.unit == "m" and np.abs(differences).max() == pytest.approx(error.max, rel=0.02)
+    assert np.sqrt(np.mean(np.square(differences))) == pytest.approx(error.rms, rel=0.05)
+    # As good as it gets: the largest error is reached, with changing signs, six times.
+    peaks = [value for value in differences if abs(value) > 0.9 * error.max]
+    assert np.count_nonzero(np.diff(np.sign(peaks))) >= 5
+
+
+def test_a_range_that_nobody_meant_is_that_of_the_knots():
+    spline = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
+    (wide,) = to_mjcf(on_a_function(spline, range=(-99999.9, 99999.9))).fidelity.records
+    (record,) = to_mjcf(on_a_function(spline)).fidelity.records
+    assert wide.errors == record.errors and "from -1 to 2" in wide.detail
+
+
+def coupled(function) -> Model:
+    """A second body that turns by a coordinate which a coupler makes a function of the first one's."""
+    model = on_a_function(LinearFunction(coefficients=(0.1, 0.0)))
+    body = model.add(Body(name="c", mass=1.0, inertia=INERTIA))
+    joint = CustomJoint(name="k", coordinates=[Coordinate(name="beta", range=(-9.0, 9.0))])
+    joint.spatial_transform.rotation1 = TransformAxis(
+        coordinates=("beta",), axis=(1, 0, 0), function=PolynomialFunction(coefficients=(1.0, 0.0, 0.0))
+    )
+    model.add(joint.between(model["/bodyset/b"], body))
+    model.constraint_set.objects.append(
+        CoordinateCouplerConstraint(
+            name="c",
+            coupled_coordinates_function=function,
+            independent_coordinate_names=("q",),
+            dependent_coordinate_name="beta",
+        )
+    )
+    return model
+
+
+def test_couplers_are_composed_into_the_functions_of_the_coordinate():
+    model = coupled(LinearFunction(coefficients=(0.5, 0.2)))
+    mjcf = to_mjcf(model)
+    assert not mjcf.fidelity.records
+    # (q / 2 + 0.2)^2
+    leader, polynomial = equalities(Compiled(mjcf))["beta_rx"]
+    assert leader == "q"
+    np.testing.assert_allclose(polynomial, (0.04, 0.2, 0.25, 0.0, 0.0), rtol=0.0, atol=1e-15)
+    assert mjcf.fidelity.translated["/constraintset/c"] == "equality beta_rx"
+
+
+def test_a_coordinate_that_is_only_an_argument_gets_a_joint():
+    spline = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
+    model = on_a_function(spline)
+    model["/jointset/j"].spatial_transform.rotation3.function = Constant(value=0.0)
+    mjcf = to_mjcf(model)
+    compiled = Compiled(mjcf)
+    assert equalities(compiled)["q_tx"][0] == "q"
+    assert {record.kind for record in mjcf.fidelity} == {"argument", "function"}
+    mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
+    assert compiled.data.joint("q").qpos[0] == 0.3
+
+
+def test_a_function_of_a_locked_coordinate_is_a_number():
+    model = coupled(LinearFunction(coefficients=(0.5, 0.2)))
+    model["/jointset/j/q"].locked = True
+    leader, polynomial = equalities(Compiled(to_mjcf(model)))["beta_rx"]
+    assert leader is None and polynomial[0] == pytest.approx(0.35**2, abs=1e-15)
+
+
+def test_a_body_stays_on_its_ellipsoid():
+    model = Model(name="shoulder")
+    body = model.add(Body(name="scapula", mass=1.0, inertia=INERTIA, mass_center=(0.0, 0.0, 0.1)))
+    coordinates = [
+        Coordinate(name=name, default_value=value) for name, value in zip("abc", (0.3, 0.4, -0.2), strict=True)
+    ]
+    joint = EllipsoidJoint(name="j", radii_x_y_z=(0.1, 0.25, 0.18), coordinates=coordinates)
+    model.add(joint.between(model.ground, body, at=(0.1, 0.2, 0.3), turned=(0.2, 0.1, 0.5), child_at=(0.01, 0.02, 0.0)))
+    mjcf = to_mjcf(model)
+    compiled, mechanism = Compiled(mjcf), mjcf.robot.mechanism
+    mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
+    mujoco.mj_forward(compiled.model, compiled.data)
+    assert np.abs(compiled.data.efc_pos).max() < 1e-12
+    for _ in range(200):
+        mujoco.mj_step(compiled.model, compiled.data)
+    mujoco.mj_forward(compiled.model, compiled.data)
+    q = {name: compiled.data.joint(name).qpos[0] for name in "abc"}
+    assert abs(q["a"] - 0.3) > 0.05
+    np.testing.assert_allclose(compiled.body("scapula"), mechanism.body_transforms(q)["scapula"], rtol=0.0, atol=1e-4)
+
+
+def test_real_functions_are_off_by_what_is_said(corpus_model):
+    try:
+        mjcf = to_mjcf(osimlite.read(corpus_model.path))
+    except OsimliteError as error:
+        pytest.skip(f"no mechanism: {error.message[:80]}")
+    compiled, mechanism = Compiled(mjcf), mjcf.robot.mechanism
+    said = {
+        record.detail.split()[1]: record.errors["value"].max for record in mjcf.fidelity if record.kind == "function"
+    }
+    random = np.random.default_rng(0)
+    low, high = np.array([info.range for info in mechanism.coordinates]).reshape(-1, 2).T
+    sane = np.nan_to_num(high - low) <= 4.0 * np.pi
+    start = mechanism.values({})
+    for _ in range(20):
+        q = np.where(sane, random.uniform(np.minimum(low, high), np.maximum(low, high)), start)
+        q[[k for k, info in enumerate(mechanism.coordinates) if info.locked]] = start[
+            [k for k, info in enumerate(mechanism.coordinates) if info.locked]
+        ]
+        # Couplers make some coordinates functions of others.
+        q = mechanism.released().values(q)
+        for coupler in mechanism.constraints:
+            if hasattr(coupler, "dependent"):
+                q[coupler.dependent] = coupler.function.evaluate(q[list(coupler.independent)])[0]
+        for name, difference in off(compiled, q).items():
+            assert abs(difference) <= 1.05 * said.get(name, 0.0) + 1e-12, name
