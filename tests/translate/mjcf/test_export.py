@@ -82,20 +82,6 @@ def test_every_component_of_the_walker_is_accounted_for():
     assert account["target"] == "mjcf 4" and {record["how"] for record in account["records"]} == {"approximate"}
 
 
-def test_real_models_are_accounted_for_and_can_start(corpus_model):
-    try:
-        model = osimlite.read(corpus_model.path)
-        mjcf = to_mjcf(model, folder=corpus_model.path.parent)
-    except OsimliteError as error:
-        pytest.skip(f"no mechanism: {error.message[:80]}")
-    assert unaccounted(model, mjcf) == []
-    compiled = Compiled(mjcf)
-    if compiled.model.nkey:
-        mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
-    mujoco.mj_forward(compiled.model, compiled.data)
-    assert np.isfinite(compiled.data.qacc).all()
-
-
 # -------------------------------------------------------------------------------------------------- names and files
 def twins() -> Model:
     """Two legs whose joints have coordinates of one name, on bodies with shapes and markers."""

@@ -1,0 +1,64 @@
+"""Real models in MuJoCo: bodies, mass matrix, functions, and an account that leaves nothing out."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.translate import to_mjcf
+from tests.translate.mjcf.compiled import Compiled
+from tests.translate.mjcf.test_couplings import off
+from tests.translate.test_export import unaccounted
+
+
+def random_pose(mechanism: Mechanism, random: np.random.Generator) -> Array:
+    """A pose in the ranges, as far as they mean anything, that fulfils locks and couplers."""
+    q = mechanism.values({})
+    for place, info in enumerate(mechanism.coordinates):
+        low, high = info.range
+        if not info.locked:
+            q[place] = random.uniform(low, high) if 0.0 <= high - low <= 4.0 * np.pi else q[place] + random.uniform()
+    for coupler in mechanism.constraints:
+        if isinstance(coupler, Coupler):
+            q[coupler.dependent] = coupler.function.evaluate(q[list(coupler.independent)])[0]
+    return q
+
+
+def test_real_models(corpus_model):
+    try:
+        model = osimlite.read(corpus_model.path)
+        mjcf = to_mjcf(model, folder=corpus_model.path.parent)
+    except OsimliteError as error:
+        pytest.skip(f"no mechanism: {error.message[:80]}")
+    assert unaccounted(model, mjcf) == []
+    compiled = Compiled(mjcf)
+    if compiled.model.nkey:
+        mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
+    mujoco.mj_forward(compiled.model, compiled.data)
+    assert np.isfinite(compiled.data.qacc).all()
+
+    own, mechanism = Compiled(mjcf, own=True), mjcf.robot.mechanism
+    free = [place for place, info in enumerate(mechanism.coordinates) if not info.locked]
+    said = {
+        record.detail.split()[1]: record.errors["value"].max for record in mjcf.fidelity if record.kind == "function"
+    }
+    random = np.random.default_rng(1)
+    for _ in range(5):
+        q = random_pose(mechanism, random)
+        own.place(q)
+        state = mechanism.at(q)
+        for index, body in enumerate(mechanism.bodies):
+            found = own.body(mjcf.robot.link_of[body.path][0].name)
+            np.testing.assert_allclose(found, state.transform(index), rtol=0.0, atol=1e-9)
+        rates = np.linalg.inv(mechanism.rate_matrix(q))
+        wanted = (rates.T @ mechanism.mass_matrix(q) @ rates)[np.ix_(free, free)]
+        scale = max(1.0, np.abs(wanted).max(initial=0.0))
+        np.testing.assert_allclose(own.mass_matrix(q)[np.ix_(free, free)], wanted, rtol=0.0, atol=1e-12 * scale)
+        for name, difference in off(own, q).items():
+            assert abs(difference) <= 1.05 * said.get(name, 0.0) + 1e-12, name
