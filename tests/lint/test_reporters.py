@@ -217,6 +217,11 @@ def test_what_differs_or_is_quickly_read_is_not_folded():
     assert render(report).count("OSIM301") == 9 and "more like this" not in render(report)
 
 
+def test_tags_that_mean_nothing_are_folded():
+    report = Report([_finding(n, f"ForwardTool has no property <old_{n}>; OpenSim ignores it") for n in range(1, 9)])
+    assert "= 7 more like this, on lines 2, 3, 4, 5 and 3 more\n" in render(report)
+
+
 def test_what_many_files_say_is_folded_too():
     late = [_finding(9, f"the time 0.{n} in m/s{n}.sto is that of 'a'", file=f"d/m{n}.sto") for n in range(6)]
     named = [_finding(3, f"no body 'b{n}'", file=f"d/m{n}.sto") for n in range(6)]

@@ -18,8 +18,8 @@ MANY = 4
 _ONE_CAUSE = {"OSIM701"}
 """Rules whose findings are mended together: two are folded already."""
 
-# A name in quotes; a number with what is written to it, or a path.
-_NAMES = re.compile(r"'[^']*'")
+# A name in quotes, or a tag; a number with what is written to it, or a path.
+_NAMES = re.compile(r"'[^']*'|<\w+>")
 _NUMBERS = re.compile(r"(?<!\S)[^\s']*/[^\s']*|(?<!\w)[-+]?[\d.][\w.+-]*")
 
 
