@@ -18,11 +18,10 @@ from osimlite.forces.hunt_crossley import (
     combine_materials,
     contact_energy,
     contact_force,
-    contact_forces,
     half_space_sphere,
-    simbody_pair_order,
     sphere_sphere,
 )
+from tests.forces.contact_sets import contact_forces, simbody_pair_order
 
 # --------------------------------------------------------------------------------------- the table of OpenSim
 

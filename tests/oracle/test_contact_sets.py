@@ -10,11 +10,10 @@ import pytest
 
 from osimlite.forces.hunt_crossley import (
     combine_materials,
-    contact_forces,
     half_space_sphere,
-    simbody_pair_order,
     sphere_sphere,
 )
+from tests.forces.contact_sets import contact_forces, simbody_pair_order
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

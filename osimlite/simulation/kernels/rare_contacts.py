@@ -66,7 +66,8 @@ def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
     """All pairs of one force in Simbody's order, until one separates too fast to push.
 
     The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces of each pair; the
-    numbers the centre and radius of each surface. The order is that of `hunt_crossley.simbody_pair_order`.
+    numbers the centre and radius of each surface. Simbody sweeps along the axis of ground on which the centres lie
+    farthest apart (largest sum of distances from their mean), from the surface that begins first.
     """
     i = at(s, item)
     count, pairs, links, p, room = i[OWN], i[OWN + 1], at(i, OWN + 2), at(x, i[NUMBERS]), at(w, i[RECORD])
