@@ -124,3 +124,18 @@ def test_a_tag_of_older_versions_is_as_bad_as_what_is_lost_with_it(tmp_path, ele
     )
     (finding,) = validate(setup, select="OSIM101").findings
     assert str(finding.severity) == severity
+
+
+@pytest.mark.parametrize(
+    ("said", "lost"), [("", True), ("<time_range/>", True), ("<time_range>0 3</time_range>", False)]
+)
+def test_inverse_kinematics_without_a_time_range_stops_at_two_seconds(project, said, lost):
+    data, setup = project / "leg.trc", project / "ik.xml"
+    lines = data.read_text().splitlines()
+    lines[2] = lines[2].replace("51", "151")
+    last = lines[-1].split("\t", 2)[2]
+    lines += [f"{52 + row}\t{1.02 + 0.02 * row:.2f}\t{last}" for row in range(100)]
+    data.write_text("\n".join([*lines, ""]))
+    setup.write_text(setup.read_text().replace("<IKTaskSet", f"{said}<IKTaskSet", 1))
+    report = validate(setup, select="OSIM844")
+    assert ["stops at 2 s" in finding.message for finding in report.findings] == [True] * lost

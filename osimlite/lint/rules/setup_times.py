@@ -12,6 +12,7 @@ from osimlite.lint.rules.setup_columns import motions
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
+from osimlite.schema.specs import field_specs
 from osimlite.tables import MarkerHeader
 
 _FIRST_STATES = 0.03
@@ -27,8 +28,9 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     control needs 0.03 s and the time of one window.
 
     ## Why is this bad
-    Inverse kinematics cuts the times to the data without a word. Loads that end before the motion go on as their spline
-    leaves them. Times in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
+    Inverse kinematics cuts the times to the data without a word. Without a time range it stops at 2 s: OpenSim 4.6
+    means to take all there is, and does not. Loads that end before the motion go on as their spline leaves them. Times
+    in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
 
     ## Example
     ```setup
@@ -95,7 +97,14 @@ def time_outside_data(setup: Setup, found: Found) -> None:
                     item, tag=tags[0], severity=ERROR,
                 )  # fmt: skip
                 continue
-            said = [setup.element_of(item, tag) is not None for tag in tags]
+            specs = field_specs(type(item))
+            said = [setup.element_of(item, tag) is not None and not setup.noted(item, specs[tag]) for tag in tags]
+            if not said[-1] and last < span[1] - slack:
+                found(
+                    f"{called(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, and '{name}' goes on to "
+                    f"{span[1]:g} s",
+                    item, tag=tags[-1],
+                )  # fmt: skip
             if said[-1] and math.isfinite(last) and last > span[1] + slack:
                 found(f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}", item, tag=tags[-1])
             if said[0] and math.isfinite(first) and first < span[0] - slack:
