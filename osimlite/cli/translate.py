@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -76,6 +77,15 @@ def translate(
             rich_help_panel="MJCF",
         ),
     ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MJCF",
+            help="Translate nothing, but measure this file, by whatever program, against the model (needs MuJoCo).",
+            show_default=False,
+            rich_help_panel="MJCF",
+        ),
+    ] = None,
 ) -> None:
     """Translate a model: writes its text, its meshes and fidelity.json.
 
@@ -83,6 +93,8 @@ def translate(
     coordinates drive joints where URDF cannot; --to mjcf writes <file>.xml.
     Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
     fidelity.json says what became of every component, and the table what is lost.
+    --check MJCF prints lengths, moment arms and forces of its muscles beside the
+    model's; with -o it writes them to check.json.
 
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
@@ -90,6 +102,11 @@ def translate(
     from osimlite.errors import OsimliteError, SettingError
     from osimlite.translate import to_mjcf, to_urdf
 
+    if check is not None:
+        from osimlite.cli._checking_mjcf import check as check_mjcf
+
+        check_mjcf(file, check, output)
+        return
     formats: dict[str, tuple[Callable[..., Urdf | Mjcf], dict[str, Any]]] = {
         "urdf": (
             to_urdf,

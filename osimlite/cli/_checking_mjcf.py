@@ -1,0 +1,52 @@
+"""``osimlite translate --check``: a file of MuJoCo's measured against the model that it was made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from osimlite.cli._console import add_row, plain_console, say
+from osimlite.text import listed, visible
+
+
+def check(file: Path, mjcf: Path, output: Path | None) -> None:
+    """Print how far a file of MuJoCo's is from a model, muscle by muscle, and write it down if there is a folder."""
+    from osimlite.document.reader import read
+    from osimlite.files import make_folder, write_atomically
+    from osimlite.translate.mjcf.check import check_mjcf
+
+    found = check_mjcf(read(file), mjcf)
+    plain_console().print(_table(found, mjcf.name))
+    if found.missing:
+        say(f"not in it: {listed(list(found.missing), most=6)}")
+    if found.coordinates:
+        say(f"no joint has the name of {listed(list(found.coordinates), most=6)}: it stands where it stands")
+    if found.bodies is not None:
+        say(f"places of bodies are off by {1e3 * found.bodies.rms:.2g} mm (root mean square)")
+    if output is not None:
+        make_folder(output)
+        write_atomically(output / "check.json", found.to_json())
+        say(f"wrote {output / 'check.json'}")
+
+
+def _table(found: Any, name: str) -> Any:
+    """A muscle in each row, the worst first: root mean squares over random poses, of the worst of its moment arms.
+
+    Last come the optimal fiber length that the file implies, over the model's, and the change of the tendon's.
+    """
+    from rich.table import Table
+
+    table = Table(title=visible(f"{name}: root mean square of what is wrong"), title_justify="left")
+    for column in ("muscle", "length, mm", "moment arm, mm", "force, Fmax", "fiber, x", "tendon, mm"):
+        table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
+    for muscle in sorted(found.muscles, key=lambda each: -each.worst_arm.rms):
+        add_row(
+            table,
+            muscle.name,
+            f"{1e3 * muscle.length.rms:.3g}",
+            f"{1e3 * muscle.worst_arm.rms:.3g}",
+            "" if muscle.force is None else f"{muscle.force.rms:.3f}",
+            "" if muscle.fiber is None else f"{muscle.fiber:.4g}",
+            "" if muscle.tendon is None else f"{1e3 * muscle.tendon:+.3g}",
+        )
+    return table

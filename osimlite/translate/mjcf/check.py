@@ -1,0 +1,240 @@
+"""What a file of MuJoCo's, whoever wrote it, makes of the paths, muscles and bodies of a model.
+
+Muscles are matched by name, joints by the names of coordinates and bodies by their own. In each of many random poses
+joints are where the coordinates are, and those that follow others by an equality where that puts them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+
+from osimlite._require import require
+from osimlite.errors import ModelError, OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.paths import Paths
+from osimlite.translate.fidelity import Error
+from osimlite.translate.mjcf.isometric import isometric_tension
+from osimlite.translate.mjcf.muscles import Curves
+from osimlite.translate.mjcf.poses import free_coordinates, random_poses
+
+NOTHING = 1e-9
+"""A moment arm (m) that is none."""
+FOLLOWED = 4
+"""So many joints may follow each other in a row."""
+
+
+@dataclass(frozen=True)
+class MuscleCheck:
+    """What became of a muscle, or of another force along a path.
+
+    Attributes:
+        name: its own.
+        length: of the path, m.
+        arms: moment arms by coordinate, m or 1.
+        force: isometric, fully active, over the greatest force; None for what is no muscle.
+        fiber: optimal fiber length that the file implies, over the model's.
+        tendon: tendon slack length that the file implies, minus the model's, m.
+    """
+
+    name: str
+    length: Error
+    arms: Mapping[str, Error]
+    force: Error | None = None
+    fiber: float | None = None
+    tendon: float | None = None
+
+    @property
+    def worst_arm(self) -> Error:
+        """The moment arm with the greatest root mean square."""
+        return max(self.arms.values(), key=lambda error: error.rms, default=Error(0.0, 0.0, "m"))
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a file makes of a model.
+
+    Attributes:
+        muscles: those that both have.
+        missing: names of forces along paths that the file does not have.
+        coordinates: names of coordinates that move by themselves and that no joint of the file has.
+        bodies: places of the bodies that both have, moved onto each other as one in every pose; None without three.
+    """
+
+    muscles: tuple[MuscleCheck, ...]
+    missing: tuple[str, ...] = ()
+    coordinates: tuple[str, ...] = ()
+    bodies: Error | None = None
+
+    def to_json(self) -> str:
+        """All numbers as JSON text."""
+        return json.dumps(_plain(asdict(self)), indent=2) + "\n"
+
+
+def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7) -> Check:
+    """Measure a file of MuJoCo's against the model that it was made of.
+
+    Args:
+        model: the model.
+        file: MJCF, or any other file that MuJoCo loads.
+        poses: how many random poses are compared, spread evenly over the ranges of all coordinates.
+        seed: of the poses.
+
+    Raises:
+        MissingDependency: mujoco is not installed.
+        OsimliteError: MuJoCo does not load the file.
+        ModelError: the two have no muscle in common.
+    """
+    mujoco: Any = require("mujoco", extra="mujoco", purpose="the check of a file of MuJoCo's")
+    try:
+        compiled = mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        raise OsimliteError(f"MuJoCo does not load it: {error}", file=str(file)) from error
+    paths = Paths(model)
+    theirs = _Compiled(mujoco, compiled, paths)
+    owners = {name.rpartition("/")[2]: name for name in paths.names}
+    tendons = {name: place for name in owners if (place := theirs.tendon(name)) is not None}
+    if not tendons:
+        raise ModelError(
+            f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners), '')}'",
+            file=str(file),
+        )
+    known, truth = random_poses(paths, poses, seed)
+    lengths, arms, places = zip(*(theirs.measured(q) for q in known.q), strict=True)
+    infos = [paths.mechanism.coordinates[place] for place in known.moving]
+    units = {info.name: "m" if info.motion_type == "rotational" else "1" for info in infos}
+    found = []
+    for name, tendon in tendons.items():
+        own = truth[owners[name]]
+        off = np.array(lengths)[:, tendon] - own.lengths
+        turned = np.array(arms)[:, tendon] - own.arms
+        by_coordinate = {
+            unique: Error.of(column, units[info.name])
+            for unique, info, column, wanted in zip(theirs.free, infos, turned.T, own.arms.T, strict=True)
+            if np.abs(wanted).max() > NOTHING or np.abs(column).max() > NOTHING
+        }
+        muscle = model.tree().by_path[owners[name]]
+        more = theirs.strength(name, muscle, own.lengths) if isinstance(muscle, Muscle) else {}
+        found.append(MuscleCheck(name, Error.of(off, "m"), by_coordinate, **more))
+    return Check(
+        tuple(found),
+        tuple(name for name in owners if name not in tendons),
+        tuple(name for name in theirs.free if name not in theirs.joints),
+        _apart(theirs, known.origins, places),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """The value with names for the numbers of errors, which JSON would have as lists."""
+    match value:
+        case Error():
+            return value._asdict()
+        case dict():
+            return {name: _plain(item) for name, item in value.items()}
+        case tuple() | list():
+            return [_plain(item) for item in value]
+    return value
+
+
+class _Compiled:
+    """A compiled model of MuJoCo's, posed by the coordinates of a model."""
+
+    def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
+        self.mujoco, self.model, self.data, self.paths = mujoco, compiled, mujoco.MjData(compiled), paths
+        names = paths.mechanism.coordinate_names
+        self.free = [names[place].strip("/").replace("/", ".") for place in free_coordinates(paths.mechanism)]
+        kinds = mujoco.mjtObj
+        self.joints = {
+            name: joint
+            for name in (label.strip("/").replace("/", ".") for label in names)
+            if (joint := mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name)) >= 0
+        }
+        bodies = ((k, body.name) for k, body in enumerate(paths.mechanism.bodies))
+        matched = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_BODY, name)) for k, name in bodies)
+        self.bodies = {k: body for k, body in matched if body >= 0}
+        self.followers = [
+            (int(compiled.eq_obj1id[k]), int(compiled.eq_obj2id[k]), compiled.eq_data[k, :5])
+            for k in range(compiled.neq)
+            if compiled.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and compiled.eq_active0[k]
+        ]
+
+    def tendon(self, name: str) -> int | None:
+        """The tendon of the actuator of a name, or of that name."""
+        kinds = self.mujoco.mjtObj
+        actuator = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_ACTUATOR, name)
+        if actuator >= 0 and self.model.actuator_trntype[actuator] == self.mujoco.mjtTrn.mjTRN_TENDON:
+            return int(self.model.actuator_trnid[actuator, 0])
+        tendon = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_TENDON, name)
+        return tendon if tendon >= 0 else None
+
+    def measured(self, q: Array) -> tuple[Array, Array, Array]:
+        """Lengths (T,) of all tendons, moment arms (T, m) about the free coordinates, places (b, 3) of bodies."""
+        model, data, mechanism = self.model, self.data, self.paths.mechanism
+        data.qpos[:] = model.qpos0
+        values = dict(zip(mechanism.coordinate_names, q.tolist(), strict=True))
+        for label, value in values.items():
+            if (joint := self.joints.get(label.strip("/").replace("/", "."))) is not None:
+                data.qpos[model.jnt_qposadr[joint]] = value
+        rates = np.zeros((len(self.free), model.nv))
+        for row, name in zip(rates, self.free, strict=True):
+            if name in self.joints:
+                row[model.jnt_dofadr[self.joints[name]]] = 1.0
+        # A joint that follows one that follows another is right after as many rounds.
+        for _ in range(FOLLOWED):
+            for joint, leader, polynomial in self.followers:
+                place, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+                value = (
+                    0.0 if leader < 0 else data.qpos[model.jnt_qposadr[leader]] - model.qpos0[model.jnt_qposadr[leader]]
+                )
+                data.qpos[place] = model.qpos0[place] + polyval(value, polynomial)
+                if leader >= 0:
+                    rates[:, dof] = polyval(value, polyder(polynomial)) * rates[:, model.jnt_dofadr[leader]]
+        arms = np.empty((model.ntendon, len(self.free)))
+        for column, rate in enumerate(rates):
+            data.qvel[:] = rate
+            self.mujoco.mj_fwdPosition(model, data)
+            self.mujoco.mj_fwdVelocity(model, data)
+            arms[:, column] = -data.ten_velocity
+        return data.ten_length.copy(), arms, data.xpos[list(self.bodies.values())].copy()
+
+    def strength(self, name: str, muscle: Muscle, lengths: Array) -> dict[str, Any]:
+        """The isometric force of a muscle at lengths of its path, and the lengths that it implies."""
+        actuator = self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+        if actuator < 0 or self.model.actuator_gaintype[actuator] != self.mujoco.mjtGain.mjGAIN_MUSCLE:
+            return {}
+        numbers, (low, high) = self.model.actuator_gainprm[actuator], self.model.actuator_lengthrange[actuator]
+        fiber = (high - low) / (numbers[1] - numbers[0])
+        tendon = low - numbers[0] * fiber
+        force = numbers[2] if numbers[2] >= 0.0 else numbers[3] / self.model.actuator_acc0[actuator]
+        curves = Curves(tendon, fiber, force, numbers[4], numbers[5], numbers[7])
+        spread = np.sort(lengths)
+        (wanted,) = isometric_tension(muscle, spread, (1.0,))
+        off = (curves.tension(spread, 1.0) - wanted)[np.isfinite(wanted)] / muscle.max_isometric_force
+        along = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
+        return {
+            "force": Error.of(off, "Fmax") if len(off) else None,
+            "fiber": float(fiber / along),
+            "tendon": float(tendon - muscle.tendon_slack_length),
+        }
+
+
+def _apart(theirs: _Compiled, origins: Array, places: Sequence[Array]) -> Error | None:
+    """How far bodies are from each other's places (m), if all of a pose are moved onto the model's as one."""
+    if len(theirs.bodies) < 3:
+        return None
+    off = []
+    for pose, found in enumerate(places):
+        wanted = origins[list(theirs.bodies), pose]
+        a, b = found - found.mean(0), wanted - wanted.mean(0)
+        left, _, right = np.linalg.svd(a.T @ b)
+        flip = np.diag((1.0, 1.0, np.sign(np.linalg.det(left @ right))))
+        off.append(np.linalg.norm(a @ left @ flip @ right - b, axis=1))
+    return Error.of(np.concatenate(off), "m")
