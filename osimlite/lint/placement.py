@@ -1,14 +1,19 @@
-"""Where bodies are in the default pose, as far as a few lines of plain arithmetic can tell.
+"""Where bodies are in a pose, as far as a few lines of plain arithmetic can tell.
 
 The numeric library that simulations use is not needed to validate, so that this knows only what it takes to look at
 the first pose: joints that are made of plain rotations and translations, and custom joints whose functions are
 constant, linear or polynomial. What hangs on another joint, on a prescribed coordinate or on a frame laid through
 stations has no known place. Constraints, which may move the model when it is assembled, are left out.
+
+Where centimetres do not matter, splines are taken for straight lines between their points, and prescribed coordinates
+have the values they are given.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.lint.axes import axes_of
@@ -16,7 +21,16 @@ from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
-from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction, PolynomialFunction
+from osimlite.schema.functions import (
+    Constant,
+    Function,
+    GCVSpline,
+    LinearFunction,
+    MultiplierFunction,
+    PiecewiseLinearFunction,
+    PolynomialFunction,
+    SimmSpline,
+)
 from osimlite.schema.joints import (
     BallJoint,
     FreeJoint,
@@ -105,6 +119,18 @@ def default_poses(subject: Subject) -> dict[int, Pose]:
     known = subject.kept.get("default poses")
     if isinstance(known, dict):
         return known
+    subject.kept["default poses"] = found = poses_at(subject)
+    return found
+
+
+def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dict[int, Pose]:
+    """The pose in ground of each body (by identity) whose place is known.
+
+    Args:
+        subject: the model.
+        values: those of coordinates, rad or m; others have their default values. Given, places may be off by some
+            centimetres.
+    """
     bones = skeleton(subject)
     poses: dict[int, Pose] = {id(bones.ground): Pose()}
     pending: list[Component] = [bones.ground]
@@ -112,7 +138,7 @@ def default_poses(subject: Subject) -> dict[int, Pose]:
         base = pending.pop(0)
         for link in bones.of(base):
             parent, child = on_base(subject, link.parent), on_base(subject, link.child)
-            motion = _motion(link.joint)
+            motion = _motion(link.joint, values)
             if parent is None or child is None or motion is None:
                 continue
             across = parent[1].then(motion).then(child[1].inverse())
@@ -120,19 +146,17 @@ def default_poses(subject: Subject) -> dict[int, Pose]:
                 if start is base and id(end) not in poses:
                     poses[id(end)] = poses[id(base)].then(step)
                     pending.append(end)
-    subject.kept["default poses"] = poses
     return poses
 
 
-def _motion(joint: Joint) -> Pose | None:
-    """The child frame of a joint in its parent frame, at the default values of the coordinates."""
-    if any(isinstance(coordinate, Unknown) or coordinate.prescribed for coordinate in joint.coordinates):
+def _motion(joint: Joint, given: Mapping[str, float] | None) -> Pose | None:
+    """The child frame of a joint in its parent frame."""
+    if any(isinstance(item, Unknown) or (item.prescribed and given is None) for item in joint.coordinates):
         return None
-    values = [coordinate.default_value for coordinate in joint.coordinates]
+    values = [(given or {}).get(item.name, item.default_value) for item in joint.coordinates]
     if is_a(joint, "CustomJoint"):
-        return _custom(
-            cast("CustomJoint", joint), dict(zip([item.name for item in joint.coordinates], values, strict=True))
-        )
+        names = [item.name for item in joint.coordinates]
+        return _custom(cast("CustomJoint", joint), dict(zip(names, values, strict=True)), rough=given is not None)
     if joint.motion_types is None or len(values) != len(joint.motion_types):
         return None
     match joint:
@@ -153,9 +177,9 @@ def _motion(joint: Joint) -> Pose | None:
     return None
 
 
-def _custom(joint: CustomJoint, values: dict[str, float]) -> Pose | None:
+def _custom(joint: CustomJoint, values: dict[str, float], *, rough: bool) -> Pose | None:
     axes = axes_of(joint)
-    moved = [_along(axis, values) for axis in axes]
+    moved = [_along(axis, values, rough) for axis in axes]
     known = [amount for amount in moved if amount is not None]
     if len(known) < len(axes):
         return None
@@ -169,12 +193,12 @@ def _custom(joint: CustomJoint, values: dict[str, float]) -> Pose | None:
     return Pose(turned.rotation, (place[0], place[1], place[2]))
 
 
-def _along(axis: TransformAxis, values: dict[str, float]) -> float | None:
+def _along(axis: TransformAxis, values: dict[str, float], rough: bool) -> float | None:
     names = [word if isinstance(word, str) else word.name for word in axis.coordinates]
-    return _value(axis.function, [values.get(name, 0.0) for name in names])
+    return _value(axis.function, [values.get(name, 0.0) for name in names], rough)
 
 
-def _value(function: Function | None, arguments: list[float]) -> float | None:
+def _value(function: Function | None, arguments: list[float], rough: bool) -> float | None:
     match function:
         case Constant():
             return function.value
@@ -187,6 +211,12 @@ def _value(function: Function | None, arguments: list[float]) -> float | None:
                 total = total * arguments[0] + coefficient
             return total
         case MultiplierFunction():
-            inner = _value(function.function, arguments)
+            inner = _value(function.function, arguments, rough)
             return None if inner is None else function.scale * inner
+        case SimmSpline() | GCVSpline() | PiecewiseLinearFunction() if (
+            rough and arguments and len(function.x) == len(function.y) > 1
+        ):
+            at = min(max(bisect_right(function.x, arguments[0]), 1), len(function.x) - 1)
+            (x0, x1), (y0, y1) = function.x[at - 1 : at + 1], function.y[at - 1 : at + 1]
+            return y0 + (y1 - y0) * (arguments[0] - x0) / ((x1 - x0) or 1.0)
     return None

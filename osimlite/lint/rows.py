@@ -199,18 +199,18 @@ class Scan:
             if self.markers and number == 0:
                 self._expect_frame(cell, line)
             elif number == time:
-                value = _number(cell)
+                value = number_in(cell)
                 if value != value:
                     self._note("time", time, line, start, cell)
                 elif not value > self._last():
                     self._order(text, line, value, self._last())
             elif not (self.markers and cell.lower() in (b"", b"nan")):
                 parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
-                if len(parts) != self.parts or any(_number(part) != _number(part) for part in parts):
+                if len(parts) != self.parts or any(number_in(part) != number_in(part) for part in parts):
                     self._note("cell", number, line, start, cell)
         if count == self.cells > time:
             self._begin(line)
-            value = _number(cells[time][1])
+            value = number_in(cells[time][1])
             rows.times.append(value if value == value else nextafter(self._last(), inf))
             rows.count += 1
             if self.markers:
@@ -218,7 +218,7 @@ class Scan:
                 rows.unseen -= _seen(form, self.cells) or set()
                 self._look_at_markers(text, line)
             if len(rows.samples) < _SAMPLES:
-                rows.samples.append(self._numbers(text, _number))
+                rows.samples.append(self._numbers(text, number_in))
 
     def _cells_of(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
         """The cells of a row with their places, of too many one more than there should be; and how many there are."""
@@ -296,6 +296,6 @@ def _blocks(data: bytes, start: int) -> Iterator[bytes]:
         start = end
 
 
-def _number(cell: bytes) -> float:
+def number_in(cell: bytes) -> float:
     """A number; NaN for a text that is none as C++ reads numbers, which knows neither NaN nor infinity."""
     return float(cell) if _PLAIN.fullmatch(cell) else nan

@@ -244,6 +244,14 @@ class Setup(Subject):
         self._looked_at[path] = None
         return top_at(path)
 
+    def table_of_tool(self, name: str) -> Table | None:
+        """A table that the tool names."""
+        if name.strip().lower() in NOTHING or not is_table(name):
+            return None
+        path = os.path.normpath(os.path.join(self.tool_folder, name.strip()))
+        self._looked_at[path] = None
+        return table_at(path)
+
     def names_of(self, target: str) -> set[str]:
         """The names of all components of a class that the tool works with: those of the model and of added sets."""
         if self.tree is None or self.tool is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 from statistics import median
@@ -12,7 +13,7 @@ from osimlite.document.source import Position
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.rows import Rows, Scan
+from osimlite.lint.rows import Rows, Scan, number_in
 from osimlite.lint.suppressions import Suppression, suppressions_in_header
 from osimlite.tables import MARK, Entry, MarkerHeader, StorageHeader, Word
 
@@ -89,6 +90,29 @@ class Table(Checked):
         if first and str(len(first[0].split())) == header.value("nColumns"):
             cells = len(first[0].split())
         return Scan(cells, header.parts).run(self.data, header.rows, header.row_line)
+
+    def rows_from(self, time: float) -> Iterator[list[bytes]]:
+        """The cells of the rows from a time on; the first is looked for by halving the text."""
+        data, place = self.data, int(self.is_markers)
+        low, high = self.header.rows, len(data)
+        while high - low > 2000:
+            middle = data.find(b"\n", (low + high) // 2, high) + 1
+            cells = data[middle : middle + 200].split(None, 2) if middle else []
+            if len(cells) <= place or not number_in(cells[place]) < time:
+                high = (low + high) // 2
+            else:
+                low = middle
+        while low < len(data):
+            end = data.find(b"\n", low) + 1 or len(data)
+            line = data[low:end].rstrip(b"\r\n")
+            cells = line.split(b"\t") if self.is_markers else line.split()
+            if len(cells) > place and number_in(cells[place]) >= time:
+                yield cells
+            low = end
+
+    def row_at(self, time: float) -> list[float]:
+        """The numbers of the first row from a time on, NaN for what is none; nothing if there is none."""
+        return [number_in(cell) for cell in next(self.rows_from(time), [])]
 
     @property
     def span(self) -> tuple[float, float] | None:

@@ -53,8 +53,8 @@ def example_file(rule: Rule, heading: str, folder: Path) -> Path:
     block = re.search(r"```(sto|trc|setup)\n", rule.page)
     path = folder / f"example.{'osim' if block is None else block[1].replace('setup', 'xml')}"
     if path.suffix == ".xml":
-        # What setups name.
-        for file in FIXTURES.glob("leg*"):
+        # What setups name, and the tool that names a setup.
+        for file in filter(Path.is_file, FIXTURES.iterdir()):
             copy(file, folder)
     path.write_bytes(example(rule, heading))
     return path

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.placement import Pose, Vector, dot
+from osimlite.lint.posture import poses_in
 from osimlite.lint.setup import Setup
+from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.text import listed
+
+_TIMES = 24
+"""How many times of a motion are looked at."""
+_NEAR = 0.4
+"""How far from the origin of its body, m, a measured force may act. Of 24 public gaits none is farther than 0.29."""
 
 
 @rule("OSIM843", "load-columns", severity=ERROR, mends="both", about="document")
@@ -94,3 +105,116 @@ def load_columns(setup: Setup, found: Found) -> None:
                         f"'{loads.datafile}' has {listed(own)} in this order: OpenSim takes the first for x",
                         force, tag=tag, severity=WARNING,
                     )  # fmt: skip
+
+
+@rule("OSIM849", "load-place", severity=WARNING, about="document")
+def load_place(setup: Setup, found: Found) -> None:
+    """A measured force acts far away from its body, or is expressed in another frame than its setup says.
+
+    ## What it does
+    Puts the model into poses of the motion that the tool is given, and looks where measured forces act: at more than
+    40 cm from the origin of their body nothing of a foot or a hand is. Where a force is expressed in a body, it looks
+    whether the numbers, as they are, point up more than they do when they are turned with that body.
+
+    ## Why is this bad
+    OpenSim applies the force wherever it is told to: joint moments are wrong by the force times that distance, without
+    a word. Feet that were taken for one another, points in millimetres, axes of the laboratory that are not those of
+    the model, and loads of another trial are found so.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <ExternalLoads name="loads">
+            <objects>
+                <ExternalForce name="right">
+                    <applied_to_body>pelvis</applied_to_body>
+                    <force_identifier>ground_force_v</force_identifier>
+                    <point_identifier>ground_force_p</point_identifier>
+                </ExternalForce>
+            </objects>
+            <datafile>leg_grf.mot</datafile>
+        </ExternalLoads>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <ExternalLoads name="loads">
+            <objects>
+                <ExternalForce name="right">
+                    <applied_to_body>shank</applied_to_body>
+                    <force_identifier>ground_force_v</force_identifier>
+                    <point_identifier>ground_force_p</point_identifier>
+                </ExternalForce>
+            </objects>
+            <datafile>leg_grf.mot</datafile>
+        </ExternalLoads>
+    </OpenSimDocument>
+    ```
+    """
+    if setup.tree is None or setup.tool is None:
+        return
+    tool: Any = setup.tool[1]
+    motion = setup.table_of_tool(getattr(tool, "coordinates_file", getattr(tool, "desired_kinematics_file", "")))
+    model: Any = setup.tree.model
+    weight = math.hypot(*model.gravity)
+    if motion is None or motion.is_markers or not weight:
+        return
+    up = tuple(-part / weight for part in model.gravity)
+    for loads in setup.named("ExternalLoads"):
+        table = setup.table(loads.datafile)
+        for force in loads.objects if table is not None else ():
+            acting = _acting(setup, force, table, motion)
+            far = [distance for distance, *_ in acting if distance > _NEAR]
+            if len(far) > max(2, len(acting) // 4):
+                found(
+                    f"at {len(far)} of {len(acting)} times {called(force)} acts more than {_NEAR:g} m from "
+                    f"{force.applied_to_body}, by up to {max(far):.3g} m: is it another body's, or are its points in "
+                    "another frame or other units?",
+                    force, tag="applied_to_body",
+                )  # fmt: skip
+            lifted = [dot(raw, up) - dot(turned, up) for _, raw, turned in acting if raw != turned]
+            if len(lifted) > 2 and max(lifted) > 0.03 and min(lifted) > -0.02:
+                found(
+                    f"{called(force)} is expressed in {force.force_expressed_in_body}, and its numbers look like those "
+                    "of ground: they point up as they are",
+                    force, tag="force_expressed_in_body",
+                )  # fmt: skip
+
+
+def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> list[tuple[float, Vector, Vector]]:
+    """What a force does at some times at which it is large.
+
+    Returns:
+        How far from the origin of its body it acts, m, and its direction, as it is written and in ground.
+    """
+    if setup.tree is None or table is None or table.span is None or motion.span is None:
+        return []
+    bodies = setup.tree.members("/bodyset", "Body")
+    places = [
+        [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)]
+        for prefix in (force.force_identifier, force.point_identifier)
+        if prefix
+    ]
+    first, last = max(table.span[0], motion.span[0]), min(table.span[1], motion.span[1])
+    if list(map(len, places)) != [3, 3] or not first < last or not force.appliesForce:
+        return []
+    rows = [table.row_at(first + (last - first) * (k + 0.5) / _TIMES) for k in range(_TIMES)]
+    rows = [row for row in rows if len(row) == len(table.labels) and not any(map(math.isnan, row))]
+    sizes = [math.hypot(*(row[place] for place in places[0])) for row in rows]
+    found = []
+    for row, size in zip(rows, sizes, strict=True):
+        if size > max(20.0, 0.2 * max(sizes)):
+            poses = poses_in(setup, motion, row[0])
+            (x, y, z), (px, py, pz) = ([row[place] for place in part] for part in places)
+            frames = (force.applied_to_body, force.force_expressed_in_body, force.point_expressed_in_body)
+            names = [str(frame).rpartition("/")[2] for frame in frames]
+            within = [Pose() if name == "ground" else poses.get(id(bodies.get(name))) for name in names]
+            body, of_force, of_point = within
+            if body is not None and of_force is not None and of_point is not None:
+                direction = (x / size, y / size, z / size)
+                found.append(
+                    (math.dist(body.position, of_point.of((px, py, pz))), direction, of_force.turned(direction))
+                )
+    return found

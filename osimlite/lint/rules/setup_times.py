@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called
@@ -270,12 +271,12 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
         header = table.header
         if isinstance(header, MarkerHeader) or header.in_degrees or setup.tree is None:
             continue
-        angles = _angles(setup)
+        angles = angles_of(setup)
         largest, label = max(
             (
                 (abs(sample[place]), column)
                 for place, column in enumerate(table.columns, 1)
-                if (column.removesuffix("/value").rpartition("/")[2]) in angles
+                if coordinate_of(column) in angles
                 for sample in table.rows.samples
                 if place < len(sample) and sample[place] == sample[place]
             ),
@@ -287,15 +288,3 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
                 "takes it for radians",
                 item, tag=tag, severity=ERROR,
             )  # fmt: skip
-
-
-def _angles(setup: Setup) -> set[str]:
-    """The coordinates that are angles."""
-    assert setup.tree is not None
-    joints: Any = setup.tree.of_class("Joint").values()
-    return {
-        coordinate.name
-        for joint in joints
-        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False)
-        if motion == "rotational"
-    }

@@ -173,7 +173,7 @@ def scale_setting(setup: Setup, found: Found) -> None:
             <objects>
                 <Measurement name="thigh">
                     <MarkerPairSet name="pairs">
-                        <objects> <MarkerPair name="first"> <markers>asis knee</markers> </MarkerPair> </objects>
+                        <objects> <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair> </objects>
                     </MarkerPairSet>
                 </Measurement>
             </objects>

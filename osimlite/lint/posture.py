@@ -1,0 +1,54 @@
+"""The model of a tool in the poses that its tables tell, to some centimetres."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, cast
+
+from osimlite.lint.placement import Pose, Vector, on_base, poses_at
+from osimlite.lint.setup import Setup
+from osimlite.lint.subject import Subject
+from osimlite.lint.table import Table
+from osimlite.schema.states import motions_of
+from osimlite.tables import StorageHeader
+
+
+def angles_of(setup: Setup) -> set[str]:
+    """The coordinates of the model that are angles."""
+    joints: Any = [] if setup.tree is None else setup.tree.of_class("Joint").values()
+    return {name for joint in joints for name, motion in motions_of(joint).items() if motion == "rotational"}
+
+
+def coordinate_of(column: str) -> str:
+    """The name of the coordinate whose values a column has."""
+    return column.removesuffix("/value").rpartition("/")[2]
+
+
+def poses_in(setup: Setup, motion: Table, time: float) -> dict[int, Pose]:
+    """The pose in ground of each body (by identity), at a time of a motion given as coordinates."""
+    angles = angles_of(setup)
+    turn = math.pi / 180.0 if isinstance(motion.header, StorageHeader) and motion.header.in_degrees else 1.0
+    values = {
+        name: value * turn if name in angles else value
+        for name, value in zip(map(coordinate_of, motion.columns), motion.row_at(time)[1:], strict=False)
+    }
+    return poses_at(_model_of(setup), values)
+
+
+def marker_places(setup: Setup) -> dict[str, Vector]:
+    """Where the markers of the model are in the default pose, in ground, m; worked out once per setup."""
+    if "marker places" not in setup.kept:
+        model = _model_of(setup)
+        poses = poses_at(model, {})
+        found: dict[str, Vector] = {}
+        for marker in model.named("Marker"):
+            frame = on_base(model, model.target_of(marker, "socket_parent_frame"))
+            if frame is not None and id(frame[0]) in poses:
+                found[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
+        setup.kept["marker places"] = found
+    return cast("dict[str, Vector]", setup.kept["marker places"])
+
+
+def _model_of(setup: Setup) -> Subject:
+    assert setup.tree is not None
+    return cast("Subject", setup.kept.setdefault("model", Subject(setup.tree.model)))
