@@ -197,8 +197,9 @@ class Analysis:
         found = named_by(self.tree, use)
         if setup is None:
             return None if found is None else self._target(self.file, found)
-        if found is not None and setup.model_file is not None:
-            return self._target(setup.model_file, found)
+        if found is not None and setup.tool is not None:
+            # A study may hold its model itself.
+            return self._target(setup.model_file or setup.tool[0], found)
         named = ((file, item) for file, top in setup.added for item in top.walk() if item.name == text)
         return next((Target(*one, number=one[1]._index) for one in named if is_of(one[1], use.reference.target)), None)
 

@@ -43,7 +43,7 @@ def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list
     if cursor.kind == "tag":
         return [*_tags(analysis, cursor, around, bracket="")]
     if cursor.kind == "attribute" and cursor.attribute == "name" and cursor.element is not None:
-        reference = reference_of(cursor.element.cls)
+        reference = reference_of(cursor)
         if reference is not None:
             return [*_names(analysis, known, cursor, reference, cursor.element)]
     if cursor.kind != "text" or around is None:
@@ -52,7 +52,7 @@ def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list
         return [*_tags(analysis, cursor, around, bracket="<")]
     if around.spec is None:
         return []
-    kind = around.spec.kind
+    kind = around.spec.kind if around.spec.names is None else around.spec.names.reference
     if isinstance(kind, Value):
         words = ("true", "false") if kind.scalar == "bool" else kind.choices
         return [_item(analysis, cursor, str(word), str(word), types.CompletionItemKind.Value) for word in words]

@@ -4,36 +4,30 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.lint.beside import documents_of, table_at
+from osimlite.lint.beside import beginning, folders_in, table_at
+from osimlite.lint.rules.setup_names import WORDS
 from osimlite.lint.setup import Setup
 from osimlite.lint.suffixes import TABLES
 from osimlite.lsp.analysis import Analysis
 from osimlite.lsp.cursor import Cursor, Element
-from osimlite.schema.base import Component, Object
+from osimlite.schema.base import Component
 from osimlite.schema.fields import Reference
 from osimlite.schema.specs import FieldSpec, lineage
+from osimlite.schema.states import variables
 from osimlite.schema.tree import Tree, Use
 
-_OPAQUE = ("input", "positional", "point-index", "output-file", "input-folder", "output-folder")
+_OPAQUE = ("input", "positional", "point-index", "output-file", "input-folder", "output-folder", "pattern")
 """Rules of references whose texts are no names of what is there."""
 _NAMED_AFTER = {
     "Control": Reference("actuator-name", "Actuator"),
     "MarkerWeight": Reference("marker-name", "Marker"),
-    "CMC_Joint": Reference("coordinate-name", "Coordinate"),
 }
 """What objects of a class are called after, although nothing says that they must be."""
-_STATES = {
-    "Coordinate": ("value", "speed"),
-    "DeGrooteFregly2016Muscle": ("activation", "normalized_tendon_force"),
-    "Muscle": ("activation", "fiber_length"),
-}
-"""The states of a class and of those derived from it; the first that fits counts."""
 _SUFFIXES = {"Model": (".osim",), "marker data": (".trc", ".sto"), "table": (".sto", ".mot")}
 """How files of a content are called; others are documents."""
-MEASURED = ("marker_file", "orientations_file", "coordinate_file")
-"""Properties that name the data that a tool compares with its model."""
 
 
 class Name(NamedTuple):
@@ -44,12 +38,16 @@ class Name(NamedTuple):
     likely: bool = True
 
 
-def reference_of(cls: type[Object] | None) -> Reference | None:
-    """What the names of objects of a class lead to."""
+def reference_of(cursor: Cursor) -> Reference | None:
+    """What the name of the object whose tag is at a place leads to."""
+    cls = None if cursor.element is None else cursor.element.cls
     if cls is None:
         return None
+    # Of some classes only the property says so that holds them, or the set that they are in.
+    held = (element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None)
+    said = next((names.reference for names in held if names is not None), None)
     after = (_NAMED_AFTER[name] for name in lineage(cls) if name in _NAMED_AFTER)
-    return cls.name_reference or next(after, None)
+    return said or cls.name_reference or next(after, None)
 
 
 def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None) -> Iterator[Name]:
@@ -73,9 +71,10 @@ def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Elem
         if setup is None:
             yield from _components(analysis.tree, reference, _owner(analysis, analysis.tree, holder))
         elif reference.rule == "state-path":
-            within = any(element.tag.startswith("control") for element in cursor.around)
-            yield from _controls(analysis.tree) if within else _states(analysis.tree)
+            for text, component in variables(analysis.tree, reference.target).items():
+                yield Name(text, type(component).tag)
         else:
+            yield from (Name(word) for word in sorted(WORDS.get(cursor.around[-1].tag, ())))
             yield from _in_tool(setup, analysis.tree, reference)
 
 
@@ -124,33 +123,13 @@ def measured(setup: Setup) -> tuple[str, list[str]] | None:
     return None
 
 
-def _controls(tree: Tree) -> Iterator[Name]:
-    for component in tree.of_class("Actuator").values():
-        yield Name(tree.path_of(component) or "", type(component).tag)
-
-
-def _states(tree: Tree) -> Iterator[Name]:
-    for component in tree.components:
-        states = next((_STATES[name] for name in lineage(type(component)) if name in _STATES), ())
-        for state in states:
-            yield Name(f"{tree.path_of(component)}/{state}", type(component).tag)
-
-
 def _files(folder: str, content: str) -> Iterator[Name]:
     """The files in a folder and in those below it that may hold something."""
-    suffixes = _SUFFIXES.get(content)
-    for place in (folder, *_folders(folder)):
-        found = documents_of(place) or () if suffixes is None else _listed(place, suffixes)
-        for path in found:
-            yield Name(os.path.relpath(path, folder).replace(os.sep, "/"))
-
-
-def _folders(folder: str) -> list[str]:
-    try:
-        with os.scandir(folder) as entries:
-            return sorted(entry.path for entry in entries if entry.is_dir() and not entry.name.startswith("."))[:50]
-    except OSError:
-        return []
+    suffixes = _SUFFIXES.get(content, (".xml",))
+    for place in (folder, *map(str, folders_in(Path(folder))[:50])):
+        for path in _listed(place, suffixes):
+            likely = content in _SUFFIXES or f"<{content}".encode() in beginning(path)
+            yield Name(os.path.relpath(path, folder).replace(os.sep, "/"), content if likely else "", likely)
 
 
 def _listed(folder: str, suffixes: tuple[str, ...]) -> list[str]:

@@ -117,6 +117,16 @@ async def test_loads_name_bodies_and_columns(editor, ask, folder: Path) -> None:
 
 
 @pytest.mark.asyncio
+async def test_files_and_words_that_a_property_takes(editor, ask, folder: Path) -> None:
+    inverse = editor(folder / "id.xml")
+    await inverse.open()
+    files = await ask.completion(inverse, "loads.xml", 2)
+    assert files["loads.xml"].sort_text < files["controls.xml"].sort_text and "coords.mot" not in files
+    assert {"MUSCLES", "hamstrings_r"} <= {*await ask.completion(inverse, "Muscles<", 2)}
+    assert {"ALL", "hip_r"} <= {*await ask.completion(inverse, "ALL<", 2)}
+
+
+@pytest.mark.asyncio
 async def test_controls_are_called_after_actuators(editor, ask, folder: Path) -> None:
     controls = editor(folder / "controls.xml")
     await controls.open()
@@ -128,6 +138,8 @@ MOCO = """<OpenSimDocument Version="40600">
         <ModelProcessor name="model"><filepath>model.osim</filepath></ModelProcessor>
         <state_infos><MocoVariableInfo name="/jointset/knee_r/knee_angle_r/value"/></state_infos>
         <control_infos><MocoVariableInfo name="/forceset/hamstrings_r"/></control_infos>
+        <goals><MocoControlGoal name="effort"><MocoWeightSet name="control_weights"><objects>
+            <MocoWeight name="/forceset/vasti_r"/></objects></MocoWeightSet></MocoControlGoal></goals>
     </MocoPhase></phases></MocoPhase></MocoProblem></MocoStudy>
 </OpenSimDocument>
 """
@@ -142,6 +154,7 @@ async def test_states_and_controls_of_moco_are_paths(editor, ask, folder: Path) 
     assert "/jointset/knee_r/knee_angle_r/speed" in states and "/forceset/hamstrings_r" not in states
     controls = await ask.completion(study, "/forceset/hamstrings_r", 3)
     assert "/forceset/hamstrings_r" in controls and "/jointset/knee_r/knee_angle_r/speed" not in controls
+    assert "/forceset/hamstrings_r" in await ask.completion(study, "/forceset/vasti_r", 3)
     assert "Coordinate `/jointset/knee_r/knee_angle_r` of" in await ask.hover(study, "/jointset/knee_r", 3)
     (folder / "study.omoco").write_text(text)
     changes = await ask.rename(study, "knee", "/jointset/knee_r", 3)

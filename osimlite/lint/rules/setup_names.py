@@ -27,7 +27,7 @@ _IN_MODEL = {
     "pattern": "",
 }
 """The rules of references that lead into the model, with what they lead to if that is not said by the reference."""
-_WORDS = {
+WORDS = {
     "bodies": {"all", "center_of_mass"},
     "body_names": {"all", "center_of_mass"},
     "coordinates": {"all"},
@@ -41,6 +41,7 @@ _WORDS = {
     "body_name": {"ground"},
     "wrt_body": {"center_of_mass", "-1"},
     "express_body": {"center_of_mass", "-1"},
+    "forces_to_exclude": {"ALL", "ACTUATORS", "MUSCLES"},
 }
 """What a property takes besides names."""
 _SETS = {"Marker": "/markerset", "Force": "/forceset"}
@@ -125,7 +126,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
             text = text.rpartition("/")[2]
         elif what == "output" and kind.rule == "state-path" and not text.startswith("/"):
             text = f"/{text}"
-        if what is None or not text or text in _WORDS.get(tag, ()) or text.lower() == "unassigned":
+        if what is None or not text or text in WORDS.get(tag, ()) or text.lower() == "unassigned":
             continue
         if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):
             continue
