@@ -86,6 +86,14 @@ def translate(
             rich_help_panel="MJCF",
         ),
     ] = None,
+    spline: Annotated[
+        str | None,
+        typer.Option(
+            help="What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
+            show_default="quartic",
+            rich_help_panel="MJCF",
+        ),
+    ] = None,
 ) -> None:
     """Translate a model: writes its text, its meshes and fidelity.json.
 
@@ -112,7 +120,7 @@ def translate(
             to_urdf,
             {"limits": limits, "merge": merge, "collision": collision, "effort": effort, "velocity": velocity},
         ),
-        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact, "fit": fit}),
+        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact, "fit": fit, "spline": spline}),
     }
     if to not in formats:
         raise OsimliteError(f"--to is 'urdf' or 'mjcf', not '{to}'")

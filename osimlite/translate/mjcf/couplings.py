@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from osimlite.multibody.functions import IDENTITY, Linear
 from osimlite.multibody.mechanism import GROUND
+from osimlite.multibody.spatial import Array
 from osimlite.robot.drivers import Composed, Driver, coordinate_drivers, joint_driver
 from osimlite.robot.lines import Line, as_line
 from osimlite.robot.mimics import couplers
 from osimlite.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
+from osimlite.translate.mjcf.bodies import LEAST_MASS
 from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, Lead, add
 from osimlite.translate.mjcf.ellipsoids import add_ellipsoids
-from osimlite.translate.mjcf.polynomials import quartic, span
+from osimlite.translate.mjcf.moving import composition
+from osimlite.translate.mjcf.polynomials import Fit, quartic, sampled, span
+
+PULLED = 0.1
+"""Inertia (kg, kg·m²) of helpers: muscles may pull at them, and the equalities that hold them are soft."""
 
 
 def add_couplings(draft: Draft) -> None:
@@ -56,13 +65,21 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
     low, high = span(function, info.range, info.default_value)
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
     fit = quartic(function if own == (1.0, 0.0) else Composed(function, Linear(*own)), (first, last), unit)
-    draft.follow(joint.name, Follower(lead.joint, fit.coefficients))
+    follower, done = Follower(lead.joint, fit.coefficients), "a quartic, fitted"
+    if fit.error is not None and draft.options.spline == "series":
+        drive, (outer,) = composition([function], (low, high))
+        led = helper(draft, driver.coordinate, drive)
+        assert led is not None
+        follower, done = Follower(led.joint, along(led.line, outer)), "a quartic of a quartic, fitted"
+        x = np.linspace(low, high, 400)
+        fit = Fit((), Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sampled(function, x), unit))
+    draft.follow(joint.name, follower)
     if fit.error is not None:
         draft.fidelity.add(
             "function",
             whose,
             "a joint that follows a coordinate by another function than a polynomial of degree four",
-            "a quartic, fitted",
+            done,
             f"joint {joint.name} over {info.name} from {low:g} to {high:g}",
             {"value": fit.error},
         )
@@ -84,11 +101,38 @@ def _argument(draft: Draft, place: int) -> Lead:
     return draft.leads[place]
 
 
-def leading(draft: Draft, place: int) -> Lead | None:
-    """The joint that a coordinate is a line of, which is made if it is not there; None if the coordinate is locked."""
-    if draft.mechanism.coordinates[place].locked:
+def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
+    """The joint, and the line of it, that is a polynomial of a coordinate; None if the coordinate is locked.
+
+    Args:
+        draft: gets the joint, if there is none.
+        place: of the coordinate in the mechanism.
+        drive: the polynomial, constant first.
+    """
+    info = draft.mechanism.coordinates[place]
+    if info.locked:
         return None
-    return draft.leads.get(place) or _argument(draft, place)
+    lead = draft.leads.get(place) or _argument(draft, place)
+    own = lead.line.inverse()
+    if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
+        return Lead(lead.joint, own)
+    follower = Follower(lead.joint, along(own, drive))
+    name = next((name for name, each in draft.followers.items() if each == follower and name in draft.helpers), None)
+    if name is None:
+        name = draft.name("joint", f"{info.name}_helper")
+        draft.helpers.add(name)
+        speck = add(draft.bodies[GROUND], "body", name=draft.name("body", name))
+        # Of such a body MuJoCo weighs equalities by its own inertia, whatever the armature.
+        add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, PULLED))
+        add(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
+        draft.follow(name, follower)
+    return Lead(name, Line(1.0, 0.0))
+
+
+def along(line: Line, polynomial: Array) -> tuple[float, ...]:
+    """The polynomial of a line, in powers of what the line is of."""
+    whole: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
+    return tuple(whole.coef.tolist())
 
 
 def _hold(draft: Draft, joint: RobotJoint) -> None:

@@ -26,6 +26,7 @@ from osimlite.translate.fidelity import Fidelity
 Version = Literal[3, 4]
 Contact = Literal["native", "none"]
 Fit = Literal["none", "wraps", "force"]
+Spline = Literal["quartic", "series"]
 Value = str | bool | int | float | Sequence[float] | Array | None
 C = TypeVar("C", bound=Component)
 
@@ -49,12 +50,14 @@ class Options:
         visuals: whether to say what bodies look like.
         contact: whether contact forces become contacts of MuJoCo's own law, or nothing.
         fit: what is fitted: nothing, what tendons go around, or that and the forces of muscles.
+        spline: what a joint follows that is no polynomial: one quartic, or a quartic of a quartic.
     """
 
     version: Version = 4
     visuals: bool = True
     contact: Contact = "native"
     fit: Fit = "none"
+    spline: Spline = "quartic"
 
 
 class Lead(NamedTuple):
@@ -100,6 +103,7 @@ class Draft:
         frames: element and frame (4, 4) in it of those links of the robot that stand still in an element, by name.
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
+        helpers: those of them that move nothing, but are what others follow.
         starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
         tendons: of paths, by the absolute path of their owners.
         activations: at the start, of the actuators that have one, by name.
@@ -115,6 +119,7 @@ class Draft:
     frames: dict[str, tuple[_Element, Array]] = field(default_factory=dict)
     leads: dict[int, Lead] = field(default_factory=dict)
     followers: dict[str, Follower] = field(default_factory=dict)
+    helpers: set[str] = field(default_factory=set)
     tendons: dict[str, Tied] = field(default_factory=dict)
     activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)

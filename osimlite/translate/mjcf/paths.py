@@ -10,7 +10,6 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from osimlite.multibody.spatial import Array
-from osimlite.robot.lines import Line
 from osimlite.schema.forces import Force
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
@@ -18,7 +17,7 @@ from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import LEFT_OUT, Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS
-from osimlite.translate.mjcf.couplings import leading
+from osimlite.translate.mjcf.couplings import PULLED, along, helper
 from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
 from osimlite.translate.mjcf.fits import fitted
 from osimlite.translate.mjcf.poses import Poses, Truth, random_poses
@@ -29,8 +28,6 @@ CHOOSING, FITTING, HELD_OUT = 64, 200, 100
 """How many random poses a tendon is chosen by, fitted to, and measured in."""
 EXACT = 1e-9
 """Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
-PULLED = 0.1
-"""Inertia (kg, kg·m²) of helpers: muscles pull at them, and the equalities that hold them are soft."""
 WRAPS = 4
 """Group of the geoms that tendons go around, and of their sites."""
 
@@ -116,7 +113,6 @@ class _Writer:
     draft: Draft
     surfaces: dict[str, str] = field(default_factory=dict)
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
-    _helpers: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def tendon(self, path: str, tendon: Tendon) -> str:
         """Write a tendon with all that it needs; returns its name."""
@@ -134,42 +130,23 @@ class _Writer:
         if spot.slides is None:
             return self.draft.site(path, spot.body, spot.place, group=WRAPS)
         assert spot.drive is not None
-        helper = self._helper(spot.coordinate, spot.drive)
-        if helper is None:
+        led = helper(self.draft, spot.coordinate, spot.drive)
+        if led is None:
             # The coordinate is locked.
             value = self.draft.mechanism.coordinates[spot.coordinate].default_value
             moved = [Polynomial(row)(Polynomial(spot.drive)(value)) for row in spot.slides]
             return self.draft.site(path, spot.body, spot.place + np.array(moved), group=WRAPS)
-        joint, line = helper
+        joint, line = led
         name = self.draft.name("body", path)
         carrier = add(self.draft.bodies[spot.body], "body", name=name, pos=tidy(spot.place + spot.slides[:, 0]))
         add(carrier, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
         for axis, polynomial in _straight(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
             slide = self.draft.name("joint", f"{name}_{len(carrier)}")
             add(carrier, "joint", name=slide, type="slide", axis=axis, armature=PULLED)
-            self.draft.follow(slide, Follower(joint, _along(line, polynomial)))
+            self.draft.follow(slide, Follower(joint, along(line, polynomial)))
         site = self.draft.name("site", path)
         add(carrier, "site", name=site, group=WRAPS)
         return site
-
-    def _helper(self, coordinate: int, drive: Array) -> tuple[str, Line] | None:
-        """The joint, and the line of it, that is a polynomial of a coordinate; None if the coordinate is locked."""
-        lead = leading(self.draft, coordinate)
-        if lead is None:
-            return None
-        own = lead.line.inverse()
-        if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
-            return lead.joint, own
-        key = (coordinate, *drive.tolist())
-        if key not in self._helpers:
-            name = self.draft.name("joint", f"{self.draft.mechanism.coordinates[coordinate].name}_helper")
-            speck = add(self.draft.section("worldbody"), "body", name=self.draft.name("body", name))
-            # Of such a body MuJoCo weighs equalities by its own inertia, whatever the armature.
-            add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, PULLED))
-            add(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
-            self.draft.follow(name, Follower(lead.joint, _along(own, drive)))
-            self._helpers[key] = name
-        return self._helpers[key], Line(1.0, 0.0)
 
     def _geom(self, path: str, around: Around) -> str:
         key = (around.body, around.kind, around.radius, around.length, *around.frame.ravel().tolist())
@@ -180,12 +157,6 @@ class _Writer:
             look: dict[str, Value] = {"contype": 0, "conaffinity": 0, "group": WRAPS, "rgba": (0.0, 1.0, 1.0, 0.3)}
             add(element, "geom", name=name, type=around.kind, size=size, **pose(around.frame), **look)
         return self._geoms[key]
-
-
-def _along(line: Line, polynomial: Array) -> tuple[float, ...]:
-    """The polynomial of a line, in powers of what the line is of."""
-    whole: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
-    return tuple(whole.coef.tolist())
 
 
 def _straight(slides: Array) -> Iterator[tuple[Array, Array]]:

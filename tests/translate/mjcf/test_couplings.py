@@ -100,6 +100,16 @@ def test_other_functions_are_off_by_what_is_said(function):
     assert np.count_nonzero(np.diff(np.sign(peaks))) >= 5
 
 
+def test_a_quartic_of_a_quartic_is_closer():
+    model = on_a_function(FITTED["spline"])
+    (once,), twice = to_mjcf(model).fidelity.records, to_mjcf(model, spline="series")
+    (record,) = twice.fidelity.records
+    assert record.errors["value"].rms < 0.5 * once.errors["value"].rms
+    compiled = Compiled(twice)
+    differences = [off(compiled, np.array((q,)))["q_tx"] for q in np.linspace(-1.0, 2.0, 301)]
+    assert np.abs(differences).max() == pytest.approx(record.errors["value"].max, rel=0.02)
+
+
 def test_a_range_that_nobody_meant_is_that_of_the_knots():
     spline = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
     (wide,) = to_mjcf(on_a_function(spline, range=(-99999.9, 99999.9))).fidelity.records
