@@ -15,11 +15,11 @@ from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
-from osimlite.lint.suffixes import is_table, project_files
+from osimlite.lint.suffixes import project_files
 from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from osimlite.document.source import Source
 
@@ -121,23 +121,26 @@ def _places(count: int) -> str:
     return f"{count} {'place' if count == 1 else 'places'}"
 
 
-def _mended(path: str, given: Config, unsafe: bool) -> tuple[Source, bytes, int, int]:
-    """A file, its bytes once everything is mended, how many mends that took, and how many guesses are left."""
-    from osimlite.document.source import Source
-    from osimlite.lint.fixes import mended
+def _mended(
+    source: Source, given: Config, unsafe: bool, put: Callable[[list[bytes | memoryview]], Source]
+) -> tuple[Source, int, int]:
+    """A file once everything is mended, how many mends that took, and how many guesses are left.
 
-    source = _source(path)
-    data, total, left = source.data, 0, 0
+    `put` makes of the pieces of each round the source of the next.
+    """
+    from osimlite.lint.fixes import mended_pieces
+
+    total = left = 0
     # A mend may bring another to light, as a misspelt set does with all that is in it.
     for _ in range(10):
-        current = Source(data, source.file)
-        report = _check(current, given)
-        data, count = mended(data if is_table(path) else current, report, unsafe=unsafe)
-        total += count
+        report = _check(source, given)
+        pieces, count = mended_pieces(source, report, unsafe=unsafe)
         if not count:
             left = sum(finding.fix is not None for finding in report.findings)
             break
-    return source, data, total, left
+        total += count
+        source = put(pieces)
+    return source, total, left
 
 
 def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, bool]:
@@ -160,11 +163,15 @@ def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, 
 
 def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
     """Mend a file; how many mends that took, and how many guesses are left."""
-    from osimlite.files import write_atomically
+    from osimlite.files import written_atomically
 
-    _, data, count, left = _mended(path, given, unsafe)
-    if count:
-        write_atomically(path, data)
+    def put(pieces: list[bytes | memoryview]) -> Source:
+        with written_atomically(path) as stream:
+            stream.writelines(pieces)
+        pieces.clear()
+        return _source(path)
+
+    _, count, left = _mended(_source(path), given, unsafe, put)
     return count, left
 
 
@@ -172,11 +179,12 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
     """Print what mending would change; whether it would change anything."""
     from osimlite.document.source import Source
 
-    source, data, count, left = _mended(path, given, unsafe)
+    source = _source(path)
+    after, count, left = _mended(source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file))
     if not count:
         guess = f"can be mended with certainty; --unsafe-fixes would mend {_places(left)}" if left else "to mend"
         say(f"{path}: nothing {guess}.", err=True)
-    print_diff(source.text, Source(data).text, path, path)
+    print_diff(source.text, after.text, path, path)
     return bool(count)
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections.abc import Iterable, Iterator
-from typing import AnyStr
+from collections.abc import Iterable
 
 from osimlite.document.escape import escape
 from osimlite.document.source import Position, Source
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
+from osimlite.lint.suffixes import is_table
 
 
 def replaced(source: Source | None, place: Position | None, text: str | None, *, safe: bool = True) -> Fix | None:
@@ -88,38 +88,35 @@ def _touches(edit: Edit, chosen: list[Edit]) -> bool:
     return before > 0 and chosen[before - 1].end > edit.start
 
 
-def mended(source: Source | bytes, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
-    """The bytes of a document, or of a table, with its mends, and how many there are; a document keeps its encoding.
+def mended(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
+    """The bytes of a file with its mends, and how many there are; raises as `mended_pieces` does."""
+    pieces, count = mended_pieces(source, report, unsafe=unsafe)
+    return b"".join(pieces), count
+
+
+def mended_pieces(source: Source, report: Report, *, unsafe: bool = False) -> tuple[list[bytes | memoryview], int]:
+    """The same in pieces, which of a table are no copies; a document keeps its encoding.
 
     Raises:
         OsimliteError: the bytes are in no single encoding, so that they cannot be written back as they were.
     """
     edits, count = edits_of(report.findings, unsafe=unsafe)
-    if isinstance(source, bytes):
-        if not count:
-            return source, 0
-        return b"".join(_spliced(source, [(edit.start, edit.end, edit.text.encode()) for edit in edits])), count
-    if not count:
-        return source.data, 0
+    ends = [0, *(edit.end for edit in edits)]
+    if not count or is_table(source.file):
+        data = memoryview(source.data)
+        pieces: list[bytes | memoryview] = []
+        for end, edit in zip(ends, edits, strict=False):
+            pieces += data[end : edit.start], edit.text.encode()
+        return [*pieces, data[ends[-1] :]], count
     if source.text.encode(source.encoding, "replace") != source.data:
         raise OsimliteError("the file mixes encodings and cannot be mended; save it as UTF-8 first", file=source.file)
-    text = "".join(_spliced(source.text, [(edit.start, edit.end, edit.text) for edit in edits]))
+    parts = (source.text[end : edit.start] + edit.text for end, edit in zip(ends, edits, strict=False))
     try:
-        return text.encode(source.encoding), count
+        return ["".join([*parts, source.text[ends[-1] :]]).encode(source.encoding)], count
     except UnicodeEncodeError:
         raise OsimliteError(
             f"a mend cannot be written in {source.encoding}; save the file as UTF-8 first", file=source.file
         ) from None
-
-
-def _spliced(whole: AnyStr, edits: list[tuple[int, int, AnyStr]]) -> Iterator[AnyStr]:
-    """The pieces of a text with others in their places."""
-    last = 0
-    for start, end, text in edits:
-        yield whole[last:start]
-        yield text
-        last = end
-    yield whole[last:]
 
 
 def _whole_line(text: str, start: int, end: int) -> Edit:

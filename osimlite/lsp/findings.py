@@ -92,7 +92,17 @@ def _title(finding: Finding) -> str:
 
 
 def _edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
-    return [types.TextEdit(analysis.text.range(edit.start, edit.end), edit.text) for edit in edits]
+    found = []
+    data, is_table = analysis.source.data, analysis.is_table and not analysis.text.content.isascii()
+    seen = characters = 0
+    for edit in sorted(edits, key=lambda edit: edit.start):
+        start, end = edit.start, edit.end
+        if is_table:
+            # Mends of tables count bytes.
+            characters += len(data[seen:start].decode())
+            seen, start, end = start, characters, characters + len(data[start:end].decode())
+        found.append(types.TextEdit(analysis.text.range(start, end), edit.text))
+    return found
 
 
 def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit:

@@ -44,8 +44,7 @@ BROKEN = [
 def mend(name: str, data: bytes, *, unsafe: bool = False) -> bytes:
     for _ in range(5):
         source = Source(data, name)
-        subject = subject_in(source)
-        data, count = mended(data if subject.about == "table" else source, run(subject), unsafe=unsafe)
+        data, count = mended(source, run(subject_in(source)), unsafe=unsafe)
         if not count:
             break
     return data

@@ -194,6 +194,20 @@ async def test_a_table_is_checked_when_it_is_written(client, editor, folder: Pat
 
 
 @pytest.mark.asyncio
+async def test_a_mend_in_a_table_is_where_it_belongs_behind_letters_of_any_script(client, editor, folder: Path) -> None:
+    text = (folder / "coords.mot").read_text()
+    rest = text.partition("\n")[2]
+    motion = editor(folder / "coords.mot", f"Läufer \U0001f3c3\n{rest.replace('inDegrees=yes', 'inDegrees=true')}")
+    (found,) = await motion.open()
+    context = types.CodeActionContext([found], only=[types.CodeActionKind.QuickFix])
+    asked = types.CodeActionParams(motion.document, found.range, context)
+    mend = next(
+        action for action in await client.text_document_code_action_async(asked) if action.title == "Change to 'yes'"
+    )
+    assert motion.after(mend.edit.changes[motion.uri]) == f"Läufer \U0001f3c3\n{rest}"
+
+
+@pytest.mark.asyncio
 async def test_xml_of_others_is_left_alone(client, editor, ask, tmp_path: Path) -> None:
     pom = editor(tmp_path / "pom.xml", "<project>\n  <Body name='a'><mass>1</mass></Body>\n  <\n</project>")
     assert await pom.open() == []
