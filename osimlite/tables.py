@@ -22,8 +22,8 @@ COUNTS = {"nRows": "nRows", "nr": "nRows", "datarows": "nRows"} | dict.fromkeys(
     ("nColumns", "nc", "datacolumns"), "nColumns"
 )
 """Keys of counts in the header of a storage file, by what they mean."""
-LONGEST_HEADER = 1_000_000
-"""Bytes in which the header of a storage file ends."""
+LONGEST_HEADER, LONGEST_LINE = 1_000_000, 4_000_000
+"""Bytes in which the header of a storage file ends, and those of a line that are looked at."""
 
 _SUFFIXES = {
     "double": ("",),
@@ -88,8 +88,8 @@ class MarkerHeader:
     label_line = 4
 
     def __init__(self, data: bytes) -> None:
-        found = [match for match in islice(_LINE.finditer(data), 5) if match[0]]
-        self.lines = [_text(match[0]) for match in found]
+        found = [match for match in islice(_LINE.finditer(data), 5) if match.end() > match.start()]
+        self.lines = [_text(data[match.start() : min(match.end(), match.start() + LONGEST_LINE)]) for match in found]
         # Where the line of X1 Y1 Z1 is missing the rows begin with the fifth.
         self.row_line = 5 if self.lines[4:] and self.lines[4][:1].isdigit() else len(found) + 1
         self.rows = found[4].start() if self.row_line == 5 and found[4:] else found[-1].end() if found else 0
@@ -140,7 +140,7 @@ class StorageHeader:
         self.rows = data.find(b"\n", start) + 1 or len(data)
         self.row_line = self.label_line + 1
         # The newer of OpenSim's readers takes a label up to a tab, the older up to a blank.
-        line = _text(data[max(start, mark) : self.rows])
+        line = _text(data[max(start, mark) : min(self.rows, start + LONGEST_LINE)])
         self.labels = words(line, self.label_line, _BETWEEN_TABS if self.is_strict and "\t" in line else _WORD)
 
     def value(self, key: str) -> str:

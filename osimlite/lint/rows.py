@@ -17,16 +17,20 @@ from operator import lt
 from typing import NamedTuple
 
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
+from osimlite.lint.words import times
 
 BLOCK = 16_000
 """Bytes that are looked at together: few enough for the fastest memory of a processor."""
 
 _LONGEST = 4_000_000
 """Bytes of a line whose look would take too much memory."""
-_SAMPLES = 64
-"""Rows of which all are samples; of further ones fewer and fewer are."""
+_SAMPLES, _SAMPLED = 64, 200_000
+"""Rows of which all are samples, and the numbers in them at most; of further ones fewer and fewer are."""
+_TOLD = 50
+"""Faults of a kind that are told, one for each column."""
 _PLAIN = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
+_FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 
 
 class Fault(NamedTuple):
@@ -34,6 +38,7 @@ class Fault(NamedTuple):
 
     `kind` is ``cell`` (no number), ``row`` (`text` says how many cells), ``comment``, ``blank``, ``order``, ``time``
     (no number), ``part`` (a part of a marker), ``zero`` (a marker at the origin) or ``frame`` (a wrong number).
+    `others` is how many more columns have such a fault that is not told.
     """
 
     kind: str
@@ -43,6 +48,13 @@ class Fault(NamedTuple):
     length: int
     text: str
     times: int = 1
+    others: int = 0
+
+    def more(self, noun: str = "row") -> str:
+        """What to say of further rows, and of further columns."""
+        rows = [f"; so it is in {times(self.times - 1, f'more {noun}')}"] if self.times > 1 else []
+        columns = [f"; there is such in {times(self.others, 'more column')}"] if self.others else []
+        return "".join(rows + columns)
 
 
 @dataclass(slots=True)
@@ -60,8 +72,11 @@ class Rows:
     unseen: set[int] = field(default_factory=set)
 
     def of(self, *kinds: str) -> list[Fault]:
-        """The faults of some kinds, by place."""
-        return sorted((fault for fault in self.faults.values() if fault.kind in kinds), key=lambda fault: fault.line)
+        """The faults of some kinds, by place; of very many the first."""
+        found = sorted((fault for fault in self.faults.values() if fault.kind in kinds), key=lambda fault: fault.line)
+        if len(found) > _TOLD:
+            found[_TOLD - 1 :] = [found[_TOLD - 1]._replace(others=len(found) - _TOLD)]
+        return found
 
     def line_of(self, row: int) -> int:
         """The line of the file that holds a row, as both are counted from 0 and 1."""
@@ -90,9 +105,10 @@ class Scan:
         """Look at the rows from an offset on, which is in this line of the file."""
         if self.markers:
             self.rows.unseen = set(range((self.cells - 2) // 3))
-            while start < len(data) and data[start : start + 1] in b"\t\r\n ":
-                # Before the first frame OpenSim passes over lines that have no number of one.
-                start, line = data.find(b"\n", start) + 1 or len(data), line + 1
+            # Before the first frame OpenSim passes over lines that have no number of one.
+            frame = _FRAME.search(data, start)
+            first = frame.start() if frame else len(data)
+            start, line = first, line + data.count(b"\n", start, first)
         layout = MARKERS if self.markers else VECTORS if self.parts > 1 else ROWS
         whole = (b"\t" if self.markers else b"").join([b",".join([b"0"] * self.parts)] * self.cells)
         for block in _blocks(data, start):
@@ -103,19 +119,25 @@ class Scan:
                 self._take(lines, [whole] * len(lines), line, zeros)
             else:
                 forms = looks.split(b"\n")
-                good = [form == whole or (self.markers and _seen(form, self.cells) is not None) for form in forms]
-                for is_good, group in groupby(range(len(lines)), good.__getitem__):
+                kinds = [form and (form == whole or self._is_good(form)) for form in forms]
+                for kind, group in groupby(range(len(lines)), kinds.__getitem__):
                     places = list(group)
-                    if is_good:
+                    if kind:
                         part = slice(places[0], places[-1] + 1)
                         self._take(lines[part], forms[part], line + places[0], zeros)
-                    else:
+                    elif kind is False:
                         for place in places:
                             self._odd(lines[place], line + place)
+                    elif self.rows.count:
+                        self._note("blank", 0, line + places[0], 0, b"", times=len(places))
             line += len(lines)
         if not self.rows.count:
             self.rows.unseen.clear()
         return self.rows
+
+    def _is_good(self, form: bytes) -> bool:
+        """Whether a form other than that of a whole row is one of a good row."""
+        return self.markers and _seen(form, self.cells) is not None
 
     def _take(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
         """Note times and samples of good rows."""
@@ -137,8 +159,8 @@ class Scan:
                     self._order(lines[number], line + number, now, before)
         rows.times.extend(times)
         rows.count += len(lines)
-        if len(rows.samples) < _SAMPLES:
-            rows.samples += [self._numbers(text, float) for text in lines]
+        if self._samples() > 0:
+            rows.samples += [self._numbers(text, float) for text in lines[: self._samples()]]
         elif len(rows.samples) ** 2 < 2 * rows.count:
             rows.samples.append(self._numbers(lines[0], float))
 
@@ -170,6 +192,10 @@ class Scan:
                 elif all(seen) and not b"".join(place).strip(b"0.-+"):
                     self._note("zero", number, line, start, cell)
             start += len(cell) + 1
+
+    def _samples(self) -> int:
+        """How many more rows are samples."""
+        return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(self.rows.samples)
 
     def _numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
         """The numbers of a row, NaN where there is none."""
@@ -217,7 +243,7 @@ class Scan:
                 form = b"\t".join(b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells)
                 rows.unseen -= _seen(form, self.cells) or set()
                 self._look_at_markers(text, line)
-            if len(rows.samples) < _SAMPLES:
+            if self._samples() > 0:
                 rows.samples.append(self._numbers(text, number_in))
 
     def _cells_of(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
@@ -255,12 +281,16 @@ class Scan:
         start, word = (place.start(), place[0]) if place else (0, b"")
         self._note("order", int(time < before), line, start, word, f"{time:.9g} {before:.9g}")
 
-    def _note(self, kind: str, number: int, line: int, start: int, cell: bytes, text: str | None = None) -> None:
+    def _note(
+        self, kind: str, number: int, line: int, start: int, cell: bytes, text: str | None = None, times: int = 1
+    ) -> None:
         faults = self.rows.faults
-        known = faults.get((kind, number))
-        told = cell.decode("latin-1") if text is None else text
-        new = Fault(kind, number, line, start + 1, max(1, len(cell)), told)
-        faults[kind, number] = new if known is None else known._replace(times=known.times + 1)
+        if (kind, number) in faults:
+            known = faults[kind, number]
+            faults[kind, number] = known._replace(times=known.times + times)
+        else:
+            told = cell.decode("latin-1") if text is None else text
+            faults[kind, number] = Fault(kind, number, line, start + 1, max(1, len(cell)), told, times)
 
 
 def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:

@@ -7,7 +7,6 @@ from math import hypot
 from osimlite.document.source import Position
 from osimlite.lint.engine import INFO, WARNING, Found, rule
 from osimlite.lint.table import Table
-from osimlite.lint.words import times
 from osimlite.tables import METRES
 
 _LARGEST, _SMALLEST = 8.0, 0.02
@@ -109,8 +108,7 @@ def marker_gap(table: Table, found: Found) -> None:
     for fault in table.rows.of("zero", "part"):
         name = table.labels[(fault.number - 2) // 3].text
         what = "is at 0 0 0 as if it had been seen there" if fault.kind == "zero" else "lacks a part of its place"
-        more = f", and in {times(fault.times - 1, 'more row')}" if fault.times > 1 else ""
-        found(f"the marker '{name}' {what}{more}", at=Position(fault.line, fault.column, fault.length))
+        found(f"the marker '{name}' {what}{fault.more()}", at=Position(fault.line, fault.column, fault.length))
     for number in sorted(table.rows.unseen):
         label = table.labels[number]
         found(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
@@ -151,10 +149,9 @@ def frame_number(table: Table, found: Found) -> None:
     ```
     """
     for fault in table.rows.of("frame"):
-        more = f"; so it is in {times(fault.times - 1, 'more row')}" if fault.times > 1 else ""
         what = (
             f"'{fault.text}' does not follow on the frame before"
             if fault.text
             else "the number of the frame is missing"
         )
-        found(f"{what}{more}", at=Position(fault.line, fault.column, max(1, fault.length)))
+        found(f"{what}{fault.more()}", at=Position(fault.line, fault.column, max(1, fault.length)))

@@ -8,7 +8,6 @@ from itertools import pairwise
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.rows import Fault
 from osimlite.lint.table import Table
 from osimlite.lint.words import times
 
@@ -47,10 +46,6 @@ def no_rows(table: Table, found: Found) -> None:
     if table.labels and "," not in table.labels[0].text and not table.rows.count and not table.rows.faults:
         fate = "looks for one for ever" if table.is_markers else "refuses the table"
         found(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
-
-
-def _more(fault: Fault, noun: str) -> str:
-    return f"; so it is in {times(fault.times - 1, f'more {noun}')}" if fault.times > 1 else ""
 
 
 @rule("OSIM806", "ragged-row", severity=ERROR, mends="safe", about="table")
@@ -97,9 +92,9 @@ def ragged_row(table: Table, found: Found) -> None:
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
             fix = _without_last_tabs(table, width) if table.is_markers and int(fault.text) > width else None
-            found(f"the row has {fault.text} cells and needs {width}{_more(fault, 'row')}", at=at, fix=fix)
+            found(f"the row has {fault.text} cells and needs {width}{fault.more()}", at=at, fix=fix)
         elif fault.kind == "comment":
-            found(f"OpenSim knows no remarks among the rows{_more(fault, 'line')}", at=at)
+            found(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
@@ -108,11 +103,11 @@ def ragged_row(table: Table, found: Found) -> None:
                     fix=_without_blank_lines(table, fault.line),
                 )  # fmt: skip
             else:
-                found(f"there is a blank line among the rows{_more(fault, 'line')}", at=at, severity=INFO)
+                found(f"there is a blank line among the rows{fault.more('line')}", at=at, severity=INFO)
 
 
 _LAST_TABS = re.compile(rb"\t+(?=\r?(\n|\Z))")
-_BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?=\s*\S)", re.MULTILINE)
+_BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?:[ \t\r\n]*\n)?(?=[^\n]*\S)", re.MULTILINE)
 
 
 def _without_last_tabs(table: Table, width: int) -> Fix | None:
@@ -168,6 +163,7 @@ def not_a_number(table: Table, found: Found) -> None:
     0.1 0.5
     ```
     """
+    end = table.rows.line_of(table.rows.count - 1) if table.rows.count else 0
     for fault in table.rows.of("cell", "time"):
         label = _label(table, fault.number)
         if table.is_markers:
@@ -175,11 +171,11 @@ def not_a_number(table: Table, found: Found) -> None:
         elif table.is_strict:
             fate = "OpenSim takes it for NaN"
         else:
-            lost = table.rows.line_of(table.rows.count - 1) - fault.line if table.rows.count else 0
+            lost = max(0, end - fault.line)
             fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {times(lost, 'row')}"
         what = f"'{fault.text}' is no number" if fault.text else "there is no number"
         found(
-            f"{what} (column '{label}'): {fate}{_more(fault, 'row')}",
+            f"{what} (column '{label}'): {fate}{fault.more()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING if fault.kind == "cell" and (table.is_markers or table.is_strict) else None,
         )
@@ -240,7 +236,7 @@ def time_order(table: Table, found: Found) -> None:
         what = f"goes back from {before} to {time}" if fault.number else f"{time} is that of the row before, too"
         severity = None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
         at = Position(fault.line, fault.column, fault.length)
-        found(f"the time {what}{_more(fault, 'row')}", at=at, severity=severity)
+        found(f"the time {what}{fault.more()}", at=at, severity=severity)
 
 
 @rule("OSIM809", "time-gap", severity=WARNING, about="table")

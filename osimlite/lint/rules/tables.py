@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.table import Table
+from osimlite.lint.words import times
 from osimlite.tables import COUNTS, MARKER_KEYS, MarkerHeader
 from osimlite.text import nearest
 
@@ -329,11 +328,12 @@ def column_label(table: Table, found: Found) -> None:
             )  # fmt: skip
         else:
             found(f"the first column is '{first}': OpenSim takes it for the time", at=at)
-    seen = Counter(label.text for label in labels)
-    told: set[str] = set()
+    places: dict[str, list[Position]] = {}
     for label in labels:
-        if seen[label.text] > 1 and label.text in told:
+        places.setdefault(label.text, []).append(label.at)
+    for name, (_, *again) in places.items():
+        if again:
             fate = "refuses the file" if table.is_markers else "does not find this one by its name"
+            more = f"; there are {times(len(again) - 1, 'more column')} of this name" if again[1:] else ""
             severity = None if table.is_markers else WARNING
-            found(f"a column is called '{label.text}' already: OpenSim {fate}", at=label.at, severity=severity)
-        told.add(label.text)
+            found(f"a column is called '{name}' already: OpenSim {fate}{more}", at=again[0], severity=severity)
