@@ -11,12 +11,14 @@ import pytest
 import osimlite
 from osimlite.cli._validating import run as validate_paths
 from osimlite.document.plugins import classes_in
+from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
 from osimlite.lint import Config, validate
+from osimlite.lint.engine import check_source
 from osimlite.lint.many import check_files
 from osimlite.lint.settings import settings_for
 from osimlite.schema.base import Unknown
-from osimlite.schema.registry import class_for, further_classes
+from osimlite.schema.registry import MODULES, class_for, further_classes
 from osimlite.schema.specs import field_specs
 
 REPO = Path(__file__).resolve().parents[2]
@@ -208,6 +210,28 @@ def test_an_output_of_a_plugin_is_one(folder):
         Path("m.osim").write_text(text.replace("\t\t</components>", reporter.format(word) + "\t\t</components>"))
         found.append([(each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")])
     assert found == [[], [("OSIM332", "/patch|flow")]]
+
+
+def test_a_class_may_derive_from_any(folder):
+    """Of every class another is derived; an object of it, wrong in two ways, is checked by all rules."""
+    names = sorted(set(MODULES) - {"Model", "Object", "Unknown"})
+    more = {
+        "properties": [
+            {"name": "gain", "type": "double"},
+            {"name": "helper", "type": "Function", "object": True, "default": {"class": "Constant"}},
+        ],
+        "sockets": [{"tag": "socket_spot", "connectee_type": "Frame"}],
+    }
+    path = declared(folder, **{f"My{name}": {"bases": [name], **more} for name in names})
+    config = Config(classes=(str(path),))
+    text = Path("m.osim").read_text()
+    for name, cls in classes_in(path).items():
+        item = f'<{name} name="mine"> <gian>2</gian> <socket_spot>/bodyset/thgh</socket_spot> </{name}>'
+        file, whole = "m.xml", f'<OpenSimDocument Version="40600"> {item} </OpenSimDocument>'
+        if cls.is_component:
+            file, whole = "m.osim", text.replace("\t\t<components>", f"\t\t<components> {item}")
+        codes = check_source(Source(whole.encode(), file), config).codes
+        assert "OSIM101" in codes and (not cls.is_component or codes.keys() & {"OSIM301", "OSIM103"}), name
 
 
 @pytest.mark.corpus

@@ -56,3 +56,46 @@ def test_opensim_passes_over_a_line_that_ignores_a_finding(line, version, tmp_pa
     meant = read(path), strictly(path)
     path.write_bytes(data.replace(b"nRows", line + b"\nnRows", 1))
     assert (read(path), strictly(path)) == meant
+
+
+SETUP = """<OpenSimDocument Version="40600">
+\t<InverseKinematicsTool name="ik">
+\t\t<accuracy>0.001</accuracy>
+\t\t<constraint_weight>20</constraint_weight>
+\t\t<marker_file>leg.trc</marker_file>
+\t\t<output_motion_file>ik.mot</output_motion_file>
+\t\t<IKTaskSet> <objects> <IKMarkerTask name="asis"> <weight>3</weight> </IKMarkerTask> </objects> </IKTaskSet>
+\t</InverseKinematicsTool>
+</OpenSimDocument>
+"""
+
+
+def tool_in(path):
+    """What OpenSim's tool holds after it has read a setup."""
+    tool = opensim.InverseKinematicsTool(str(path), False)
+    tasks = tool.getIKTaskSet()
+    weights = [(tasks.get(place).getName(), tasks.get(place).getWeight()) for place in range(tasks.getSize())]
+    values = [tool.getPropertyByName(name).toString() for name in ("accuracy", "constraint_weight", "marker_file")]
+    return *values, tool.getOutputMotionFileName(), weights
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("accuracy>", "Accuracy>"),
+        ("constraint_weight>", "constrain_weight>"),
+        ("IKMarkerTask", "IKMarkerTaks"),
+        ("\t\t<marker_file>", "\t\t<accuracy>1</accuracy>\n\t\t<marker_file>"),
+        ("leg.trc", "Leg.trc"),
+        ("IKTaskSet>", "IKTaskset>"),
+    ],
+)
+def test_opensim_reads_the_setup_that_was_meant(old, new, fixtures, tmp_path):
+    opensim.Logger.setLevelString("Off")
+    (tmp_path / "leg.trc").write_bytes(MARKERS)
+    path = tmp_path / "ik.xml"
+    path.write_text(SETUP)
+    meant = tool_in(path)
+    assert meant[-1] == [("asis", 3.0)]
+    path.write_bytes(mend(str(path), SETUP.replace(old, new).encode(), unsafe=True))
+    assert tool_in(path) == meant and path.read_text() == SETUP

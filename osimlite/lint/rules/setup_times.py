@@ -117,7 +117,9 @@ def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, floa
         if len(item.time_range) > 1 and getattr(item, "apply", True):
             yield item, ("time_range",), *item.time_range[:2]
     for item in setup.having("initial_time", "final_time"):
-        yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
+        # Without times of their own Moco's tools take those of the data.
+        if item.initial_time is not None and item.final_time is not None:
+            yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
     for item in setup.named("Analysis"):
         if item.start_time > item.end_time:
             yield item, ("start_time", "end_time"), item.start_time, item.end_time
