@@ -139,3 +139,13 @@ def test_inverse_kinematics_without_a_time_range_stops_at_two_seconds(project, s
     setup.write_text(setup.read_text().replace("<IKTaskSet", f"{said}<IKTaskSet", 1))
     report = validate(setup, select="OSIM844")
     assert ["stops at 2 s" in finding.message for finding in report.findings] == [True] * lost
+
+
+@pytest.mark.parametrize(("motion", "found"), [("leg.mot", 1), ("not_yet_written.mot", 0)])
+def test_how_long_a_motion_lasts_that_is_not_there_is_not_known(project, motion, found):
+    (project / "analyze.xml").write_text(
+        '<OpenSimDocument Version="40600"><AnalyzeTool name="run"><model_file>leg.osim</model_file>'
+        "<final_time>100</final_time><external_loads_file>leg_grf.xml</external_loads_file>"
+        f"<coordinates_file>{motion}</coordinates_file></AnalyzeTool></OpenSimDocument>"
+    )
+    assert len(validate(project / "analyze.xml", select="OSIM845").findings) == found

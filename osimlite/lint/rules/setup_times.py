@@ -10,7 +10,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import NOTHING, Setup, is_of
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.specs import field_specs
@@ -181,9 +181,13 @@ def loads_end_early(setup: Setup, found: Found) -> None:
         if table is None or span is None:
             continue
         for tag in ("coordinates_file", "states_file", "desired_kinematics_file"):
-            motion = setup.table(getattr(item, tag, ""))
+            name = getattr(item, tag, "")
+            motion = setup.table(name)
             if motion is not None and motion.span is not None:
                 first, last = max(first, motion.span[0]), min(last, motion.span[1])
+            elif name.strip().lower() not in NOTHING:
+                # It may be written yet, and is not known to last longer than the loads.
+                first, last = -math.inf, math.inf
         slack = max(table.step, 1e-9) * 1.01
         if (math.isfinite(last) and last > span[1] + slack) or (math.isfinite(first) and first < span[0] - slack):
             found(
