@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from lsprotocol import types
@@ -11,6 +12,8 @@ from osimlite.lint.diagnostic import Edit, Finding, Severity
 from osimlite.lint.fixes import edits_of
 from osimlite.lsp.analysis import Analysis
 from osimlite.text import visible
+
+_ENDS_HEADER = re.compile(r"(\r?\n)([ \t]*endheader)")
 
 SOURCE = "osimlite"
 """What an editor names as the origin of a diagnostic."""
@@ -65,11 +68,13 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
                     is_preferred=finding.fix.safe, edit=types.WorkspaceEdit({uri: edits}),
                 )
             )  # fmt: skip
-        if finding.line is not None and finding.code[4] != "0" and analysis.markup:
+        ignoring = _ignoring(analysis, finding) if finding.code[4] != "0" else None
+        if ignoring is not None:
+            where = "in this table" if analysis.is_table else "on this line"
             found.append(
                 types.CodeAction(
-                    f"Ignore {finding.code} ({finding.name}) on this line", kind=types.CodeActionKind.QuickFix,
-                    diagnostics=concerned, edit=types.WorkspaceEdit({uri: [_ignoring(analysis, finding)]}),
+                    f"Ignore {finding.code} ({finding.name}) {where}", kind=types.CodeActionKind.QuickFix,
+                    diagnostics=concerned, edit=types.WorkspaceEdit({uri: [ignoring]}),
                 )
             )  # fmt: skip
     safe = _edits(analysis, edits_of(analysis.report)[0])
@@ -105,9 +110,16 @@ def _edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
     return found
 
 
-def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit:
-    """A comment at the end of the line that ignores the finding."""
-    assert finding.line is not None
+def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit | None:
+    """What makes the linter pass over a finding: a comment at the end of its line, a line in the header of a table."""
+    if finding.line is None:
+        return None
+    if analysis.is_table:
+        header = _ENDS_HEADER.search(analysis.text.content)
+        if header is None:
+            return None
+        place = analysis.text.range(header.start(2), header.start(2))
+        return types.TextEdit(place, f"osimlite: ignore {finding.code}{header[1]}")
     line = analysis.source.lines[finding.line - 1]
     end = analysis.source.line_start(finding.line) + len(line)
     return types.TextEdit(analysis.text.range(end, end), f" <!-- osimlite: ignore {finding.code} -->")

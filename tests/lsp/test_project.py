@@ -9,6 +9,8 @@ from shutil import copy
 import pytest
 from lsprotocol import types
 
+from osimlite.lint import validate
+
 ERROR = types.DiagnosticSeverity.Error
 
 
@@ -70,6 +72,21 @@ async def test_a_task_names_a_marker_of_the_model(editor, ask, folder: Path) -> 
 
 
 @pytest.mark.asyncio
+async def test_a_misspelt_marker_is_mended_or_ignored(client, editor, folder: Path) -> None:
+    ik = editor(folder / "ik.xml")
+    await ik.open()
+    found = [
+        d for d in await ik.type('IKMarkerTask name="R.ASIS"', 'IKMarkerTask name="R.ASSIS"') if d.code == "OSIM831"
+    ]
+    context = types.CodeActionContext(found, only=[types.CodeActionKind.QuickFix])
+    asked = types.CodeActionParams(ik.document, found[0].range, context)
+    actions = await client.text_document_code_action_async(asked)
+    texts = [ik.after(action.edit.changes[ik.uri]) for action in actions]
+    assert any('IKMarkerTask name="R.ASIS"' in text for text in texts)
+    assert any("<!-- osimlite: ignore OSIM831 -->" in text for text in texts)
+
+
+@pytest.mark.asyncio
 async def test_what_an_open_model_says_counts_before_it_is_written(client, editor, folder: Path) -> None:
     ik, model = editor(folder / "ik.xml"), editor(folder / "model.osim")
     await ik.open()
@@ -94,6 +111,8 @@ async def test_a_marker_is_renamed_in_the_model_and_in_setups(editor, ask, folde
     await ik.open()
     uses = await ask.references(ik, 'IKMarkerTask name="R.ASIS"', 22)
     assert {use.uri for use in uses} == {ik.uri, model.uri, scale.uri}
+    await model.open()
+    assert {use.uri for use in await ask.references(model, '<Marker name="R.ASIS"', 16)} == {use.uri for use in uses}
     changes = await ask.rename(ik, "RASI", 'IKMarkerTask name="R.ASIS"', 22)
     assert '<IKMarkerTask name="RASI">' in ik.after(changes[ik.uri])
     assert '<Marker name="RASI">' in model.after(changes[model.uri])
@@ -188,9 +207,12 @@ async def test_a_table_is_checked_when_it_is_written(client, editor, folder: Pat
     assert motion.words(found.range) == "true"
     context = types.CodeActionContext([found], only=[types.CodeActionKind.QuickFix])
     asked = types.CodeActionParams(motion.document, found.range, context)
-    for action in await client.text_document_code_action_async(asked):
-        # A comment of XML has no place in a table.
-        assert "<!--" not in motion.after(action.edit.changes[motion.uri])
+    actions = await client.text_document_code_action_async(asked)
+    texts = [motion.after(action.edit.changes[motion.uri]) for action in actions]
+    assert any("inDegrees=yes" in text for text in texts)
+    ignored = next(text for text in texts if "osimlite: ignore OSIM803\nendheader" in text)
+    (folder / "coords.mot").write_text(ignored)
+    assert not validate(folder / "coords.mot").findings
 
 
 @pytest.mark.asyncio
