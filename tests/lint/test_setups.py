@@ -149,3 +149,18 @@ def test_how_long_a_motion_lasts_that_is_not_there_is_not_known(project, motion,
         f"<coordinates_file>{motion}</coordinates_file></AnalyzeTool></OpenSimDocument>"
     )
     assert len(validate(project / "analyze.xml", select="OSIM845").findings) == found
+
+
+@pytest.mark.parametrize(
+    ("content", "severity"),
+    [("<objects/> <groups/>", "info"), ("", "info"), ("<objects> <IKMarkerTask name='asis'/> </objects>", "error")],
+)
+def test_what_stands_in_a_set_that_is_read_from_a_file_is_lost_only_if_it_is_something(project, content, severity):
+    setup = project / "ik.xml"
+    start, rest = setup.read_text().split("<IKTaskSet")
+    tasks, end = rest.split("</IKTaskSet>")
+    head = '<?xml version="1.0" encoding="UTF-8" ?>\n<OpenSimDocument Version="40600">\n'
+    (project / "tasks.xml").write_text(f"{head}<IKTaskSet{tasks}</IKTaskSet>\n</OpenSimDocument>\n")
+    setup.write_text(f'{start}<IKTaskSet file="tasks.xml">{content}</IKTaskSet>{end}')
+    (finding,) = validate(setup).findings
+    assert (finding.code, str(finding.severity)) == ("OSIM702", severity)

@@ -119,7 +119,10 @@ def included_file(subject: Subject, found: Found) -> None:
 
 def _has_content(source: Source | None, number: int) -> bool:
     """Whether an element with a ``file`` holds something; of members of a set OpenSim does not look at the file."""
-    if source is None or not source.children(number):
+    if source is None:
+        return False
+    # An empty set has empty elements for members and groups.
+    if all(source.spans[i].tag in ("objects", "groups") and not source.children(i) for i in source.children(number)):
         return False
     end = source.spans[number].end
     around = next((i for i in range(number - 1, -1, -1) if source.spans[i].end >= end), 0)
