@@ -33,7 +33,7 @@ from osimlite.schema.old_muscles import (
     Thelen2003Muscle_Deprecated,
 )
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, Unsayable, add
+from osimlite.translate.mjcf.draft import Draft, Unsayable, add, tidy
 from osimlite.translate.mjcf.isometric import isometric_tension
 
 MUSCLES = (
@@ -114,7 +114,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
     rise, fall = (getattr(force, f"{word}_time_constant", 0.0) for word in ("activation", "deactivation"))
     lags = rise > 0.0 and fall > 0.0 and not force.ignore_activation_dynamics
-    numbers = (0.0, 1.0, curves.force, SCALE, curves.lmin, curves.lmax, *_rates(force, cos, curves.fpmax))
+    numbers = tidy(np.array((0, 1, curves.force, SCALE, curves.lmin, curves.lmax, *_rates(force, cos, curves.fpmax))))
     add(
         draft.section("actuator"),
         "general",
