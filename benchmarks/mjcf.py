@@ -22,6 +22,7 @@ import numpy as np
 
 import osimlite
 from osimlite.translate.mjcf.check import Check, check_mjcf
+from osimlite.translate.mjcf.draft import Version
 
 MYO, O2M, SIM, OPENSIM = "myoconverter/models", "O2MConverter/models", "myo_sim", "opensim-models/Models"
 FILES = {
@@ -43,8 +44,10 @@ FILES = {
 }
 """Models, and the files that others have made of them."""
 
-HEAD = f"{'':34} {'s':>5} {'length, mm':>16} {'moment arm, mm':>24} {'force':>6} {'fiber':>8} {'worst':>6}"
-UNDER = f"{'':34} {'':>5} {'median':>8}{'worst':>8} {'mean':>8}{'90 %':>8}{'worst':>8} {'/ Fmax':>6} {'> 10 %':>8} {'x':>6}"
+HEAD = f"{'':24} {'s':>5} {'length, mm':>16} {'moment arm, mm':>24} {'force':>6} {'fiber':>8} {'worst':>6}"
+UNDER = (
+    f"{'':24} {'':>5} {'median':>8}{'worst':>8} {'mean':>8}{'90 %':>8}{'worst':>8} {'/ Fmax':>6} {'> 10 %':>8} {'x':>6}"
+)
 
 
 def row(name: str, seconds: float | None, check: Check) -> str:
@@ -56,7 +59,7 @@ def row(name: str, seconds: float | None, check: Check) -> str:
     off, worst = np.abs(fibers - 1.0) > 0.1, max([*fibers, *(1.0 / np.abs(fibers))], default=1.0)
     took = "" if seconds is None else f"{seconds:.1f}"
     return (
-        f"{name:34} {took:>5} {np.median(lengths):8.3f}{lengths.max():8.2f} "
+        f"{name:24} {took:>5} {np.median(lengths):8.3f}{lengths.max():8.2f} "
         f"{arms.mean():8.3f}{np.percentile(arms, 90):8.2f}{arms.max():8.2f} "
         f"{np.median(forces) if forces else np.nan:6.3f} {f'{off.sum()} of {len(off)}':>8} {worst:6.2f}"
     )
@@ -65,16 +68,16 @@ def row(name: str, seconds: float | None, check: Check) -> str:
 def loadable(file: Path) -> Path:
     """The file without what MuJoCo reads no more, beside it."""
     found = file.with_name(f"{file.stem}_now.xml")
-    text = file.read_text()
+    text = file.read_text(encoding="utf-8")
     for word in ("all", "predefined", "dynamic"):
         text = text.replace(f'collision="{word}"', "")
-    found.write_text(text)
+    found.write_text(text, encoding="utf-8")
     return found
 
 
 def main(base: Path) -> None:
     """Print the table."""
-    version = int(mujoco.__version__.partition(".")[0])
+    version: Version = 4 if mujoco.__version__ >= "4" else 3
     print(f"MuJoCo {mujoco.__version__}\n{HEAD}\n{UNDER}")
     for osim, others in FILES.items():
         if not (base / osim).exists():

@@ -24,7 +24,7 @@ from osimlite.translate.mjcf.poses import Poses, Truth, random_poses
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
 
-CHOOSING, FITTING, HELD_OUT = 64, 200, 100
+CHOOSING, FITTING, HELD_OUT = 150, 250, 150
 """How many random poses a tendon is chosen by, fitted to, and measured in."""
 EXACT = 1e-9
 """Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
@@ -60,12 +60,14 @@ def add_paths(draft: Draft) -> None:
         name = writer.tendon(path, tendon)
         draft.tendons[path] = Tied(name, truth[path].lengths, held_truth[path].lengths)
         draft.account(own, f"tendon {name}")
+        for wrap in given.path_wrap_set.objects:
+            surface = draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""
+            draft.fidelity.translated[surface] = "what tendons go around, if they touch it"
         errors = _errors(draft, tendon, held, held_truth[path])
         if any(error.max > EXACT for error in errors.values()):
             how = "the nearest tendon that its own points and surfaces make"
             done = f"{how}, fitted" if fits else how
             draft.fidelity.add("path", own, _what(route, router), done, f"tendon {name}", errors)
-    draft.fidelity.translated |= {path: f"geom {name}" for path, name in writer.surfaces.items()}
 
 
 def _errors(draft: Draft, tendon: Tendon, poses: Poses, truth: Truth) -> dict[str, Error]:
@@ -107,11 +109,9 @@ class _Writer:
 
     Attributes:
         draft: what they are written into.
-        surfaces: names of geoms by the paths of their wrap objects.
     """
 
     draft: Draft
-    surfaces: dict[str, str] = field(default_factory=dict)
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def tendon(self, path: str, tendon: Tendon) -> str:
