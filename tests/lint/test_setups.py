@@ -164,3 +164,9 @@ def test_what_stands_in_a_set_that_is_read_from_a_file_is_lost_only_if_it_is_som
     setup.write_text(f'{start}<IKTaskSet file="tasks.xml">{content}</IKTaskSet>{end}')
     (finding,) = validate(setup).findings
     assert (finding.code, str(finding.severity)) == ("OSIM702", severity)
+
+
+def test_a_weight_of_zero_is_a_warning_where_nobody_gave_it(project):
+    setup = project / "ik.xml"
+    setup.write_text(setup.read_text().replace("<weight>1</weight>", "").replace("<weight>2<", "<weight>0<"))
+    assert [str(finding.severity) for finding in validate(setup, select="OSIM851").findings] == ["warning", "info"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called
 
@@ -18,8 +18,8 @@ def task_weight(setup: Setup, found: Found) -> None:
     coordinates that have two tasks, and for sets of which no task applies.
 
     ## Why is this bad
-    OpenSim refuses negative weights. A task without weight is not tracked, but counted in the error. If no task
-    applies, all markers count the same.
+    OpenSim refuses negative weights. A task without weight is not tracked, but counted in the error; a weight of 0 that
+    is given may be meant so, and is an information. If no task applies, all markers count the same.
 
     ## Example
     ```setup
@@ -54,7 +54,11 @@ def task_weight(setup: Setup, found: Found) -> None:
             if task.weight < 0:
                 found(f"the weight of {called(task)} is {task.weight:g}: OpenSim refuses it", task, tag="weight")
             elif task.weight == 0:
-                found(f"{called(task)} has no weight: nothing is fitted to it", task, tag="weight", severity=WARNING)
+                given = setup.element_of(task, "weight") is not None
+                what = "weighs 0" if given else "has no weight, and the default is 0"
+                found(
+                    f"{called(task)} {what}: it is not tracked", task, tag="weight", severity=INFO if given else WARNING
+                )
             if is_of(task, "IKCoordinateTask") and task.value_type == "manual_value" and abs(task.value) > 6.3:
                 found(
                     f"the value of {called(task)} is {task.value:g}, and is in radians or metres", task, tag="value",
