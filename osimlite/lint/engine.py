@@ -77,6 +77,7 @@ _MODULES = (
     "setup_names",
     "setup_columns",
     "setup_markers",
+    "setup_geometry",
     "setup_loads",
     "setup_times",
     "setup_sensors",

@@ -6,7 +6,7 @@ import math
 from typing import Any, cast
 
 from osimlite.lint.placement import Pose, Vector, on_base, poses_at
-from osimlite.lint.setup import Setup
+from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.table import Table
 from osimlite.schema.states import motions_of
@@ -41,8 +41,10 @@ def marker_places(setup: Setup) -> dict[str, Vector]:
         model = _model_of(setup)
         poses = poses_at(model, {})
         found: dict[str, Vector] = {}
-        for marker in model.named("Marker"):
-            frame = on_base(model, model.target_of(marker, "socket_parent_frame"))
+        # What a set of markers adds has absolute paths.
+        added = [item for _, top in setup.added for item in top.walk() if is_of(item, "Marker")]
+        for marker in (*model.named("Marker"), *added):
+            frame = on_base(model, model.tree.walk(str(marker.socket_parent_frame), "/markerset", "Frame").target)
             if frame is not None and id(frame[0]) in poses:
                 found[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
         setup.kept["marker places"] = found

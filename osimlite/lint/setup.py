@@ -259,6 +259,14 @@ class Setup(Subject):
         names = {item.name for item in self.tree.of_class(target).values()}
         return names | {item.name for _, added in self.added for item in added.walk() if is_of(item, target)}
 
+    def is_bound(self, name: str) -> bool:
+        """Whether a coordinate of the model is locked, prescribed, or follows from others."""
+        assert self.tree is not None
+        bound: Any = self.tree.of_class("CoordinateCouplerConstraint").values()
+        item = self.tree.of_class("Coordinate").get(name)
+        held = any(getattr(item, flag, False) for flag in ("locked", "prescribed"))
+        return held or name in {str(coupler.dependent_coordinate_name) for coupler in bound}
+
     @cached_property
     def added(self) -> list[tuple[str, Object]]:
         """The sets of forces and markers that the tool adds to its model, with the paths of their files."""

@@ -54,6 +54,18 @@ def part(name: str, pattern: str) -> str:
     return next(re.finditer(pattern, TEXTS[name], re.DOTALL))[0]
 
 
+def unseen(row: int, new: str) -> tuple[str, str, str]:
+    """The second marker replaced in a row."""
+    cells = rows("walk.trc")[row].split("\t")
+    return "walk.trc", "\t".join(cells), "\t".join([*cells[:5], new, new, new, *cells[8:]])
+
+
+def swapped(one: str, other: str) -> str:
+    """The line of labels with two of them swapped."""
+    labels = TEXTS["walk.trc"].splitlines()[3].split("\t")
+    return "\t".join({one: other, other: one}.get(label, label) for label in labels)
+
+
 TRC = rows("walk.trc")
 COORDS = rows("coords.mot")
 HEAD = TEXTS["walk.trc"].splitlines()
@@ -128,6 +140,7 @@ FAULTS = [
     Fault(31, "walk.trc", HEAD[3], re.sub(r"\t(\w[^\t]*)(?=\t\t\t|\t*$)", r"\tS1:\1", HEAD[3]), "ik.xml",
           "<marker_file>"),
     Fault(32, "ik.xml", TASK, f"{TASK}\n</IKMarkerTask>\n{TASK.replace('3', '20')}", "", "second:R.ASIS"),
+    Fault("sides swapped", "walk.trc", HEAD[3], swapped("R.Heel", "L.Heel"), "ik.xml", 'name="R.Heel"'),
     Fault(33, "ik.xml", "<weight>3<", "<weight>-3<"),
     Fault(34, "ik.xml", "<weight>3<", "<weight>0<"),
     Fault(35, "ik.xml", "<weight>3<", "<weight>NaN<"),
@@ -331,6 +344,9 @@ FAULTS = [
     Fault(233, "scale.xml", "markers.xml", "nomarkers.xml"),
     Fault(235, "markers.xml", "/bodyset/torso", "/bodyset/trunk"),
     Fault(236, "scale.xml", "<markers>R.ASIS L.ASIS", "<markers>R.ASIS L.ASYS"),
+    Fault(249, *unseen(4, "NaN"), "scale.xml", "R.ASIS L.ASIS"),
+    Fault(250, *unseen(4, ""), "scale.xml", "R.ASIS L.ASIS"),
+    Fault("factor", "scale.xml", "<scales>1 1 1", "<scales>1 10 1"),
     Fault(237, "scale.xml", "<markers>R.ASIS L.ASIS", "<markers>R.ASIS"),
     Fault(238, "scale.xml", "<markers>R.ASIS L.ASIS", "<markers>R.ASIS R.ASIS"),
     Fault(239, "walk.trc", "\tTop.Head\t", "\tTopHead\t", "scale.xml", "V.Sacral Top.Head"),
@@ -449,8 +465,10 @@ HARMLESS = [
     Fault(52, "ik.xml", "<constraint_weight>Inf", "<constraint_weight>20"),
     Fault(70, "walk.trc", f"\n\n{TRC[0]}", f"\n{TRC[0]}"),
     Fault(71, "walk.trc", "every:\n", "\r\n"),
-    Fault(74, "walk.trc", TRC[4], "\t".join([*TRC[4].split("\t")[:5], "", "", "", *TRC[4].split("\t")[8:]])),
-    Fault(76, "walk.trc", TRC[4], "\t".join([*TRC[4].split("\t")[:5], "NaN", "NaN", "NaN", *TRC[4].split("\t")[8:]])),
+    Fault(74, "walk.trc", TRC[20], "\t".join([*TRC[20].split("\t")[:5], "", "", "", *TRC[20].split("\t")[8:]])),
+    Fault(
+        76, "walk.trc", TRC[20], "\t".join([*TRC[20].split("\t")[:5], "NaN", "NaN", "NaN", *TRC[20].split("\t")[8:]])
+    ),
     Fault(102, "coords.mot", "inDegrees=yes", "inDegrees = yes"),
     Fault(112, *without("coords.mot", "version")),
     Fault(113, "coords.mot", "version=1", "version=3"),

@@ -42,6 +42,7 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     report = check_files(sorted(str(file) for file in project.glob("*.xml") if file.name != "pom.xml"), Config())
     assert {(finding.file.rpartition("/")[2], finding.code) for finding in report} == {
         ("ik.xml", "OSIM831"),
+        ("ik.xml", "OSIM841"),
         ("scale.xml", "OSIM831"),
     }
 
@@ -51,7 +52,7 @@ def test_what_was_found_in_a_setup_is_found_again_when_its_model_changes(project
     assert not check_files(["ik.xml"], Config()).findings
     model = project / "leg.osim"
     model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
-    assert dict(check_files(["ik.xml"], Config()).codes) == {"OSIM831": 1}
+    assert dict(check_files(["ik.xml"], Config()).codes) == {"OSIM831": 1, "OSIM841": 1}
 
 
 def test_what_another_setup_writes_need_not_be_there(project):

@@ -53,7 +53,7 @@ def missing_column(setup: Setup, found: Found) -> None:
             column if plain or "/" not in column else (parts[-2] if (parts := column.split("/"))[-1] == "value" else "")
             for column in table.columns
         }
-        lacking = sorted(name for name in names - columns if not _is_bound(setup, name))
+        lacking = sorted(name for name in names - columns if not setup.is_bound(name))
         if not names & columns:
             paths = any(column.startswith("/") for column in table.columns)
             why = "; its columns are called by paths, which inverse dynamics does not understand" if paths else ""
@@ -107,16 +107,6 @@ def _is_state(setup: Setup, column: str) -> bool:
             setup.tree.walk(path, "", "Component").target is not None or path.rpartition("/")[2] in setup.tree.by_name
         )
     return column.partition(".")[0].removesuffix("_u") in setup.tree.by_name
-
-
-def _is_bound(setup: Setup, name: str) -> bool:
-    """Whether a coordinate is locked or follows from others."""
-    assert setup.tree is not None
-    bound = {
-        str(item.dependent_coordinate_name) for item in setup.tree.of_class("CoordinateCouplerConstraint").values()
-    }
-    item = setup.tree.of_class("Coordinate").get(name)
-    return name in bound or (item is not None and bool(getattr(item, "locked", False)))
 
 
 def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:

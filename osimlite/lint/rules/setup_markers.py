@@ -1,17 +1,20 @@
-"""OSIM841, OSIM848 and OSIM855: the markers of a tool, beside those that were measured."""
+"""OSIM841: the markers of a tool, beside those that were measured."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.rows import number_in
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.table import Table
-from osimlite.lint.words import nearest_name
+from osimlite.lint.words import nearest_name, times
 
 
-def _marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
+def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
     """Every part of a tool that fits markers, with its data."""
     for item in setup.having("ik_task_set", "marker_file"):
         table = setup.table(item.marker_file)
@@ -24,12 +27,14 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
     """A marker that is to be fitted is not in the data.
 
     ## What it does
-    Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the data. If none is in
-    both model and data, it is an error.
+    Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the data, and of pairs in
+    each row that is averaged. If none is in both model and data, it is an error. Counts whether the markers are enough
+    for the coordinates of the model.
 
     ## Why is this bad
     OpenSim leaves the marker out without a word; with no marker at all in common it crashes. A measurement one of whose
-    markers is missing does not count: its bodies keep their size.
+    markers is missing, in one row, does not count: its bodies keep their size. Coordinates that too few markers tell of
+    stay where they are, or drift.
 
     ## Example
     ```setup
@@ -41,6 +46,7 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
             <IKTaskSet>
                 <objects>
                     <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                    <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
                     <IKMarkerTask name="hip_marker"> <weight>1</weight> </IKMarkerTask>
                 </objects>
             </IKTaskSet>
@@ -56,13 +62,16 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
             <marker_file>leg.trc</marker_file>
             <output_motion_file>ik.mot</output_motion_file>
             <IKTaskSet>
-                <objects> <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask> </objects>
+                <objects>
+                    <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                    <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+                </objects>
             </IKTaskSet>
         </InverseKinematicsTool>
     </OpenSimDocument>
     ```
     """
-    for user, table in _marker_users(setup):
+    for user, table in marker_users(setup):
         labels = table.columns
         tasks = [task for task in user.ik_task_set.objects if is_of(task, "IKMarkerTask") and task.apply and task.name]
         model = setup.names_of("Marker")
@@ -71,6 +80,20 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
             found(
                 f"no marker of the tasks is in both the model and '{user.marker_file}': OpenSim crashes",
                 user, tag="marker_file", severity=ERROR,
+            )  # fmt: skip
+        if setup.tree is not None and not model:
+            maker = next(setup.named("GenericModelMaker"), None)
+            tag = "model_file" if maker is None else "marker_set_file"
+            found("the model has no markers: OpenSim refuses the tool", maker or user, tag=tag, severity=ERROR)
+        free = 0
+        if setup.tree is not None and both:
+            free = sum(not setup.is_bound(name) for name in setup.tree.of_class("Coordinate"))
+        others = sum(is_of(task, "IKCoordinateTask") and task.apply for task in user.ik_task_set.objects)
+        if 3 * len(both) + others < free:
+            found(
+                f"{times(len(both), 'marker')} and {times(others, 'coordinate task')} cannot tell the {free} free "
+                "coordinates of the model",
+                user.ik_task_set,
             )  # fmt: skip
         for task in tasks:
             if task.name not in labels:
@@ -82,6 +105,7 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
         static = setup.table(scaler.marker_file)
         if static is None or not static.labels:
             continue
+        gone = _unseen(static, scaler.time_range)
         for measurement in scaler.measurement_set.objects if scaler.apply else ():
             for pair in measurement.marker_pair_set.objects if measurement.apply else ():
                 for name in pair.markers:
@@ -91,3 +115,30 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
                             f"'{measurement.name}' out",
                             pair, tag="markers", word=str(name), suggestion=nearest_name(str(name), static.columns),
                         )  # fmt: skip
+                    elif name in gone:
+                        found(
+                            f"'{name}' is not seen in every row of '{scaler.marker_file}' that is averaged: OpenSim "
+                            f"leaves the whole measurement '{measurement.name}' out",
+                            pair, tag="markers", word=str(name),
+                        )  # fmt: skip
+
+
+def _unseen(table: Table, span: tuple[float, ...]) -> set[str]:
+    """The markers that a row between two times lacks."""
+    places = cells_of(table)
+    return {label for row in rows_between(table, span) for label, place in places if any(map(math.isnan, row[place]))}
+
+
+def rows_between(table: Table, span: tuple[float, ...]) -> Iterator[list[float]]:
+    """The numbers of the rows between two times, of a long stretch the first ones."""
+    if table.is_markers and len(span) == 2:
+        for cells in islice(table.rows_from(span[0]), 1000):
+            row = [number_in(cell.strip()) for cell in cells]
+            if row[1] > span[1]:
+                return
+            yield row + [math.nan] * (2 + 3 * len(table.columns) - len(row))
+
+
+def cells_of(table: Table) -> list[tuple[str, slice]]:
+    """The markers of a table, each with its cells in a row."""
+    return [(label, slice(2 + 3 * number, 5 + 3 * number)) for number, label in enumerate(table.columns)]

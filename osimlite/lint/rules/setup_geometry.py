@@ -1,0 +1,177 @@
+"""OSIM855 and OSIM856: where markers were measured, beside where the model has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence, Set
+
+from osimlite.lint.engine import WARNING, Found, rule
+from osimlite.lint.posture import marker_places
+from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
+from osimlite.lint.setup import Setup
+from osimlite.lint.words import called, times
+from osimlite.tables import METRES
+
+_LEAST, _MOST = 0.5, 2.0
+"""Between these a factor that scales a body can be believed."""
+_SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT", "LEFT"))
+"""How names tell sides."""
+
+
+@rule("OSIM855", "scale-factor", severity=WARNING, about="document")
+def scale_factor(setup: Setup, found: Found) -> None:
+    """A body would be scaled beyond belief.
+
+    ## What it does
+    Looks for factors given by hand, and for measurements, that make a body less than half or more than twice as large.
+    A measurement is the distance of its markers in the data over that in the model, in its default pose.
+
+    ## Why is this bad
+    A label at another place, units that are not those of the header, or a pair of markers that the pose of the subject
+    moves apart, make a model that is no longer that of a person; OpenSim says nothing.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <ScaleSet name="factors">
+            <objects>
+                <Scale name="thigh"> <scales>1.1 11 1.1</scales> <segment>thigh</segment> </Scale>
+            </objects>
+        </ScaleSet>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <ScaleSet name="factors">
+            <objects>
+                <Scale name="thigh"> <scales>1.1 1.1 1.1</scales> <segment>thigh</segment> </Scale>
+            </objects>
+        </ScaleSet>
+    </OpenSimDocument>
+    ```
+    """
+    for scale in setup.named("Scale"):
+        for factor in dict.fromkeys(scale.scales) if scale.apply else ():
+            if not _LEAST <= factor <= _MOST:
+                found(f"{called(scale)} scales {scale.segment} by {factor:g}", scale, tag="scales")
+    for scaler in setup.named("ModelScaler"):
+        table = setup.table(scaler.marker_file)
+        if table is None or setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
+            continue
+        places, unit = marker_places(setup), METRES.get(table.entries["Units"].value.text, math.nan)
+        rows, columns = list(rows_between(table, scaler.time_range)), dict(cells_of(table))
+        for measurement in scaler.measurement_set.objects if rows else ():
+            pairs = measurement.marker_pair_set.objects if measurement.apply else ()
+            for pair in pairs:
+                one, other = (str(name) for name in pair.markers) if len(pair.markers) == 2 else ("", "")
+                if {one, other} <= columns.keys() & places.keys() and one != other:
+                    apart = [math.dist(row[columns[one]], row[columns[other]]) * unit for row in rows]
+                    factor = sum(apart) / len(apart) / math.dist(places[one], places[other])
+                    if factor < _LEAST or factor > _MOST:
+                        found(
+                            f"{one} and {other} are {sum(apart) / len(apart):.3g} m apart in '{scaler.marker_file}', "
+                            f"and {math.dist(places[one], places[other]):.3g} m in the model: {called(measurement)} "
+                            f"scales by {factor:.3g}",
+                            pair, tag="markers",
+                        )  # fmt: skip
+
+
+@rule("OSIM856", "swapped-sides", severity=WARNING, about="document")
+def swapped_sides(setup: Setup, found: Found) -> None:
+    """A marker of the right side was measured on the left, and its fellow on the right.
+
+    ## What it does
+    Compares, for each two markers whose names differ by the side alone, the way from the left one to the right one with
+    that of all other such pairs, in the data and in the model. A pair that is the other way round in four rows of five
+    is told. Pairs that are more than half a metre apart in the model are left out: arms may be crossed.
+
+    ## Why is this bad
+    Inverse kinematics twists legs and pelvis to bring the markers as near as it can; the errors that it reports are
+    spread over all markers.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>sides.osim</model_file>
+            <marker_file>sides_swapped.trc</marker_file>
+            <time_range>0 0.02</time_range>
+            <output_motion_file>ik.mot</output_motion_file>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>sides.osim</model_file>
+            <marker_file>sides.trc</marker_file>
+            <time_range>0 0.02</time_range>
+            <output_motion_file>ik.mot</output_motion_file>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    for user, table in marker_users(setup):
+        if setup.tree is None or not table.is_markers:
+            continue
+        places, columns = marker_places(setup), dict(cells_of(table))
+        pairs = [
+            (name, fellow)
+            for name in columns
+            if (fellow := _fellow(name, places.keys() & columns.keys()))
+            and name in places
+            and 0.03 < math.dist(places[name], places[fellow]) < 0.5
+        ]
+        model = _agreement([_way(places[left], places[right]) for right, left in pairs])
+        seen = [0] * len(pairs)
+        turned = [0] * len(pairs)
+        for row in table.rows.samples:
+            row = row + [math.nan] * (2 + 3 * len(columns) - len(row))
+            ways = [_way(row[columns[left]], row[columns[right]]) for right, left in pairs]
+            for number, agreement in enumerate(_agreement(ways)):
+                seen[number] += agreement == agreement
+                turned[number] += agreement * model[number] < -0.3
+        for (right, left), rows, wrong in zip(pairs, seen, turned, strict=True):
+            if rows and wrong >= 0.8 * rows:
+                task = next((task for task in user.ik_task_set.objects if task.name == right), None)
+                found(
+                    f"in {wrong} of {times(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
+                    f"'{left}' are the other way round than other markers of both sides: are they swapped?",
+                    task or user, tag=None if task else "marker_file", attribute="name" if task else None,
+                )  # fmt: skip
+
+
+def _fellow(name: str, names: Set[str]) -> str:
+    """The name of the same marker on the left, of one on the right; nothing if there is none."""
+    for right, left in _SIDES:
+        for fellow in (
+            left + name.removeprefix(right),
+            name.removesuffix(right) + left,
+            name.replace(f"_{right}_", f"_{left}_"),
+        ):
+            if len(fellow) == len(name) - len(right) + len(left) and fellow != name and fellow in names:
+                return fellow
+    return ""
+
+
+def _way(start: Sequence[float], end: Sequence[float]) -> list[float]:
+    """The direction from one point to another; NaN if one is not known."""
+    length = math.dist(start, end) or math.nan
+    return [(b - a) / length for a, b in zip(start, end, strict=True)]
+
+
+def _agreement(ways: list[list[float]]) -> list[float]:
+    """The cosine of each direction with the mean of the others; NaN where there are few, or these do not agree."""
+    known = [way for way in ways if way[0] == way[0]]
+    whole = [sum(parts) for parts in zip(*known, strict=True)] or [0.0, 0.0, 0.0]
+    found = []
+    for way in ways:
+        rest = [total - part for total, part in zip(whole, way, strict=True)]
+        length = math.hypot(*rest)
+        agree = len(known) > 3 and length > 0.5 * (len(known) - 1)
+        found.append(sum(a * b for a, b in zip(way, rest, strict=True)) / length if agree else math.nan)
+    return found
