@@ -165,13 +165,9 @@ class Setup(Subject):
             return self.file, self.top
         here = os.path.realpath(self.file)
         for file, top in self.neighbours:
-            for item in top.walk():
-                for spec in reference_specs(type(item)):
-                    if isinstance(spec.kind, Reference) and spec.kind.rule == "file":
-                        value = getattr(item, spec.name)
-                        for name in value if isinstance(value, tuple) else (value,):
-                            if name and os.path.realpath(os.path.join(os.path.dirname(file), name)) == here:
-                                return file, top
+            folder = os.path.dirname(file)
+            if any(os.path.realpath(os.path.join(folder, name)) == here for name in _files_read_by(top)):
+                return file, top
         return None
 
     @cached_property
@@ -306,6 +302,17 @@ class Setup(Subject):
 def is_of(item: Object, target: str) -> bool:
     """Whether an object is of the class with this name, or of one derived from it."""
     return any(base.__name__ == target for base in type(item).__mro__)
+
+
+def _files_read_by(top: Object) -> Iterator[str]:
+    """Every file that is read with a document, as it is named."""
+    for item in top.walk():
+        if item.layout is not None and item.layout.include is not None:
+            yield item.layout.include.path
+        for spec in reference_specs(type(item)):
+            if isinstance(spec.kind, Reference) and spec.kind.rule == "file":
+                value = getattr(item, spec.name)
+                yield from filter(None, value if isinstance(value, tuple) else (value,))
 
 
 def _model_named_by(top: Object) -> str | None:

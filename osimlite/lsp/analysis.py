@@ -114,8 +114,13 @@ class Analysis:
     @cached_property
     def objects(self) -> dict[int, Object]:
         """The objects of the document by the number of their element."""
-        held = () if self.document is None else self.document.by_class.values()
-        return {item._index: item for items in held for item in items if item._index is not None}
+        top = None if self.document is None else self.document.top
+        found: dict[int, Object] = {}
+        for item in top.walk() if top is not None else ():
+            if item._index is not None:
+                # What is read from another file has the number of the element that names that.
+                found.setdefault(item._index, item)
+        return found
 
     def span(self, number: int) -> Span:
         """Where an element stands."""
@@ -138,6 +143,9 @@ class Analysis:
     def _place(self, use: Use) -> tuple[int, int] | None:
         number = use.holder._index
         if number is None or not isinstance(use.value, str) or not use.value:
+            return None
+        if self.objects.get(number) is not use.holder:
+            # It stands in a file that is named here.
             return None
         if use.spec.tag == "@name":
             return self.name_of(number)
@@ -177,8 +185,10 @@ class Analysis:
                 return self.led_to(use)
         for number, item in self.objects.items():
             span = self.span(number)
-            if span.start <= offset <= span.tag_end and isinstance(item, Component):
-                return self._target(self.file, item)
+            if span.start <= offset <= span.tag_end:
+                if item.layout is not None and item.layout.include is not None:
+                    return Target(item.layout.include.path)
+                return self._target(self.file, item) if isinstance(item, Component) else None
         return None
 
     def led_to(self, use: Use) -> Target | None:

@@ -146,6 +146,21 @@ async def test_files_and_words_that_a_property_takes(editor, ask, folder: Path) 
 
 
 @pytest.mark.asyncio
+async def test_a_set_in_a_file_of_its_own(editor, ask, folder: Path) -> None:
+    text = (folder / "ik.xml").read_text()
+    tasks = text[text.index("<IKTaskSet>") : text.index("</IKTaskSet>") + len("</IKTaskSet>")]
+    (folder / "ik.xml").write_text(text.replace(tasks, '<IKTaskSet name="t" file="tasks.xml"/>'))
+    (folder / "tasks.xml").write_text(f'<OpenSimDocument Version="40600">{tasks}</OpenSimDocument>')
+    ik, own = editor(folder / "ik.xml"), editor(folder / "tasks.xml")
+    await ik.open()
+    await own.open()
+    assert (await ask.definition(ik, "tasks.xml", 2)).uri == own.uri
+    assert await ask.definition(ik, '"t"', 1) == await ask.definition(ik, "tasks.xml", 2)
+    assert (await ask.definition(own, "R.ASIS", 2)).uri.endswith("/model.osim")
+    assert "in `walk.trc`" in await ask.hover(own, "R.ASIS", 2)
+
+
+@pytest.mark.asyncio
 async def test_controls_are_called_after_actuators(editor, ask, folder: Path) -> None:
     controls = editor(folder / "controls.xml")
     await controls.open()
