@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 import typing
 from collections.abc import Iterable
 from typing import Any
@@ -29,6 +30,8 @@ PAUSE = 0.02
 """A check begins when nothing has been typed for so long, s."""
 LONG_PAUSE = 0.4
 """And that of what depends on what is typed, s."""
+LONGEST_PAUSE = 2.0
+"""Of a file whose check takes long, s."""
 
 
 class Asked(typing.Protocol):
@@ -51,6 +54,7 @@ class Server(LanguageServer):
         )
         self.project = Project()
         self._checks: dict[str, asyncio.Task[None]] = {}
+        self._took: dict[str, float] = {}
 
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Tell the editor what nobody asked for; what is no JSON may be a question, and gets an answer."""
@@ -83,8 +87,10 @@ class Server(LanguageServer):
             task.cancel()
 
     async def _check(self, uri: str, pause: float) -> None:
-        await asyncio.sleep(pause)
+        # Nothing else is answered meanwhile: what takes long is not begun at every key.
+        await asyncio.sleep(max(pause, self._took.get(uri, 0.0)))
         analysis = self.project.open[uri]
+        began = time.monotonic()
         try:
             found = diagnostics(analysis)
         except OsimliteError as error:
@@ -95,6 +101,7 @@ class Server(LanguageServer):
             # The next keystroke may well be checked again: a server that ends takes everything else with it.
             self.report_server_error(error, FeatureRequestError)
             return
+        self._took[uri] = min(time.monotonic() - began, LONGEST_PAUSE)
         document = self.workspace.text_documents.get(uri)
         version = None if document is None else document.version
         self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, found, version))
