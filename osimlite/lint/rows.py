@@ -28,7 +28,7 @@ _SAMPLES, _SAMPLED = 64, 200_000
 """Rows of which all are samples, and the numbers in them at most; of further ones fewer and fewer are."""
 _TOLD = 50
 """Faults of a kind that are told, one for each column."""
-_PLAIN = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_PLAIN = re.compile(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
 _FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 

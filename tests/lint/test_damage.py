@@ -26,6 +26,7 @@ from osimlite.lint.engine import check_source, run, subject_of
 from osimlite.lint.reporters import render
 from osimlite.lint.suffixes import is_table
 from osimlite.schema.base import Object
+from osimlite.schema.difference import differences
 from osimlite.simulation import read_sto
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -129,7 +130,8 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[
     for file in (FIXTURES / "setups").iterdir():
         data = file.read_bytes()
         (folder / file.name.removesuffix(".gz")).write_bytes(gzip.decompress(data) if file.suffix == ".gz" else data)
-    files = [*folder.iterdir(), *(FIXTURES / "documents").iterdir(), FIXTURES / "lint/skeleton.osim"]
+    files = [*folder.iterdir(), *(FIXTURES / "documents").glob("*.xml"), FIXTURES / "lint/skeleton.osim"]
+    files += (FIXTURES / "lint").glob("OSIM8*/pass-*.*t[or]*")
     if MORE:
         suffixes = (".osim", ".xml", ".omoco", ".sto", ".mot", ".trc")
         files += [file for file in Path(MORE).rglob("*") if file.suffix in suffixes and file.stat().st_size < 300_000]
@@ -161,7 +163,16 @@ def check(folder: Path, name: str, data: bytes) -> None:
         return
     text = to_text(top)
     again = read_document(Source(text.encode(), name), of=Object).top
-    assert again == top and to_text(again) == text
+    assert to_text(again) == text and not differences(top, again)
+    assert _unknown(again) == _unknown(top)
+
+
+def _unknown(top: Object) -> list[str]:
+    """What no class has, however an element without text is written."""
+    texts = (
+        re.sub(r"></[^>]*>|\s*/>", "/>", text) for item in top.walk() if item.layout for text in item.layout.unknown
+    )
+    return sorted(texts)
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="the time of a check cannot be limited here")
@@ -170,7 +181,8 @@ def test_a_damaged_file_has_findings_in_places_that_exist(project, group):
     folder, victims = project
     for seed in range(FIRST + group, FIRST + WANTED, GROUPS):
         draw = random.Random(seed)
-        name, data = draw.choice(victims)
+        suffix = draw.choice([".osim", ".xml", ".xml", ".sto", ".mot", ".trc"])
+        name, data = draw.choice([victim for victim in victims if victim[0].endswith(suffix)])
         for way in draw.choices(WAYS, WEIGHTS, k=draw.choice([1, 1, 2, 3])):
             data = way(data, draw)
         try:
@@ -178,7 +190,6 @@ def test_a_damaged_file_has_findings_in_places_that_exist(project, group):
                 check(folder, name, data)
         except Exception as error:
             error.add_note(f"OSIMLITE_SEED={seed}: {name}")
-            (folder / f"seed{seed}{Path(name).suffix}").write_bytes(data)
             raise
 
 
