@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from math import nan
+
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
@@ -9,6 +12,8 @@ from osimlite.lint.table import Table
 from osimlite.lint.words import times
 from osimlite.tables import COUNTS, MARKER_KEYS, MarkerHeader
 from osimlite.text import nearest
+
+_WHOLE = re.compile(r"\+?[0-9]+")
 
 
 @rule("OSIM801", "table-header", severity=ERROR, mends="safe", about="table")
@@ -170,12 +175,13 @@ def table_count(table: Table, found: Found) -> None:
         if entry is None or (what in ("rows", "frames") and (odd_rows or not count)):
             continue
         said = entry.value.text
-        if said.lstrip("+").isdecimal() and int(said) == count:
+        number = float(said) if _WHOLE.fullmatch(said) else nan
+        if number == count:
             continue
         fate = ""
-        if severity is ERROR and what == "rows" and said.isdecimal():
-            lost = count - int(said)
-            severity, fate = (ERROR, f": OpenSim leaves out the last {lost}") if lost > 0 else (WARNING, "")
+        if severity is ERROR and what == "rows" and number == number:
+            lost = count - number
+            severity, fate = (ERROR, f": OpenSim leaves out the last {lost:g}") if lost > 0 else (WARNING, "")
         elif severity is ERROR:
             fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim takes numbers for others"
         found(
