@@ -63,7 +63,7 @@ def test_what_is_no_file_is_one_finding(special: Path, tmp_path: Path) -> None:
     done = run("validate", special, "--format", "concise", "--no-cache", folder=tmp_path)
     assert (done.code, done.err) == (1, "")
     assert done.out.startswith(f"{special}:1:1: error OSIM003 cannot read the file: this is a ")
-    assert done.out.endswith("Found 1 error in 1 model.\n")
+    assert done.out.endswith("Found 1 error in 1 file.\n")
 
 
 def test_what_is_no_file_is_not_included(special: Path, tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_the_rest_of_a_folder_is_checked(tmp_path: Path) -> None:
     (tmp_path / "b.osim").write_text('<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>')
     done = run("validate", ".", "--format", "concise", "--no-cache", folder=tmp_path)
     assert done.code == 1 and "OSIM101" in done.out and "OSIM003" in done.out
-    assert done.out.endswith("Found 2 errors in 2 models.\n")
+    assert done.out.endswith("Found 2 errors in 2 files.\n")
 
 
 def test_tables_and_data_come_from_files(tmp_path: Path) -> None:

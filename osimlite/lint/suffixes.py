@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.files import TABLES as TABLES
+from osimlite.files import unsaved
 
 DOCUMENTS = (".xml", ".omoco")
 """Setups of tools and what they consist of."""
@@ -36,6 +37,7 @@ def project_files(
     With `only_ours`, XML of other programs is passed over even where it is named.
 
     Raises:
+        MissingFileError: a path is not there.
         OsimliteError: there is none in a folder.
     """
     found: list[str] = []
@@ -49,6 +51,8 @@ def project_files(
                     file=str(path),
                 )
             found += map(str, below)
+        elif str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved:
+            raise MissingFileError("cannot read the file: no such file", file=str(path))
         elif not only_ours or begins_as_ours(str(path)):
             found.append(str(path))
     return found

@@ -127,7 +127,7 @@ def test_errors_are_one_sentence(tmp_path: Path) -> None:
         assert error.count("\n") == 1
     code, _, error = run("info", ".", folder=tmp_path)
     assert code == 2 and error.endswith("this is a folder; name a model file in it\n")
-    said = "osimlite: .: there is no .osim or .xml or .omoco file in this folder\n"
+    said = "osimlite: .: there is no file of OpenSim in this folder: no .osim, .xml or .omoco\n"
     assert run("format", ".", folder=tmp_path) == (2, "", said)
     (tmp_path / "empty.osim").touch()
     assert run("format", "empty.osim", folder=tmp_path)[0] == 1
