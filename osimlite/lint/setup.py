@@ -304,6 +304,11 @@ def is_of(item: Object, target: str) -> bool:
     return any(base.__name__ == target for base in type(item).__mro__)
 
 
+def members(owner: Any, target: str) -> list[Any]:
+    """The objects of a set that are of a class: a text may put anything there."""
+    return [item for item in owner.objects if is_of(item, target)]
+
+
 def _files_read_by(top: Object) -> Iterator[str]:
     """Every file that is read with a document, as it is named."""
     for item in top.walk():

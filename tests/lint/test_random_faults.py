@@ -73,9 +73,9 @@ def test_the_project_is_without_findings(folder):
 
 def test_a_fault_is_found_where_it_is(folder):
     missed = []
-    for fault in islice((f for f in faults(folder.project, random.Random(SEED)) if f.sure), WANTED // 2):
+    for fault in islice(faults(folder.project, random.Random(SEED)), WANTED // 2):
         findings = folder.found(fault)
-        if not in_place(fault, findings):
+        if fault.sure and not in_place(fault, findings):
             missed.append(
                 f"{fault.kind} {fault.what}\n  {sorted(fault.places)}\n  " + "\n  ".join(map(str, findings[:3]))
             )

@@ -40,8 +40,7 @@ def not_finite(subject: Subject, found: Found) -> None:
     <gravity>0 -9.80665 0</gravity>
     ```
     """
-    for item, spec in _reals(subject):
-        value = getattr(item, spec.name)
+    for item, spec, value in _reals(subject):
         if spec.tag == "mass" and value != value and subject.noted(item, spec):
             continue
         if _has_nan(spec.default) and spec.name not in item.model_fields_set:
@@ -100,7 +99,8 @@ def doubtful_value(subject: Subject, found: Found) -> None:
     """A number is outside the values that make sense for its property.
 
     ## What it does
-    Reports numbers outside the domain that the property declares: a negative radius or dissipation, an opacity of 3.
+    Reports numbers outside the domain that the property declares: a negative radius or dissipation, an opacity of 3;
+    and numbers of 1e20 and more.
 
     ## Why is this bad
     OpenSim computes with it all the same: a negative dissipation feeds energy into each impact, and a sphere with a
@@ -119,6 +119,13 @@ def doubtful_value(subject: Subject, found: Found) -> None:
     for item, spec, value, verdict in outside(subject):
         if not verdict.known:
             _report_domain(subject, found, item, spec, value, verdict)
+    for item, spec, value in _reals(subject):
+        huge = [number for number in _numbers(value) if HUGE <= abs(number) < math.inf]
+        if huge and not _bound(spec):
+            found(
+                f"{subject.titled(item, spec)} is {shown(value)}: no quantity of a motion is of this size",
+                item, tag=spec.tag, word=_word_of(subject, item, spec, huge[0]),
+            )  # fmt: skip
 
 
 @rule("OSIM208", "unknown-choice", severity=ERROR)
@@ -166,6 +173,10 @@ def unknown_choice(subject: Subject, found: Found) -> None:
                             severity=WARNING if str(word).lower() in choices else None,
                             suggestion=nearest(str(word), map(str, choices)),
                         )
+
+
+HUGE = 1e20
+"""No quantity of a motion, in whatever unit, is as large."""
 
 
 class Verdict(NamedTuple):
@@ -274,8 +285,8 @@ def _test(domain: str) -> Callable[[float], bool]:
     }[sign]
 
 
-def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec]]:
-    """Every property that holds a number that is not finite; a quick test first, since there are many numbers."""
+def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
+    """Every property that may hold a number that is huge or not finite: a quick test, since there are many numbers."""
     for cls, items in subject.by_class.items():
         specs = _numeric(cls)
         for item in items:
@@ -283,12 +294,11 @@ def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec]]:
             for spec, name in specs:
                 value = state[name]
                 if value.__class__ is float:
-                    if -math.inf < value < math.inf:
+                    if -HUGE < value < HUGE:
                         continue
-                # The sum of finite numbers may be infinite, and no other sum is finite.
-                elif not value or math.isfinite(sum(value)) or all(map(math.isfinite, value)):
+                elif not value or -HUGE < sum(value) < HUGE:
                     continue
-                yield item, spec
+                yield item, spec, value
 
 
 @cache

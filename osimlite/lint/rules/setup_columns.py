@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import nearest_name
 from osimlite.text import listed
@@ -80,8 +80,8 @@ def missing_column(setup: Setup, found: Found) -> None:
                 item, tag="states_file",
             )  # fmt: skip
     for user in setup.having("ik_task_set"):
-        for task in user.ik_task_set.objects:
-            if is_of(task, "IKCoordinateTask") and task.apply and task.value_type == "from_file":
+        for task in members(user.ik_task_set, "IKCoordinateTask"):
+            if task.apply and task.value_type == "from_file":
                 values = setup.table(user.coordinate_file)
                 if not user.coordinate_file.strip() or user.coordinate_file == "Unassigned":
                     found(

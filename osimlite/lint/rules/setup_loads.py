@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.placement import Pose, Vector, dot
 from osimlite.lint.posture import poses_in
-from osimlite.lint.setup import Setup
+from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.text import listed
@@ -70,8 +70,9 @@ def load_columns(setup: Setup, found: Found) -> None:
             continue
         columns = table.columns
         prefixes = sorted({column[:-1] for column in columns if column[-1:] in "xyzXYZ"})
-        names = [force.name for force in loads.objects]
-        for place, force in enumerate(loads.objects):
+        forces = members(loads, "ExternalForce")
+        names = [force.name for force in forces]
+        for place, force in enumerate(forces):
             if force.name in names[:place]:
                 found(f"a force is called '{force.name}' already", force, attribute="name", severity=WARNING)
             if not str(force.applied_to_body):

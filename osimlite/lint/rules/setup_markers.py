@@ -9,7 +9,7 @@ from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.rows import number_in
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import nearest_name, times
 
@@ -73,7 +73,7 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
     """
     for user, table in marker_users(setup):
         labels = table.columns
-        tasks = [task for task in user.ik_task_set.objects if is_of(task, "IKMarkerTask") and task.apply and task.name]
+        tasks = [task for task in members(user.ik_task_set, "IKMarkerTask") if task.apply and task.name]
         model = setup.names_of("Marker")
         both = [task for task in tasks if task.name in labels and task.name in model]
         if tasks and model and not both:
@@ -106,8 +106,8 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
         if static is None or not static.labels:
             continue
         gone = _unseen(static, scaler.time_range)
-        for measurement in scaler.measurement_set.objects if scaler.apply else ():
-            for pair in measurement.marker_pair_set.objects if measurement.apply else ():
+        for measurement in members(scaler.measurement_set, "Measurement") if scaler.apply else ():
+            for pair in members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ():
                 for name in pair.markers:
                     if name not in static.columns:
                         found(

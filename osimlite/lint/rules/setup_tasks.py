@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.words import called
 
 
@@ -40,7 +40,7 @@ def task_weight(setup: Setup, found: Found) -> None:
     ```
     """
     for tasks in setup.named("IKTaskSet"):
-        applied = [task for task in tasks.objects if getattr(task, "apply", False)]
+        applied = [task for task in members(tasks, "IKTask") if task.apply]
         if tasks.objects and not applied:
             found(
                 "no task of this set applies: OpenSim takes all markers, each with the weight 1", tasks,

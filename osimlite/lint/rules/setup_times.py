@@ -71,13 +71,17 @@ def time_outside_data(setup: Setup, found: Found) -> None:
             fate, severity = (
                 ("takes all times", WARNING) if is_of(item, "IMUInverseKinematicsTool") else ("refuses it", ERROR)
             )
-            found(f"a time of {called(item)} is no number: OpenSim {fate}", item, tag=tags[0], severity=severity)
+            tag = tags[0] if first != first else tags[-1]
+            found(f"a time of {called(item)} is no number: OpenSim {fate}", item, tag=tag, severity=severity)
             continue
-        if first > last:
-            found(
-                f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim fails",
-                item, tag=tags[-1], severity=ERROR,
-            )  # fmt: skip
+        if first > last or (first == last and is_of(item, "AbstractTool") and not is_of(item, "AnalyzeTool")):
+            # Nobody knows which of the two is wrong.
+            fate, severity = ("goes by the tool's times", WARNING) if is_of(item, "Analysis") else ("fails", ERROR)
+            for tag in tags:
+                found(
+                    f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim {fate}",
+                    item, tag=tag, severity=severity,
+                )  # fmt: skip
             continue
         needed = _FIRST_STATES + getattr(item, "cmc_time_window", math.nan)
         if last - first < needed:
@@ -95,7 +99,7 @@ def time_outside_data(setup: Setup, found: Found) -> None:
             if first > span[1] + slack or last < span[0] - slack:
                 found(
                     f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
-                    item, tag=tags[0], severity=ERROR,
+                    item, tag=tags[0] if first > span[1] else tags[-1], severity=ERROR,
                 )  # fmt: skip
                 continue
             specs = field_specs(type(item))

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import NOTHING, UNGIVEN, Setup, is_of
+from osimlite.lint.setup import NOTHING, UNGIVEN, Setup, is_of, members
 from osimlite.lint.words import called, nearest_name
 
 
@@ -208,9 +208,10 @@ def scale_setting(setup: Setup, found: Found) -> None:
     for measurement in setup.named("Measurement"):
         if not measurement.apply:
             continue
-        if not measurement.marker_pair_set.objects:
+        pairs = members(measurement.marker_pair_set, "MarkerPair")
+        if not pairs:
             found(f"{called(measurement)} has no pair of markers: it measures nothing", measurement, severity=WARNING)
-        for pair in measurement.marker_pair_set.objects:
+        for pair in pairs:
             if len(pair.markers) != 2:
                 found(f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes", pair, tag="markers")
             elif pair.markers[0] == pair.markers[1]:
