@@ -40,8 +40,11 @@ def _put(
         first = text.text.count("\n", 0, start) + 1 + shift
         lines |= set(range(first, first + new.count("\n") + 1))
         shift += new.count("\n") - text.text.count("\n", start, end)
-    if around is not None and around.parent >= 0:
-        lines.add(text.text.count("\n", 0, text.elements[around.parent].start) + 1)
+    # What an object lacks may be told of it, or of what it is a part of.
+    for _ in range(2):
+        if around is not None and around.parent >= 0:
+            around = text.elements[around.parent]
+            lines.add(text.text.count("\n", 0, around.start) + 1)
     return Change(file, what, text.put(*changes), tuple(lines), words, sure)
 
 

@@ -93,13 +93,18 @@ def _repeated(items: list[Any]) -> Iterator[Any]:
         names.add(item.name)
 
 
+_MOTIONS = {"MocoStateTrackingGoal": ("reference",), "MocoInverse": ("kinematics",)}
+"""Properties that name the motion of a class, if not states_reference."""
+
+
 @rule("OSIM862", "study-data", severity=ERROR, about="document")
 def study_data(setup: Setup, found: Found) -> None:
     """A table that a study follows, or starts from, does not fit its model.
 
     ## What it does
-    Looks for tables that are not named, for columns that are no state, control, generalized force or marker of the
-    model, and for states and controls that an initial guess lacks.
+    Looks for tables that are not named, for motions that do not say whether they are in degrees, for columns that are
+    no state, control, generalized force or marker of the model, and for states and controls that an initial guess
+    lacks.
 
     ## Why is this bad
     OpenSim refuses the study.
@@ -150,6 +155,11 @@ def study_data(setup: Setup, found: Found) -> None:
             name = getattr(held, tag, "").strip()
             if not name and spec.tag in _NEEDED and tag:
                 found(f"{called(item)} names no table to follow: OpenSim refuses it", item)
+            table = setup.table(name) if spec.tag in _MOTIONS.get(type(item).__name__, ("states_reference",)) else None
+            if table is not None:
+                said = table.entries.get("inDegrees")
+                if said is None or said.value.text not in ("yes", "no"):
+                    found(f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study", held, tag=tag)
             allowed = any(getattr(item, flag, False) for flag in _ALLOW)
             for column in [] if allowed else _strangers(setup, spec, held, name):
                 found(

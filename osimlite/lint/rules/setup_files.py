@@ -16,7 +16,7 @@ _NEEDED = {
     "AnalyzeTool": ("model_file",),
     "ForwardTool": ("model_file",),
     "IMUInverseKinematicsTool": ("model_file", "orientations_file"),
-    "IMUPlacer": ("model_file",),
+    "IMUPlacer": ("model_file", "orientation_file_for_calibration"),
     "CMCTool": ("model_file", "desired_kinematics_file", "task_set_file"),
     "RRATool": ("model_file", "desired_kinematics_file", "task_set_file"),
     "GenericModelMaker": ("model_file",),

@@ -231,7 +231,7 @@ def scale_setting(setup: Setup, found: Found) -> None:
             found("the markers are not placed, and the tool says that it failed", placer, tag="apply", severity=WARNING)
         elif placer.output_model_file.strip().lower() in NOTHING:
             found("the model with its markers placed is not written", placer, tag="output_model_file", severity=WARNING)
-        if placer.apply and not placer.time_range[0] < placer.time_range[-1]:
+        if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
             found(
                 f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
                 placer, tag="time_range",
