@@ -25,7 +25,7 @@ COUNTS = {"nRows": "nRows", "nr": "nRows", "datarows": "nRows"} | dict.fromkeys(
 LONGEST_HEADER, LONGEST_LINE = 1_000_000, 4_000_000
 """Bytes in which the header of a storage file ends, and those of a line that are looked at."""
 
-_SUFFIXES = {
+SUFFIXES = {
     "double": ("",),
     "Vec3": ("_x", "_y", "_z"),
     "UnitVec3": ("_x", "_y", "_z"),
@@ -53,10 +53,10 @@ def suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:
         UnsupportedError: OpenSim has no such kind.
     """
     if kind.lower() == "double":
-        return _SUFFIXES["double"]
-    if kind not in _SUFFIXES:
-        raise UnsupportedError(f"the table holds {kind}; tables hold {', '.join(_SUFFIXES)}", file=file)
-    return _SUFFIXES[kind]
+        return SUFFIXES["double"]
+    if kind not in SUFFIXES:
+        raise UnsupportedError(f"the table holds {kind}; tables hold {', '.join(SUFFIXES)}", file=file)
+    return SUFFIXES[kind]
 
 
 class Word(NamedTuple):
@@ -172,7 +172,7 @@ class StorageHeader:
     @property
     def parts(self) -> int:
         """How many numbers a cell has; 1 if OpenSim does not know what it holds."""
-        return len(_SUFFIXES.get(self.kind, ("",)))
+        return len(SUFFIXES.get(self.kind, ("",)))
 
     @property
     def in_degrees(self) -> bool:

@@ -61,7 +61,7 @@ def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Elem
     """
     setup = analysis.document if isinstance(analysis.document, Setup) else None
     if reference.rule == "file":
-        yield from _files(os.path.dirname(analysis.file), reference.target.removesuffix(" file"))
+        yield from _files(os.path.dirname(analysis.file), reference.target.removesuffix(" file").partition(" or ")[0])
     elif reference.rule == "column":
         table = None if setup is None else setup.table(getattr(setup.top, "datafile", ""))
         columns = [] if table is None else table.columns

@@ -6,7 +6,7 @@ from osimlite.schema.base import ModelComponent, Object, made, none
 from osimlite.schema.controllers import Controller
 from osimlite.schema.fields import Many, Single, Value, Vector, real
 from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import LegacyFileName, MaybeFileName, NumberInputs
+from osimlite.schema.references import MaybeFileName, NumberInputs, reads
 
 
 class PrescribedController(Controller):
@@ -23,7 +23,7 @@ class PrescribedController(Controller):
 class ControlSetController(Controller):
     """Controls read from a file of control curves."""
 
-    controls_file: LegacyFileName = "Unassigned"
+    controls_file: Annotated[str, reads("ControlSet or table", legacy=True)] = "Unassigned"
     """File of control curves (.xml) or of columns (.sto)."""
 
 

@@ -55,7 +55,6 @@ SetMemberNames = Annotated[Names, Reference("set-member", "Object", "list", requ
 
 # What lies outside the model: files and the columns and tables in them.
 FileName = Annotated[str, Reference("file", "file", required=False)]
-LegacyFileName = Annotated[str, Reference("file", "file", required=False, legacy=True)]
 MaybeFileName = Annotated[str | None, Reference("file", "file", "optional", required=False)]
 ColumnName = Annotated[str, Reference("column", "column", required=False)]
 MaybeColumnName = Annotated[str | None, Reference("column", "column", "optional", required=False)]

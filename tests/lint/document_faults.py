@@ -214,7 +214,10 @@ def _retagged(name: str, text: Text, element: Element, new: str, what: str, *, s
     changes = [(element.start + 1, element.start + 1 + len(element.tag), new)]
     if text.text[element.tail : element.tail + 2] == "</":
         changes.append((element.tail + 2, element.tail + 2 + len(element.tag), new))
-    return _put(name, text, what, *changes, around=element, sure=sure)
+    change = _put(name, text, what, *changes, around=element, sure=sure)
+    # Of two with one tag it is the second that is one too many.
+    twins = [text.text.count("\n", 0, other.start) + 1 for other in text.siblings(element) if other.tag == new]
+    return change._replace(lines=(*change.lines, *twins))
 
 
 def tag_misspelt(project: Project, draw: random.Random) -> Change | None:
@@ -289,9 +292,9 @@ def version(project: Project, draw: random.Random) -> Change | None:
     match = re.search(r' Version="([^"]*)"', text.text)
     assert match is not None
     new = draw.choice(("abc", "", "4.0", "10500", "20000", "20201", "30000", "40000", "99999"))
-    if draw.random() < 0.1:
-        return _put(name, text, "no version", (match.start(), match.end(), ""))
-    return _put(name, text, f"version {match[1]} -> {new!r}", (*match.span(1), new), sure=new in ("abc", "4.0"))
+    change = _put(name, text, f"version {match[1]} -> {new!r}", (*match.span(1), new), sure=new in ("abc", "4.0"))
+    # What a document of another version says is another thing anywhere.
+    return change if change.sure else change._replace(lines=tuple(range(1, text.text.count("\n") + 2)))
 
 
 def root_tag(project: Project, draw: random.Random) -> Change | None:

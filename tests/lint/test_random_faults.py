@@ -82,6 +82,56 @@ def test_a_fault_is_found_where_it_is(folder):
     assert not missed, f"{len(missed)} of {WANTED // 2}:\n" + "\n".join(missed)
 
 
+@pytest.mark.parametrize(
+    ("folder", "file", "old", "new"),
+    [
+        # Computed muscle control takes 0.03 s and a window of time before it controls anything.
+        (walking, "cmc.xml", "<final_time>0.65", "<final_time>0.634"),
+        (walking, "cmc.xml", "<cmc_time_window>0.005", "<cmc_time_window>0.021"),
+        (walking, "rra.xml", "<final_time>0.51", "<final_time>0.5"),
+        (walking, "rra.xml", "<replace_force_set>true", "<replace_force_set>false"),
+        (walking, "so.xml", "<initial_time>0.5", "<initial_time>60"),
+        (walking, "markers.xml", ">/bodyset/torso<", ">torso<"),
+        (walking, "markers.xml", ">/bodyset/torso<", ">/torso<"),
+        (walking, "constraints.xml", "hamstrings_r.excitation", "hamstrings_r"),
+        (walking, "controls.xml", "hamstrings_r.excitation", "/forceset/hamstrings_r.excitation"),
+        (walking, "forward.xml", ">controls.xml<", ">coords.mot<"),
+        (walking, "ik.xml", "> model.osim <", ">walk.trc<"),
+        (walking, "loads.xml", ">grf.mot<", ">tasks.xml<"),
+        (walking, "tasks.xml", "<kp> 100 <", "<kp> 1e30 <"),
+        (walking, "slide_guess.sto", "num_controls=1", "num_controls=2"),
+        (walking, "slide_guess.sto", "num_controls=1\n", ""),
+        (pendulum, "angles.sto", "DataType=double", "DataType=dubble"),
+        (pendulum, "angles.sto", "DataType=double", "DataType = double"),
+        (pendulum, "angles.sto", "inDegrees=no", "inDegrees=YES"),
+        (pendulum, "orientations.sto", "DataType=Quaternion", "DataType=Vec4"),
+    ],
+    indirect=["folder"],
+)
+def test_what_chance_has_shown_is_found(folder, file, old, new):
+    text = folder.project.texts[file]
+    assert old in text
+    places = {(file, text[: text.index(old)].count("\n") + 1), *folder.project.users(file).items()}
+    fault = Fault("known", f"{file}: {old} -> {new}", file, {file: text.replace(old, new, 1)}, frozenset(places), True)
+    assert in_place(fault, folder.found(fault))
+
+
+@pytest.mark.parametrize(
+    ("folder", "file", "old", "new"),
+    [
+        (walking, "markers.xml", ">/bodyset/torso<", ">../../bodyset/torso<"),
+        (walking, "markers.xml", ">/bodyset/torso<", ">//bodyset/torso/<"),
+        (pendulum, "angles.sto", "version=3", "version = 3"),
+        (pendulum, "orientations.sto", "DataRate=50.000000\n", ""),
+    ],
+    indirect=["folder"],
+)
+def test_what_opensim_takes_is_not_found(folder, file, old, new):
+    text = folder.project.texts[file]
+    assert old in text
+    assert folder.found(Fault("none", "", file, {file: text.replace(old, new, 1)}, frozenset(), False)) == []
+
+
 def test_what_changes_nothing_is_not_found(folder):
     wrong = []
     for fault in islice(harmless(folder.project, random.Random(SEED)), WANTED // 6):

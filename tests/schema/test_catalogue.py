@@ -49,7 +49,7 @@ OUTSIDE_46 = {"@file", "actuator_list"}
 """An attribute every object may have, and a property that versions before 40600 had."""
 
 OUTSIDE_TARGETS = {"file": "file", "column": "column"}
-"""What lies outside the model has one target per rule; the catalogue describes it in prose."""
+"""What else lies outside the model has one target per rule; the catalogue describes it in prose."""
 
 TARGETS = {
     "SimTK::Vector_<double>": "Vector",
@@ -59,6 +59,8 @@ TARGETS = {
     "Marker (2)": "Marker",
     "PhysicalFrame base frame name": "PhysicalFrame",
     "segment of the model": "Body",
+    ".sto/.mot file": "table file",
+    ".sto or ControlSet .xml": "ControlSet or table file",
 }
 """What the catalogue describes in prose."""
 
@@ -90,7 +92,7 @@ def expected_reference(prop: dict) -> tuple[str, str, bool, bool] | None:
         return None
     rule = entry["resolution"]
     target = entry["target"].removeprefix("Output of type ").removesuffix(" (list)")
-    target = OUTSIDE_TARGETS.get(rule, TARGETS.get(target, target))
+    target = TARGETS.get(target, OUTSIDE_TARGETS.get(rule, target))
     return rule, target, entry["required"], prop["kind"] == "list"
 
 

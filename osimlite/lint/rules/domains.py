@@ -121,7 +121,7 @@ def doubtful_value(subject: Subject, found: Found) -> None:
             _report_domain(subject, found, item, spec, value, verdict)
     for item, spec, value in _reals(subject):
         huge = [number for number in _numbers(value) if HUGE <= abs(number) < math.inf]
-        if huge and not _bound(spec):
+        if huge and not _bound(item, spec):
             found(
                 f"{subject.titled(item, spec)} is {shown(value)}: no quantity of a motion is of this size",
                 item, tag=spec.tag, word=_word_of(subject, item, spec, huge[0]),

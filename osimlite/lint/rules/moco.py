@@ -8,11 +8,13 @@ from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.fields import Value
 from osimlite.schema.specs import FieldSpec, field_specs, member_specs
 from osimlite.schema.states import variables
+from osimlite.schema.tree import Tree
 from osimlite.text import listed
 
 _FILES = ("filepath", "marker_file")
@@ -93,6 +95,8 @@ def _repeated(items: list[Any]) -> Iterator[Any]:
         names.add(item.name)
 
 
+_COUNTED = ("states", "controls", "multipliers", "derivatives", "slacks", "parameters", "input_controls")
+"""What the columns of a trajectory are, of which its header must say how many; the last need not be counted."""
 _MOTIONS = {"MocoStateTrackingGoal": ("reference",), "MocoInverse": ("kinematics",)}
 """Properties that name the motion of a class, if not states_reference."""
 
@@ -148,6 +152,9 @@ def study_data(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
+    for processor in setup.named("ModelProcessor"):
+        if not processor.filepath and processor.model is None:
+            found(f"{called(processor)} names no model: OpenSim refuses the study", processor, tag="filepath")
     for item in setup.items:
         for spec in member_specs(type(item)) if getattr(item, "enabled", True) else ():
             held = getattr(item, spec.name)
@@ -179,9 +186,26 @@ def study_data(setup: Setup, found: Found) -> None:
                 if column in wanted or (column.startswith("/") and "/implicitderiv_" not in column)
             }
             missing, more = sorted(wanted - columns), sorted(columns - wanted)
+            wrong = _miscounted(setup.tree, guess)
             if missing or more:
                 what = f"lacks {listed(missing)}" if missing else f"has {listed(more)}, which the model has not"
                 found(f"the guess '{item.guess_file}' {what}: OpenSim refuses it", item, tag="guess_file")
+            elif wrong:
+                found(f"the guess '{item.guess_file}' {wrong}: OpenSim refuses it", item, tag="guess_file")
+
+
+def _miscounted(tree: Tree, guess: Table) -> str:
+    """What is wrong with how a trajectory of Moco counts and orders its columns, nothing if all is right."""
+    said = {what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else "" for what in _COUNTED}
+    odd = next((what for what in _COUNTED[:-1] if not said[what].isdecimal()), None)
+    if odd is not None:
+        return f"must say how many of its columns are {odd} (num_{odd}=...)"
+    total, count = sum(int(number) for number in said.values() if number.isdecimal()), len(guess.columns)
+    if total != count:
+        return f"has {count} columns, and {total} by the counts in its header"
+    states = variables(tree, "state variable")
+    odd = next((column for column in guess.columns[: int(said["states"])] if column not in states), None)
+    return "" if odd is None else f"has '{odd}' among its first columns, which are those of states"
 
 
 def _strangers(setup: Setup, spec: FieldSpec, held: Any, name: str) -> list[str]:

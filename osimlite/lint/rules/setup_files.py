@@ -130,7 +130,9 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
         assert isinstance(naming.spec.kind, Reference)
         if not os.path.isfile(naming.path):
             continue
-        wanted = naming.spec.kind.target.removesuffix(" file")
+        wanted, _, either = naming.spec.kind.target.removesuffix(" file").partition(" or ")
+        if either == "table" and is_table(naming.name):
+            continue
         endings = {"table": (".sto", ".mot", ".trc", ".csv"), "marker data": (".trc", ".sto", ".c3d")}.get(wanted)
         if endings is not None:
             if not naming.name.lower().endswith(endings):

@@ -8,7 +8,7 @@ from collections.abc import Sequence, Set
 from osimlite.lint.engine import WARNING, Found, rule
 from osimlite.lint.posture import marker_places
 from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
-from osimlite.lint.setup import Setup
+from osimlite.lint.setup import Setup, members
 from osimlite.lint.words import called, times
 from osimlite.tables import METRES
 
@@ -62,8 +62,8 @@ def scale_factor(setup: Setup, found: Found) -> None:
             continue
         places, unit = marker_places(setup), METRES.get(table.entries["Units"].value.text, math.nan)
         rows, columns = list(rows_between(table, scaler.time_range)), dict(cells_of(table))
-        for measurement in scaler.measurement_set.objects if rows else ():
-            pairs = measurement.marker_pair_set.objects if measurement.apply else ()
+        for measurement in members(scaler.measurement_set, "Measurement") if rows else ():
+            pairs = members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ()
             for pair in pairs:
                 one, other = (str(name) for name in pair.markers) if len(pair.markers) == 2 else ("", "")
                 if {one, other} <= columns.keys() & places.keys() and one != other:

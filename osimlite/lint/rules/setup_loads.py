@@ -165,7 +165,7 @@ def load_place(setup: Setup, found: Found) -> None:
     up = tuple(-part / weight for part in model.gravity)
     for loads in setup.named("ExternalLoads"):
         table = setup.table(loads.datafile)
-        for force in loads.objects if table is not None else ():
+        for force in members(loads, "ExternalForce") if table is not None else ():
             acting = _acting(setup, force, table, motion)
             far = [distance for distance, *_ in acting if distance > _NEAR]
             if len(far) > max(2, len(acting) // 4):

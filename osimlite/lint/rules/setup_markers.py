@@ -88,7 +88,7 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
         free = 0
         if setup.tree is not None and both:
             free = sum(not setup.is_bound(name) for name in setup.tree.of_class("Coordinate"))
-        others = sum(is_of(task, "IKCoordinateTask") and task.apply for task in user.ik_task_set.objects)
+        others = sum(task.apply for task in members(user.ik_task_set, "IKCoordinateTask"))
         if 3 * len(both) + others < free:
             found(
                 f"{times(len(both), 'marker')} and {times(others, 'coordinate task')} cannot tell the {free} free "

@@ -18,6 +18,10 @@ from osimlite.tables import MarkerHeader
 
 _FIRST_STATES = 0.03
 """For how long computed muscle control runs to find the states of muscles at the start, s."""
+_SEVERAL = 4
+"""So many joints do not all stay straight."""
+_USUAL_WINDOW = 0.01
+"""The time over which its controls are found, if nothing is said, s."""
 
 
 @rule("OSIM844", "time-outside-data", severity=WARNING, about="document")
@@ -83,12 +87,12 @@ def time_outside_data(setup: Setup, found: Found) -> None:
                     item, tag=tag, severity=severity,
                 )  # fmt: skip
             continue
-        needed = _FIRST_STATES + getattr(item, "cmc_time_window", math.nan)
-        if last - first < needed:
+        window = getattr(item, "cmc_time_window", math.nan)
+        if last - first < _FIRST_STATES + window:
             found(
-                f"{called(item)} runs for {last - first:.4g} s and needs {needed:g} s for its first controls: OpenSim "
-                "fails",
-                item, tag=tags[-1], severity=ERROR,
+                f"{called(item)} runs for {last - first:.4g} s and needs {_FIRST_STATES + window:g} s for its first "
+                "controls: OpenSim fails",
+                item, tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1], severity=ERROR,
             )  # fmt: skip
         for name, kind in _data_of(item):
             table = setup.table(name)
@@ -248,11 +252,12 @@ def filter_frequency(setup: Setup, found: Found) -> None:
 
 @rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
 def motion_in_degrees(setup: Setup, found: Found) -> None:
-    """Angles of a motion are in degrees, and OpenSim takes them for radians.
+    """Angles of a motion are in degrees, and OpenSim takes them for radians, or the other way round.
 
     ## What it does
     Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of more than 10 is no
-    angle in radians that a joint takes.
+    angle in radians that a joint takes. Of a motion that says so, the largest angle of many joints is more than 3
+    degrees.
 
     ## Why is this bad
     Joint moments of hundreds of thousands, without a word.
@@ -279,20 +284,26 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
     """
     for item, tag, table in motions(setup):
         header = table.header
-        if isinstance(header, MarkerHeader) or header.in_degrees or setup.tree is None:
+        if isinstance(header, MarkerHeader) or setup.tree is None:
             continue
         angles = angles_of(setup)
-        largest, label = max(
+        places = [place for place, column in enumerate(table.columns, 1) if coordinate_of(column) in angles]
+        largest, place = max(
             (
-                (abs(sample[place]), column)
-                for place, column in enumerate(table.columns, 1)
-                if coordinate_of(column) in angles
+                (abs(sample[place]), place)
+                for place in places
                 for sample in table.rows.samples
                 if place < len(sample) and sample[place] == sample[place]
             ),
-            default=(0.0, ""),
+            default=(0.0, 0),
         )
-        if largest > 10.0:
+        label = table.labels[place].text
+        if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _SEVERAL:
+            found(
+                f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is {largest:.3g}: is it in radians?",
+                item, tag=tag,
+            )  # fmt: skip
+        elif largest > 10.0 and not header.in_degrees:
             found(
                 f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is {largest:.4g} in it: OpenSim "
                 "takes it for radians",

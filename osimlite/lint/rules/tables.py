@@ -10,7 +10,7 @@ from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.table import Table
 from osimlite.lint.words import times
-from osimlite.tables import COUNTS, MARKER_KEYS, MarkerHeader
+from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, MarkerHeader
 from osimlite.text import nearest
 
 _WHOLE = re.compile(r"\+?[0-9]+")
@@ -258,9 +258,27 @@ def table_setting(table: Table, found: Found) -> None:
             f"'inDegrees' is 'yes' or 'no'; of '{degrees.value.text}' OpenSim makes no: it takes angles for radians",
             at=degrees.value.at, suggestion=meant, certain=True, severity=WARNING if harmless else None,
         )  # fmt: skip
+    _cells(table, found)
     version = entries.get("version")
     if version is not None and not version.value.text.isdecimal():
         found(f"the version is a whole number, not '{version.value.text}'", at=version.value.at, severity=WARNING)
+
+
+def _cells(table: Table, found: Found) -> None:
+    """What the newer reader of storage files makes of the type of the cells, and of blanks around keys."""
+    kind = table.entries.get("DataType")
+    if kind is not None and kind.value.text and kind.value.text not in SUFFIXES:
+        found(
+            f"OpenSim knows no tables of '{kind.value.text}', and refuses the file", at=kind.value.at,
+            suggestion=nearest(kind.value.text, SUFFIXES), severity=None if table.is_strict else WARNING,
+        )  # fmt: skip
+    for key, entry in table.entries.items() if table.is_strict else ():
+        behind = table.header.lines[entry.key.at.line - 1][entry.key.at.column - 1 + entry.key.at.length :]
+        if key != "version" and "=" in behind and not behind.startswith(f"={entry.value.text}"):
+            found(
+                f"OpenSim's newer reader takes the blanks beside '=' for parts of '{key}' and of its value",
+                at=entry.key.at, severity=ERROR if key == "DataType" else WARNING,
+            )  # fmt: skip
 
 
 def _is_positive(text: str) -> bool:
