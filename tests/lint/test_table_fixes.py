@@ -23,6 +23,8 @@ MARKERS = (LINT / "leg.trc").read_bytes().replace(b"Z3\t\n", b"Z3\n")
 BROKEN = [
     ("count", MOTION, rb"nRows=3", b"nRows=2"),
     ("count-of-columns", MOTION, rb"nColumns=3", b"nColumns=4"),
+    ("count-missing", MOTION, rb"nRows=3", b"nRows="),
+    ("count-without-its-mark", MOTION, rb"nColumns=3", b"nColumns3"),
     ("true", MOTION, rb"=yes", b"=true"),
     ("case-of-a-key", MOTION, rb"inDegrees", b"indegrees"),
     ("case-of-the-end", MOTION, rb"endheader", b"EndHeader"),
@@ -76,6 +78,23 @@ def test_what_nobody_knows_is_left_alone():
     for damage in (b"0.1\tx\t3", b"0.1\t1", b"0\t1\t3"):
         data = MOTION.replace(b"0.1\t1\t3", damage)
         assert mend("a.sto", data, unsafe=True) == data
+
+
+@pytest.mark.parametrize(
+    ("data", "old", "new"),
+    [
+        # A label is lost, a line is broken, a line is not what it should be.
+        (MOTION, b"\thip", b""),
+        (MARKERS, b"knee_marker", b"knee\nmarker"),
+        (MARKERS, b"Frame#\tTime\t", b"asis\t\t\t"),
+        (MARKERS, b"\t\tX1\t", b"\t\tleft\t"),
+        (MARKERS, b"NumFrames\t", b""),
+    ],
+)
+def test_what_may_mean_another_thing_is_left_alone(data, old, new):
+    assert data.count(old) == 1
+    broken = data.replace(old, new)
+    assert mend("a.sto" if data is MOTION else "a.trc", broken, unsafe=True) == broken
 
 
 SETUP = """<OpenSimDocument Version="{version}">

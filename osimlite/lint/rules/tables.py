@@ -10,10 +10,12 @@ from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.table import Table
 from osimlite.lint.words import times
-from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, MarkerHeader
+from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
 from osimlite.text import nearest
 
 _WHOLE = re.compile(r"\+?[0-9]+")
+_TO_THE_END = 1_000_000
+"""As many characters as stand in no line."""
 
 
 @rule("OSIM801", "table-header", severity=ERROR, mends="safe", about="table")
@@ -77,12 +79,20 @@ def table_header(table: Table, found: Found) -> None:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
                 near = nearest(key, table.entries, cutoff=75)
-                at = table.entries[near].key.at if near else header.end.at
+                entry = table.entries[near] if near else None
+                at = entry.key.at if entry else header.end.at
+                fix = _saying(table, entry, key, count) if entry else table.inserting(at.line, f"{key}={count}")
                 found(
                     f"the header does not say '{key}': OpenSim refuses the table",
-                    at=at, suggestion=near and key, certain=True,
-                    fix=None if near else table.inserting(at.line, f"{key}={count}"),
+                    at=at, suggestion=near and key, fix=fix,
                 )  # fmt: skip
+
+
+def _saying(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
+    """The mend that makes a line of a header say a count: the key alone if a value is there."""
+    if entry.value.text:
+        return table.replacing(entry.key.at, None, key, certain=True)
+    return table.replacing(entry.key.at._replace(length=_TO_THE_END), None, f"{key}={count}", certain=True)
 
 
 def _marker_header(table: Table, header: MarkerHeader, found: Found) -> None:
@@ -113,16 +123,19 @@ def _marker_header(table: Table, header: MarkerHeader, found: Found) -> None:
                 f"there are {len(values)} values of the {len(keys)} keys above them: OpenSim refuses the file",
                 at=Position(3, 1),
             )
-    subscripts = [word.text for word in header.words(5)] if len(header.lines) > 4 else []
+    fifth = header.lines[4] if len(header.lines) > 4 else b""
+    subscripts = [word.text for word in header.words(5)] if fifth else []
     count = len(table.labels)
     wanted = [f"{axis}{number}" for number in range(1, count + 1) for axis in "XYZ"]
     if subscripts[: 3 * count] != wanted:
         wrong = next((k for k, word in enumerate(wanted) if subscripts[k : k + 1] != [word]), 0)
         place = header.words(5)[wrong].at if wrong < len(subscripts) else Position(5, 1)
         line = "\t\t" + "\t".join(wanted)
-        fix: Fix | None = table.inserting(5, line)
-        if any(word.startswith(("X", "Y", "Z")) for word in subscripts):
-            fix = table.replacing(Position(5, 1, len(header.lines[4].rstrip())), None, line, certain=True)
+        fix = None
+        if len(subscripts) == len(wanted) and all(word[:1] in "XYZ" for word in subscripts):
+            fix = table.replacing(Position(5, 1, len(fifth.rstrip())), None, line, certain=True)
+        elif (fifth[:1].isdigit() or not fifth.strip()) and [word.text for word in values[3:4]] == [str(count)]:
+            fix = table.inserting(5, line)
         found(f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file", at=place, fix=fix)
 
 
@@ -184,9 +197,14 @@ def table_count(table: Table, found: Found) -> None:
             severity, fate = (ERROR, f": OpenSim leaves out the last {lost:g}") if lost > 0 else (WARNING, "")
         elif severity is ERROR:
             fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim takes numbers for others"
+        # Where a row has as many cells as the header says, it is a label that is wrong.
+        plain = not isinstance(table.header, MarkerHeader) and table.header.parts == 1
+        in_rows = len(rows.samples[0]) if key == "nColumns" and plain and rows.samples else count
+        is_right = not odd_rows and rows.count > 0 and in_rows == count
         found(
             f"'{entry.key.text}' is '{said}', and there are {count} {what}{fate}",
-            at=entry.value.at, severity=severity, suggestion=None if odd_rows else str(count), certain=True,
+            at=entry.value.at, severity=severity, suggestion=str(count) if is_right else None, certain=True,
+            fix=_saying(table, entry, key, count) if is_right and not said else None,
         )  # fmt: skip
 
 
@@ -331,7 +349,7 @@ def column_label(table: Table, found: Found) -> None:
             if word.text != right:
                 found(
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
-                    at=word.at, suggestion=right, certain=True,
+                    at=word.at, suggestion=nearest(word.text, [right], cutoff=60), certain=True,
                 )  # fmt: skip
         for label in labels:
             if " " in label.text:
