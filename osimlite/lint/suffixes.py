@@ -16,7 +16,12 @@ DOCUMENTS = (".xml", ".omoco")
 PROJECT = (".osim", *DOCUMENTS, *TABLES)
 """Everything that belongs to a project."""
 
-_OURS = re.compile(rb"<OpenSimDocument\b|<(\w*(Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet))\b")
+_OURS = re.compile(
+    rb"<OpenSimDocument\b|"
+    rb"\A[^<]*+(?:(?:<!--.*?-->|<(?:\?|!(?!--))[^>]*+>)[^<]*+)*+"
+    rb"<\w*(?:Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet)\b",
+    re.DOTALL,
+)
 
 
 def is_table(file: str | None) -> bool:

@@ -15,6 +15,7 @@ from osimlite.lint import Config, validate
 from osimlite.lint import many as module
 from osimlite.lint.cache import NAME, folder_for
 from osimlite.lint.many import Texts, check_files, settings_of
+from osimlite.lint.suffixes import is_ours
 
 MESH = """\
 <OpenSimDocument Version="40600">
@@ -232,3 +233,18 @@ def test_the_text_of_a_file_that_has_gone_is_empty(project):
     assert texts[str(file)] == MESH
     shutil.move(file, project / "moved.osim")
     assert texts[str(file)] == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "ours"),
+    [
+        ('<?xml version="1.0"?>\n<!-- a > b -->\n<IKTool name="x">', True),
+        ("\ufeff<InverseKinemtaticsTool>", True),
+        ("<OpenSimDocument Version='40600'>", True),
+        ("<TaskSpace::Controller> <TaskSet>", False),
+        ("<!-- ForceSet --> <project>", False),
+        ("<!-- x --><?" * 300, False),
+    ],
+)
+def test_xml_of_other_programs_is_known_by_its_root(text, ours):
+    assert is_ours(text.encode()) is ours
