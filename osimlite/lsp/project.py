@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -53,14 +54,16 @@ class Project:
     def hold(self, analysis: Analysis) -> bool:
         """Let others see a document that can be read as it is in the editor; whether it is another one to them."""
         path = os.path.realpath(analysis.file)
+        # The mark counts for more than what the text says of its encoding.
+        held = codecs.BOM_UTF8 + analysis.source.data
         before = unsaved.get(path)
         if before is None:
             try:
-                before = read_file(path)
+                before = codecs.BOM_UTF8 + read_file(path).removeprefix(codecs.BOM_UTF8)
             except OsimliteError:
                 return False
-        unsaved[path] = analysis.source.data
-        return before != analysis.source.data
+        unsaved[path] = held
+        return before != held
 
     def close(self, uri: str) -> Analysis | None:
         """Forget a file, which is from now on as it is on the disk."""

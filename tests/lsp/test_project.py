@@ -9,7 +9,11 @@ from shutil import copy
 import pytest
 from lsprotocol import types
 
+from osimlite.document.reader import read
 from osimlite.lint import validate
+from osimlite.lsp.analysis import Analysis
+from osimlite.lsp.project import Project
+from osimlite.lsp.text import Text
 
 ERROR = types.DiagnosticSeverity.Error
 
@@ -103,6 +107,18 @@ async def test_what_an_open_model_says_counts_before_it_is_written(client, edito
     client.text_document_did_close(types.DidCloseTextDocumentParams(model.document))
     await ik.checked()
     assert not [d for d in await ik.checked() if d.code == "OSIM831"]
+
+
+def test_what_is_held_needs_no_encoding(tmp_path: Path) -> None:
+    file = tmp_path / "m.osim"
+    text = '<?xml version="1.0" encoding="ISO-8859-1"?><OpenSimDocument Version="40600"><Model name="é"/></OpenSimDocument>'
+    file.write_text(text, encoding="iso-8859-1")
+    project = Project()
+    project.open["m"] = Analysis(Text(text.replace("é", "öß")), str(file))
+    assert project.hold(project.open["m"]) and not project.hold(project.open["m"])
+    assert read(file).name == "öß"
+    project.close("m")
+    assert read(file).name == "é"
 
 
 @pytest.mark.asyncio
