@@ -111,7 +111,8 @@ async def test_what_an_open_model_says_counts_before_it_is_written(client, edito
 
 def test_what_is_held_needs_no_encoding(tmp_path: Path) -> None:
     file = tmp_path / "m.osim"
-    text = '<?xml version="1.0" encoding="ISO-8859-1"?><OpenSimDocument Version="40600"><Model name="é"/></OpenSimDocument>'
+    head = '<?xml version="1.0" encoding="ISO-8859-1"?>'
+    text = f'{head}<OpenSimDocument Version="40600"><Model name="é"/></OpenSimDocument>'
     file.write_text(text, encoding="iso-8859-1")
     project = Project()
     project.open["m"] = Analysis(Text(text.replace("é", "öß")), str(file))
