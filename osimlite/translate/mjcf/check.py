@@ -210,19 +210,18 @@ class _Compiled:
         actuator = self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if actuator < 0 or self.model.actuator_gaintype[actuator] != self.mujoco.mjtGain.mjGAIN_MUSCLE:
             return {}
-        numbers, (low, high) = self.model.actuator_gainprm[actuator], self.model.actuator_lengthrange[actuator]
-        fiber = (high - low) / (numbers[1] - numbers[0])
-        tendon = low - numbers[0] * fiber
-        force = numbers[2] if numbers[2] >= 0.0 else numbers[3] / self.model.actuator_acc0[actuator]
-        curves = Curves(tendon, fiber, force, numbers[4], numbers[5], numbers[7])
+        gain, bias = (row[actuator].copy() for row in (self.model.actuator_gainprm, self.model.actuator_biasprm))
+        if gain[2] < 0.0:
+            gain[2] = gain[3] / self.model.actuator_acc0[actuator]
+        curves = Curves.read(self.model.actuator_lengthrange[actuator], gain, bias)
         spread = np.sort(lengths)
         (wanted,) = isometric_tension(muscle, spread, (1.0,))
         off = (curves.tension(spread, 1.0) - wanted)[np.isfinite(wanted)] / muscle.max_isometric_force
         along = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
         return {
             "force": Error.of(off, "Fmax") if len(off) else None,
-            "fiber": float(fiber / along),
-            "tendon": float(tendon - muscle.tendon_slack_length),
+            "fiber": float(curves.fiber / along),
+            "tendon": float(curves.tendon - muscle.tendon_slack_length),
         }
 
 

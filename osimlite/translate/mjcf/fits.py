@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,47 +13,66 @@ from osimlite.multibody.spatial import Array, offset
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon
 
-SCALE = 0.01
-"""Shifts (m), turns (by 10 of it, rad) and sizes are sought in these units."""
 GOOD = 1e-4
 """An error (m) that need not become less."""
+ROUNDS, WORTH = 4, 0.98
+"""At most so many rounds, as long as the error falls below this part of what it was."""
+SHIFT, TURN, GROW = 0.01, 0.1, 0.1
+"""What the search takes for equally large: shifts (m), turns (rad), logarithms of radii."""
 SIDES = 24
+"""So many directions around a surface are tried as sides."""
+
+Wrong = Callable[[Tendon], Array]
+"""The residuals of a tendon with a piece of it."""
 
 
 def fitted(router: Router, tendon: Tendon) -> Tendon:
-    """The tendon with the surfaces and the free sites where its error is least, starting from where they are."""
-    if router.error(tendon) < GOOD or not any(map(_is_free, tendon)):
+    """The tendon with surfaces and sites of ours where its error is least, sought from where they are.
+
+    Points of the path stay where they are, and so do specks that stand for such points.
+    """
+    if router.error(tendon) < GOOD:
         return tendon
+    fixed = [place for place, part in enumerate(tendon) if isinstance(part, Spot) and part.name]
+    for first, last in reversed(list(pairwise(fixed))):
+        piece = tendon[first : last + 1]
+        if any(map(_is_free, piece)):
+            found = _search(piece, router.but_for(tendon, piece))
+            tendon = (*tendon[:first], *found, *tendon[last + 1 :])
+    return tendon
+
+
+def _search(piece: Tendon, wrong: Wrong) -> Tendon:
+    """The piece with the least error: all numbers are sought together, then the side of each surface, in turn."""
     search = require("scipy.optimize", extra="sim", purpose="fits of tendons").least_squares
-    best, least = tendon, router.error(tendon)
-    for _ in range(4):
+    best, least = piece, _error(wrong(piece))
+    for _ in range(ROUNDS):
         start = best
-        for loss in ("soft_l1", "linear"):
-            guess = search(
-                lambda x, t=start: 1e3 * router.residuals(_moved(t, x)).ravel(),
-                np.zeros(_size(start)),
-                loss=loss,
-                max_nfev=40,
-            )
-            found = _moved(start, guess.x)
-            found = _sided(router, found)
-            if (error := router.error(found)) < least:
-                best, least = found, error
-        if best is start or least < GOOD:
+        size = sum(7 if isinstance(part, Around) else 3 for part in start if _is_free(part))
+        guess = search(lambda x, t=start: 1e3 * wrong(_moved(t, x)).ravel(), np.zeros(size), max_nfev=40)
+        found = _sided(_moved(start, guess.x), wrong)
+        error = _error(wrong(found))
+        if error < least:
+            best = found
+        if not error < WORTH * least:
             break
+        least = error
     return best
 
 
-def _sided(router: Router, tendon: Tendon) -> Tendon:
-    """The tendon with the best side for each surface."""
-    for number, part in enumerate(tendon):
+def _error(residuals: Array) -> float:
+    return float(np.sqrt(np.square(residuals).mean(0).sum()))
+
+
+def _sided(piece: Tendon, wrong: Wrong) -> Tendon:
+    """The piece with the best side for each surface."""
+    turns = np.arange(SIDES) * (2.0 * np.pi / SIDES)
+    directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
+    for place, part in enumerate(piece):
         if isinstance(part, Around) and _is_free(part):
-            turns = np.arange(SIDES) * (2.0 * np.pi / SIDES)
-            sides = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
-            options = [(*tendon[:number], part.sided(side), *tendon[number + 1 :]) for side in sides]
-            options.append(tendon)
-            tendon = min(options, key=router.error)
-    return tendon
+            options = [(*piece[:place], part.sided(way), *piece[place + 1 :]) for way in (None, *directions)]
+            piece = min((piece, *options), key=lambda option: _error(wrong(option)))
+    return piece
 
 
 def _is_free(part: Spot | Around) -> bool:
@@ -60,28 +81,18 @@ def _is_free(part: Spot | Around) -> bool:
     return not part.name
 
 
-def _size(tendon: Tendon) -> int:
-    return sum(7 if isinstance(part, Around) else 3 for part in tendon if _is_free(part))
-
-
-def _moved(tendon: Tendon, x: Array) -> Tendon:
-    """The tendon with its free parts moved by numbers of the fit."""
+def _moved(piece: Tendon, x: Array) -> Tendon:
+    """The piece with its free parts moved by numbers of the search."""
     parts: list[Spot | Around] = []
-    for part in tendon:
+    for part in piece:
         if not _is_free(part):
             parts.append(part)
-        elif isinstance(part, Around):
-            shift, turn, size = SCALE * x[:3], 10.0 * SCALE * x[3:6], x[6]
-            moved = replace(
-                part,
-                frame=part.frame @ offset(shift, turn),
-                radius=part.radius * float(np.exp(10.0 * SCALE * np.clip(size, -50, 50))),
-            )
-            if part.side is not None:
-                moved = moved.sided(part.frame[:3, :3].T @ (part.side.place - part.frame[:3, 3]))
-            parts.append(moved)
-            x = x[7:]
-        else:
-            parts.append(replace(part, place=part.place + SCALE * x[:3]))
+        elif isinstance(part, Spot):
+            parts.append(replace(part, place=part.place + SHIFT * x[:3]))
             x = x[3:]
+        else:
+            frame = part.frame @ offset(SHIFT * x[:3], TURN * x[3:6])
+            radius = part.radius * float(np.exp(np.clip(GROW * x[6], -5.0, 5.0)))
+            parts.append(part.moved(frame, radius))
+            x = x[7:]
     return tuple(parts)

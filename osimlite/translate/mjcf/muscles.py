@@ -51,12 +51,12 @@ ACTIVATIONS = (0.01, 0.5, 1.0)
 """At which isometric tensions are compared."""
 LENGTHS = 24
 """So many lengths, evenly spread over those that occur."""
-LEAST, GREATEST = (0.0, 1.05, 0.0), (0.95, 4.0, 20.0)
-"""Bounds of the ends of the active curve and of the height of the passive one."""
+LEAST, GREATEST = (0.0, 1.05, 1.05, 0.0), (0.95, 4.0, 6.0, 20.0)
+"""Bounds of the ends of the active curve, and of end and height of the passive one."""
 SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
 FREE = 0.25
-"""Parts by which a fit to forces may change tendon, fibers and strength."""
+"""Parts by which a fit to forces may change tendon, fibers and strength, and by which it may move the passive curve."""
 
 
 class Curves(NamedTuple):
@@ -67,8 +67,10 @@ class Curves(NamedTuple):
         fiber: optimal length of the fibers along the tendon, m.
         force: at the optimal length, fully active and at rest, N.
         lmin: normalized length below which there is no active force.
-        lmax: that above which there is none; the passive force is a line from halfway between 1 and here.
+        lmax: that above which there is none.
+        end: the passive force is a line from halfway between 1 and here.
         fpmax: twice the passive force there, halfway, over `force`.
+        shift: by so much more than 1 the normalized length is where the passive force begins.
     """
 
     tendon: float
@@ -76,7 +78,9 @@ class Curves(NamedTuple):
     force: float
     lmin: float = 0.5
     lmax: float = 1.6
+    end: float = 1.6
     fpmax: float = 1.3
+    shift: float = 0.0
 
     def tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
@@ -86,14 +90,30 @@ class Curves(NamedTuple):
         outer = np.where(x <= 1.0, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high))
         active = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
         active = np.where((x < self.lmin) | (x > self.lmax), 0.0, active)
-        stretch = np.maximum(x - 1.0, 0.0) / (high - 1.0)
-        passive = self.fpmax * np.where(x <= high, 0.5 * stretch**2, stretch - 0.5)
+        stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
+        passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
         found: Array = self.force * (activation * active + passive)
         return found
 
     def tensions(self, lengths: Array) -> Array:
         """Tensions (A, L) at the activations that are compared."""
         return np.stack([self.tension(lengths, activation) for activation in ACTIVATIONS])
+
+    @classmethod
+    def read(cls, lengthrange: Array, gain: Array, bias: Array) -> Curves:
+        """Those of an actuator by its length range (m), and its numbers of gain and bias."""
+        (low, high), (first, last) = lengthrange, gain[:2]
+        fiber = (high - low) / (last - first)
+        shift = (gain[0] - bias[0]) if bias[1] - bias[0] == last - first else math.nan
+        return cls(low - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift)
+
+    def numbers(self, vmax: float, fvmax: float) -> tuple[Array, Array]:
+        """MuJoCo's numbers of gain and bias of an actuator whose length range is (tendon, tendon + fiber)."""
+        gain = np.array((0.0, 1.0, self.force, SCALE, self.lmin, self.lmax, vmax, self.fpmax, fvmax))
+        bias = np.array(
+            (-self.shift, 1.0 - self.shift, self.force, SCALE, self.lmin, self.end, vmax, self.fpmax, fvmax)
+        )
+        return tidy(gain), tidy(bias)
 
 
 def muscle(draft: Draft, force: Muscle, path: str) -> str:
@@ -114,7 +134,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
     rise, fall = (getattr(force, f"{word}_time_constant", 0.0) for word in ("activation", "deactivation"))
     lags = rise > 0.0 and fall > 0.0 and not force.ignore_activation_dynamics
-    numbers = tidy(np.array((0, 1, curves.force, SCALE, curves.lmin, curves.lmax, *_rates(force, cos, curves.fpmax))))
+    gain, bias = curves.numbers(*_rates(force, cos))
     add(
         draft.section("actuator"),
         "general",
@@ -124,9 +144,9 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         dyntype="muscle" if lags else "none",
         dynprm=(rise, fall, 0.0) if lags else None,
         gaintype="muscle",
-        gainprm=numbers,
+        gainprm=gain,
         biastype="muscle",
-        biasprm=numbers,
+        biasprm=bias,
         ctrlrange=limits if limits[0] < limits[1] else None,
     )
     if lags:
@@ -151,11 +171,11 @@ def _isometric(force: Muscle, lengths: Array) -> tuple[Array, Array]:
     return spread, isometric_tension(force, spread, ACTIVATIONS)
 
 
-def _rates(force: Muscle, cos: float, fpmax: float) -> tuple[float, float, float]:
-    """MuJoCo's vmax, fpmax and fvmax; the first is measured along the tendon."""
+def _rates(force: Muscle, cos: float) -> tuple[float, float]:
+    """MuJoCo's vmax, which is measured along the tendon, and fvmax."""
     curve = getattr(force, "force_velocity_curve", None)
     strongest = getattr(curve, "max_eccentric_velocity_force_multiplier", getattr(force, "Flen", 1.4))
-    return getattr(force, "Vmax", force.max_contraction_velocity) / cos**2, fpmax, strongest
+    return getattr(force, "Vmax", force.max_contraction_velocity) / cos**2, strongest
 
 
 def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
@@ -166,22 +186,19 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
 
     def curves(x: Array) -> Curves:
-        lmin, lmax, fpmax, *rest = x.tolist()
-        tendon, fiber, strength = rest or (0.0, 0.0, 0.0)
+        lmin, lmax, end, fpmax, *rest = x.tolist()
+        tendon, fiber, strength, shift = rest or (0.0, 0.0, 0.0, 0.0)
         moved = own.tendon + tendon * own.fiber, own.fiber * (1.0 + fiber), own.force * (1.0 + strength)
-        return Curves(*moved, lmin, lmax, fpmax)
+        return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def off(x: Array) -> Array:
         found: Array = ((curves(x).tensions(lengths) - tensions) / own.force)[known]
         return found
 
-    start, low, high = [own.lmin, own.lmax, own.fpmax], list(LEAST), list(GREATEST)
+    start, low, high = [own.lmin, own.lmax, own.end, own.fpmax], list(LEAST), list(GREATEST)
     if free:
-        start, low, high = [*start, 0.0, 0.0, 0.0], [*low, *[-FREE] * 3], [*high, *[FREE] * 3]
-    best = min((search(off, each, bounds=(low, high)) for each in _starts(start)), key=lambda found: found.cost)
+        start, low, high = [*start, *[0.0] * 4], [*low, *[-FREE] * 4], [*high, *[FREE] * 4]
+    # The curves have kinks: the way from one start may end at one.
+    starts = start, [0.2, 2.2, *start[2:]]
+    best = min((search(off, each, bounds=(low, high)) for each in starts), key=lambda found: found.cost)
     return curves(best.x)
-
-
-def _starts(start: list[float]) -> list[list[float]]:
-    """Several places to seek from: the curves have kinks."""
-    return [[lmin, lmax, *start[2:]] for lmin in (start[0], 0.2) for lmax in (start[1], 2.2)]

@@ -99,12 +99,17 @@ class Router:
     def _least(self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]) -> Tendon:
         """The option for a part of a tendon with which the whole has the least error."""
         head, tail = before[_last_spot(before) :], after[: len(after) - _last_spot(after[::-1])]
-        rest = self.residuals((*before, *now, *after)) - self._own((*head, *now, *tail))
+        wrong = self.but_for((*before, *now, *after), (*head, *now, *tail))
         errors = [
-            np.square(rest + self._own(piece)).mean(0).sum() if _is_tendon(piece) else np.inf
+            np.square(wrong(piece)).mean(0).sum() if _is_tendon(piece) else np.inf
             for piece in ((*head, *option, *tail) for option in options)
         ]
         return options[int(np.argmin(errors))]
+
+    def but_for(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
+        """The residuals of a tendon, as a function of what stands in the place of a piece of it from site to site."""
+        rest = self.residuals(tendon) - self._own(piece)
+        return lambda other: rest + self._own(other)
 
     def _own(self, tendon: Tendon) -> Array:
         """Lengths and moment arms (P, 1 + m) of a tendon."""
@@ -139,11 +144,7 @@ class Router:
         best: dict[int, Around] = {}
         options: list[Tendon]
         for number in sorted(numbers, key=lambda number: np.mean(self._turn(number, numbers))):
-            options = [
-                (each.sided(side),)
-                for each in self._stand_ins(number)
-                for side in self._sides(number, each, DIRECTIONS)
-            ]
+            options = [(sided,) for each in self._stand_ins(number) for sided in self._sides(number, each, DIRECTIONS)]
             (found,) = choose(options)
             assert isinstance(found, Around)
             best[number] = found
@@ -151,7 +152,7 @@ class Router:
         for (one, first), (two, second) in combinations(best.items(), 2):
             for middle in self._between(one, two):
                 sides = product(self._sides(one, first, 0), self._sides(two, second, 0))
-                options += [(first.sided(side), middle, second.sided(other)) for side, other in sides]
+                options += [(sided, middle, other) for sided, other in sides]
         return choose(options)
 
     def _stand_ins(self, number: int) -> Iterator[Around]:
@@ -180,6 +181,8 @@ class Router:
                 out = np.array((x, y, 0.0)) / np.hypot(x, y)
                 turned = transform(_z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
                 yield replace(own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube)
+                # Or it runs through a ball in the hole, whose side site is inside.
+                yield replace(own, radius=ring - tube, side=Spot(own.body, own.frame[:3, 3]))
 
     def _touched(self, number: int) -> Array:
         """The tangent points (2 k, 3) on a surface, in its own frame."""
@@ -187,20 +190,20 @@ class Router:
         found: Array = (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
         return found
 
-    def _sides(self, number: int, around: Around, directions: int) -> Iterator[Array | None]:
-        """No side, the side of the quadrant, the side that is touched, and directions all around."""
+    def _sides(self, number: int, around: Around, directions: int) -> Iterator[Around]:
+        """As it is, or with the side of the quadrant, the side that is touched, or one of the directions all around."""
+        yield around
         surface, touch = self.route.surfaces[number], self.touches[number]
         turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
         axis, sign = int(surface.numbers[0]), surface.numbers[1]
-        yield None
         if sign:
-            yield turned @ (sign * np.eye(3)[axis])
+            yield around.sided(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
-        yield (middles / np.linalg.norm(middles, axis=1, keepdims=True)).mean(0)
+        yield around.sided((middles / np.linalg.norm(middles, axis=1, keepdims=True)).mean(0))
         for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
-            yield np.array((np.cos(turn), np.sin(turn), 0.0))
+            yield around.sided(np.array((np.cos(turn), np.sin(turn), 0.0)))
         if directions and around.kind == "sphere":
-            yield from (np.array((0.0, 0.0, 1.0)), np.array((0.0, 0.0, -1.0)))
+            yield from (around.sided(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
 
     def _turn(self, number: int, numbers: Sequence[int]) -> list[int]:
         """Where a surface stands in the order of those that the path touches, in each pose."""

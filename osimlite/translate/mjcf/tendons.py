@@ -66,6 +66,14 @@ class Around:
         place = self.frame[:3, :3] @ (direction * (2.0 * self.radius / np.linalg.norm(direction))) + self.frame[:3, 3]
         return replace(self, side=Spot(self.body, place))
 
+    def moved(self, frame: Array, radius: float) -> Around:
+        """The same elsewhere (4, 4) and of another radius (m), with the side site where it is as seen from there."""
+        if self.side is None:
+            return replace(self, frame=frame, radius=radius)
+        seen = self.frame[:3, :3].T @ (self.side.place - self.frame[:3, 3])
+        side = replace(self.side, place=frame[:3, :3] @ (seen * (radius / self.radius)) + frame[:3, 3])
+        return replace(self, frame=frame, radius=radius, side=side)
+
 
 Tendon = tuple[Spot | Around, ...]
 

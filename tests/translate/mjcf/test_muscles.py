@@ -37,19 +37,21 @@ def test_fibers_and_tendons_keep_their_lengths(corpus):
 
 @pytest.mark.parametrize("activation", [0.0, 0.3, 1.0])
 def test_tension_is_mujocos(activation):
-    curves = Curves(0.2, 0.1, 500.0, 0.4, 1.7, 1.2)
-    numbers = f"0 1 500 200 {curves.lmin} {curves.lmax} 10 {curves.fpmax} 1.4"
+    curves = Curves(0.2, 0.1, 500.0, 0.4, 1.7, 1.5, 1.2, 0.1)
+    gain, bias = (" ".join(map(str, row)) for row in curves.numbers(10.0, 1.4))
     model = mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody><site name="a"/>
         <body><joint name="x" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="b"/></body>
         </worldbody><tendon><spatial name="t"><site site="a"/><site site="b"/></spatial></tendon>
         <actuator><general tendon="t" lengthrange="0.2 0.3" dyntype="none" gaintype="muscle" biastype="muscle"
-        gainprm="{numbers}" biasprm="{numbers}"/></actuator></mujoco>""")
+        gainprm="{gain}" biasprm="{bias}"/></actuator></mujoco>""")
     data, lengths, found = mujoco.MjData(model), np.linspace(0.22, 0.45, 40), []
     for length in lengths:
         data.qpos[0], data.ctrl[0] = length, activation
         mujoco.mj_forward(model, data)
         found.append(-data.actuator_force[0])
     np.testing.assert_allclose(curves.tension(lengths, activation), found, rtol=1e-12, atol=1e-9)
+    read = Curves.read(model.actuator_lengthrange[0], model.actuator_gainprm[0], model.actuator_biasprm[0])
+    assert read == pytest.approx(curves)
 
 
 def test_isometric_forces_are_near_and_nearer_if_fitted(corpus):
