@@ -100,7 +100,7 @@ class _Printer:
                     spec.name in present
                     or (default is not None and value != getattr(default, spec.name))
                     or (default is None and layout is not None and spec.name in layout.inherited)
-                    or (default is None and isinstance(spec.kind, Held) and has_content(value))
+                    or (default is None and isinstance(spec.kind, Held) and has_content(value, spec.kind.form))
                     # A part may start with a value that its class does not have elsewhere, as the axes of a transform.
                     or (default is None and not isinstance(spec.kind, Held) and value != spec.default == spec.default)
                 ):
@@ -194,16 +194,17 @@ class _Printer:
             self.lines.extend(f"{indent}<!--{text}-->" for text in texts)
 
 
-def has_content(value: Any) -> bool:
-    """Whether an object or list that no one assigned holds something all the same."""
+def has_content(value: Any, form: str = "") -> bool:
+    """Whether an object or list that no one assigned holds something all the same, by the form of its property."""
     if isinstance(value, list):
         return bool(value)
     if not isinstance(value, Object):
         return False
+    if form in ("list", "optional"):
+        # The member of a list is content even if nothing in it was set: a set of one marker at the origin has a marker.
+        return True
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True
-    # The member of a list is content even if nothing in it was set: a set of one marker at the origin has a marker.
     return any(
-        (isinstance(spec.kind, Held) and spec.kind.form in ("list", "optional")) or has_content(held)
-        for spec, held in value.objects_held()
+        has_content(held, spec.kind.form if isinstance(spec.kind, Held) else "") for spec, held in value.objects_held()
     )

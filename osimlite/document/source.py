@@ -128,6 +128,8 @@ class Source:
         if isinstance(self.spans, PlainSpans):
             yield from self.spans.inside(number)
             return
+        if number >= len(self.spans):
+            return  # The text ends within its tag.
         inner, end = number + 1, self.spans[number].end
         while inner < len(self._starts) and self._starts[inner] < end:
             yield inner

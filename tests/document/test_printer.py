@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 import osimlite
+from osimlite.document.reader import read_document
+from osimlite.document.source import Source
 from osimlite.errors import ModelError, OsimliteError
+from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactSphere
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint
@@ -135,3 +138,10 @@ def test_what_no_file_can_hold_is_refused(odd: str, tmp_path: Path) -> None:
         with pytest.raises(ModelError, match="no file can hold the last character of") as caught:
             osimlite.write(model, tmp_path / "m.osim")
         assert str(caught.value).isprintable() and not list(tmp_path.iterdir())
+
+
+def test_an_object_that_is_there_by_itself_is_printed_where_it_may_be_missing() -> None:
+    phase = osimlite.MocoPhase(name="phase")
+    text = osimlite.to_text(phase)
+    assert phase.model.model is not None and '<Model name="model">' in text
+    assert read_document(Source(text.encode()), of=Object).top.model.model == phase.model.model

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -74,6 +75,11 @@ def test_a_spoilt_text_has_findings_in_places_that_exist(seed):
         assert finding.line is not None and 1 <= finding.line <= len(lines) + 1
         assert finding.column is not None and finding.column >= 1
     assert render(report)
+
+
+def test_a_text_may_end_within_a_tag():
+    for match in re.finditer(r"<[A-Z][\w:]* na", TEXTS[0]):
+        assert validate(Source(TEXTS[0][: match.end()].encode(), "cut.osim")).errors
 
 
 @pytest.mark.parametrize(
