@@ -30,7 +30,8 @@ _REFUSED_OUTSIDE: Final = {
     "ForceVelocityCurve": "concentric_slope_at_vmax concentric_slope_near_vmax isometric_slope eccentric_slope_at_vmax "
     "eccentric_slope_near_vmax max_eccentric_velocity_force_multiplier concentric_curviness eccentric_curviness",
     "MocoControlGoal": "exponent",
-    "MocoDirectCollocationSolver": "num_mesh_intervals",
+    "MocoDirectCollocationSolver": "num_mesh_intervals optim_max_iterations optim_convergence_tolerance "
+    "optim_constraint_tolerance",
     "Millard2012EquilibriumMuscle": "optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
     "deactivation_time_constant minimum_activation maximum_pennation_angle",
     "MeyerFregly2016Muscle": "pennation_angle_at_optimal",

@@ -38,7 +38,7 @@ OTHER_PROJECTS = {
 }  # fmt: skip
 """Kinds of faults that, unless they are sure, may leave a project in which nothing shows that it was another."""
 
-TOLD = re.compile(r"OpenSim (ignores|keeps|takes|reads|makes|does not know)|no class of OpenSim")
+TOLD = re.compile(r"OpenSim (ignores|keeps|takes|reads|makes|does not know)|no class of OpenSim|becomes NaN")
 """What an error says that a part of a text is lost, of which nobody knows whether it was needed."""
 
 Ask = Callable[[Path, str, str], dict[str, Any]]

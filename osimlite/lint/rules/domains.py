@@ -269,7 +269,11 @@ def _is_rigid(item: Object) -> bool:
 
 
 def _test(domain: str) -> Callable[[float], bool]:
-    """The test that a domain such as ``"> 0"``, ``">= 1"`` or ``"0 to 1"`` stands for."""
+    """The test that a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"`` stands for."""
+    domain, _, besides = domain.partition(" or ")
+    if besides:
+        inside, alone = _test(domain), float(besides)
+        return lambda value: value == alone or inside(value)
     between = re.fullmatch(r"(\S+) to (\S+)", domain)
     if between:
         low, high = float(between[1]), float(between[2])

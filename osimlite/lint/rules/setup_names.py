@@ -44,6 +44,8 @@ WORDS = {
     "forces_to_exclude": {"ALL", "ACTUATORS", "MUSCLES"},
 }
 """What a property takes besides names."""
+_UNUSED = {"CMC_Joint": ("wrt_body", "express_body")}
+"""What a class has from its base and does not use."""
 _SETS = {"Marker": "/markerset", "Force": "/forceset"}
 """Where in the model stands what a tool adds to it; relative paths start there."""
 _SILENT = {
@@ -126,6 +128,8 @@ def unknown_name(setup: Setup, found: Found) -> None:
             text = text.rpartition("/")[2]
         elif what == "output" and kind.rule == "state-path" and not text.startswith("/"):
             text = f"/{text}"
+        if tag in _UNUSED.get(type(item).__name__, ()):
+            continue
         if what is None or not text or text in WORDS.get(tag, ()) or text.lower() == "unassigned":
             continue
         if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):

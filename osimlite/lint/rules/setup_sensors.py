@@ -65,8 +65,9 @@ def sensor_without_frame(setup: Setup, found: Found) -> None:
     """
     for item, tag, ending, table in _orientations(setup):
         file = getattr(item, tag)
-        held = table.entries.get("DataType")
-        if held is None or held.value.text != "Quaternion":
+        # OpenSim takes any key that has this in it.
+        held = [entry.value.text for key, entry in table.entries.items() if "DataType" in key]
+        if held[:1] != ["Quaternion"]:
             found(f"'{file}' must say DataType=Quaternion: OpenSim refuses it", item, tag=tag, severity=ERROR)
         base = getattr(item, "base_imu_label", "")
         if base and base not in table.columns:

@@ -57,11 +57,15 @@ def tool_setting(setup: Setup, found: Found) -> None:
         elif tool.accuracy == 0.0:
             found("an accuracy of 0 is never reached", tool, tag="accuracy", severity=WARNING)
     for tool in setup.named("AbstractTool"):
-        if not tool.integrator_error_tolerance > 0.0:
+        if not (tool.integrator_error_tolerance > 0.0 or is_of(tool, "AnalyzeTool")):
             found(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
-                tool, tag="integrator_error_tolerance",
+                tool, tag="integrator_error_tolerance", severity=None if is_of(tool, "ForwardTool") else WARNING,
             )  # fmt: skip
+        if is_of(tool, "RRATool") and not tool.force_set_files:
+            found(
+                f"{called(tool)} is given no forces that it could control: OpenSim fails", tool, tag="force_set_files"
+            )
         if tool.maximum_number_of_integrator_steps < 10:
             found(
                 f"the run ends after {tool.maximum_number_of_integrator_steps} steps",

@@ -85,6 +85,8 @@ def table_header(table: Table, found: Found) -> None:
                 found(
                     f"the header does not say '{key}': OpenSim refuses the table",
                     at=at, suggestion=near and key, fix=fix,
+                    # What is written for the newer reader is taken by it without a version too.
+                    severity=WARNING if "DataType" in table.entries else None,
                 )  # fmt: skip
 
 

@@ -97,7 +97,7 @@ class MocoSolver(Object, abstract=True):
 class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     """Makes a problem of many variables of a motion, by values at the nodes of a mesh."""
 
-    num_mesh_intervals: Annotated[int, Value("int", domain=">= 0")] = 100
+    num_mesh_intervals: Annotated[int, Value("int", domain="> 0")] = 100
     """Number of equal intervals of the mesh."""
     mesh: Annotated[Reals, reals()] = ()
     """Nodes of a mesh of unequal intervals, from 0 to 1."""
@@ -121,11 +121,11 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     """Whether accelerations are computed, or are variables."""
     optim_solver: Annotated[str, word("ipopt", "snopt")] = "ipopt"
     """The optimizer."""
-    optim_max_iterations: Integer = -1
+    optim_max_iterations: Annotated[int, Value("int", domain=">= 0 or -1")] = -1
     """How many iterations the optimizer may take; -1 for its own number."""
-    optim_convergence_tolerance: Number = -1.0
+    optim_convergence_tolerance: Annotated[float, real(domain="> 0 or -1")] = -1.0
     """How far the optimizer goes; -1 for its own number."""
-    optim_constraint_tolerance: Number = -1.0
+    optim_constraint_tolerance: Annotated[float, real(domain="> 0 or -1")] = -1.0
     """How well constraints are met; -1 for the optimizer's own number."""
     optim_hessian_approximation: Annotated[str, word("limited-memory", "exact")] = "limited-memory"
     """Where the optimizer has second derivatives from."""

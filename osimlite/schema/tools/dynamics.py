@@ -69,7 +69,7 @@ class AbstractTool(Object, abstract=True):
     """Whether muscles are brought into equilibrium before the run."""
     maximum_number_of_integrator_steps: LegacyInteger = 20000
     """How many steps the integrator may take."""
-    maximum_integrator_step_size: LegacyNumber = 1.0
+    maximum_integrator_step_size: Annotated[float, real(domain="> 0", legacy=True)] = 1.0
     """Longest step of the integrator, in seconds."""
     minimum_integrator_step_size: LegacyNumber = 1e-8
     """Shortest step of the integrator, in seconds."""

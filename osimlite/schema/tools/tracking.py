@@ -123,7 +123,7 @@ class CMCTool(AbstractTool):
     """Controls that RRA computed, around which those of the residuals are kept."""
     lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the motion; negative for no filter."""
-    cmc_time_window: Annotated[float, real("s", legacy=True)] = 0.01
+    cmc_time_window: Annotated[float, real("s", "> 0", legacy=True)] = 0.01
     """Time that muscles are given to come to the force that is asked for."""
     use_fast_optimization_target: LegacyFlag = True
     """Whether accelerations must be met exactly; it is faster, and fails where they cannot be."""
@@ -133,7 +133,7 @@ class CMCTool(AbstractTool):
     """Step of the optimizer's numerical derivatives."""
     optimization_convergence_tolerance: LegacyNumber = 1e-4
     """How far the optimizer goes."""
-    optimizer_max_iterations: LegacyInteger = 1000
+    optimizer_max_iterations: Annotated[int, Value("int", domain="> 0", legacy=True)] = 1000
     """How many iterations the optimizer may take."""
     optimizer_print_level: LegacyInteger = 0
     """How much the optimizer prints, from 0 to 3."""
