@@ -94,6 +94,14 @@ def translate(
             rich_help_panel="MJCF",
         ),
     ] = None,
+    driver: Annotated[
+        bool | None,
+        typer.Option(
+            "--driver",
+            help="Write what osimlite.mjcf.Driver moves with OpenSim's own laws; without it the file has no forces.",
+            rich_help_panel="MJCF",
+        ),
+    ] = None,
 ) -> None:
     """Translate a model: writes its text, its meshes and fidelity.json.
 
@@ -120,7 +128,7 @@ def translate(
             to_urdf,
             {"limits": limits, "merge": merge, "collision": collision, "effort": effort, "velocity": velocity},
         ),
-        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact, "fit": fit, "spline": spline}),
+        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact, "fit": fit, "spline": spline, "driver": driver}),
     }
     if to not in formats:
         raise OsimliteError(f"--to is 'urdf' or 'mjcf', not '{to}'")

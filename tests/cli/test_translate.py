@@ -76,6 +76,22 @@ def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
     ]
 
 
+def test_translate_writes_mjcf_and_its_account(walker: Path) -> None:
+    code, out, _ = run("translate", "walker.osim", "--to", "mjcf", "-o", "native", folder=walker)
+    assert code == 0 and "worst error" in out
+    account = json.loads((walker / "native/fidelity.json").read_text())
+    limits = [record for record in account["records"] if record["kind"] == "limit-force"]
+    assert account["target"] == "mjcf 4" and {record["how"] for record in limits} == {"approximate"}
+    assert set(limits[0]["errors"]) == {"force", "damping"} and limits[0]["errors"]["force"]["unit"] == "N m"
+    code, _, _ = run("translate", "walker.osim", "--to", "mjcf", "--driver", "-o", "driven", folder=walker)
+    assert code == 0
+    assert sorted(path.name for path in (walker / "driven").iterdir() if path.is_file()) == [
+        "fidelity.json",
+        "walker.osim",
+        "walker.xml",
+    ]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

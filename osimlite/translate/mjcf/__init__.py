@@ -1,6 +1,6 @@
 """MJCF, the models of MuJoCo.
 
-A translation is a list of passes over a `Draft` (`export.PASSES`): each takes what it can say of the model, adds
+A translation is a list of passes over a `Draft` (in `export`): each takes what it can say of the model, adds
 elements to the draft and accounts for the components in the draft's fidelity. What no pass speaks of is left out by
 name at the end. A kind of thing is added as one function in a module of its own, and one place in the list.
 

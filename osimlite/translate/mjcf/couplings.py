@@ -64,7 +64,8 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
     own, function = lead.line.inverse(), driver.function
     low, high = span(function, info.range, info.default_value)
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
-    fit = quartic(function if own == (1.0, 0.0) else Composed(function, Linear(*own)), (first, last), unit)
+    exact = function if own == (1.0, 0.0) else Composed(function, Linear(*own))
+    fit = quartic(exact, (first, last), unit)
     follower, done = Follower(lead.joint, fit.coefficients), "a quartic, fitted"
     if fit.error is not None and draft.options.spline == "series":
         drive, (outer,) = composition([function], (low, high))
@@ -74,7 +75,9 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
         x = np.linspace(low, high, 400)
         fit = Fit((), Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sampled(function, x), unit))
     draft.follow(joint.name, follower)
-    if fit.error is not None:
+    if fit.error is not None and draft.options.driver:
+        draft.functions[joint.name] = exact
+    elif fit.error is not None:
         draft.fidelity.add(
             "function",
             whose,

@@ -12,6 +12,7 @@ import numpy as np
 from lxml.etree import Element, SubElement, _Element
 
 from osimlite.errors import ModelError, SimulationError
+from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, StationPlacement
 from osimlite.multibody.spatial import Array
 from osimlite.robot.lines import Line
@@ -51,6 +52,7 @@ class Options:
         contact: whether contact forces become contacts of MuJoCo's own law, or nothing.
         fit: what is fitted: nothing, what tendons go around, or that and the forces of muscles.
         spline: what a joint follows that is no polynomial: one quartic, or a quartic of a quartic.
+        driver: whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces itself.
     """
 
     version: Version = 4
@@ -58,6 +60,7 @@ class Options:
     contact: Contact = "native"
     fit: Fit = "none"
     spline: Spline = "quartic"
+    driver: bool = False
 
 
 class Lead(NamedTuple):
@@ -97,6 +100,7 @@ class Draft:
         robot: its mechanism as one-axis joints; locked coordinates are fixed joints.
         fidelity: the account; a pass puts components into `translated`, and what is lost into records.
         options: what the user chooses.
+        folder: where the model's file is, and the files that it names.
         mesh_files: takes up the mesh files that the text names.
         root: the element ``<mujoco>``.
         bodies: the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
@@ -104,6 +108,7 @@ class Draft:
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
         helpers: those of them that move nothing, but are what others follow.
+        functions: that a joint exactly is of the joint that it follows, by name, where the polynomial is fitted.
         starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
         tendons: of paths, by the absolute path of their owners.
         activations: at the start, of the actuators that have one, by name.
@@ -113,6 +118,7 @@ class Draft:
     robot: Robot
     fidelity: Fidelity
     options: Options
+    folder: Path | None
     mesh_files: MeshFiles
     root: _Element = field(default_factory=lambda: Element("mujoco"))
     bodies: dict[int, _Element] = field(default_factory=dict)
@@ -123,6 +129,7 @@ class Draft:
     tendons: dict[str, Tied] = field(default_factory=dict)
     activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)
+    functions: dict[str, Function] = field(default_factory=dict)
     _names: dict[str, set[str]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 

@@ -10,9 +10,11 @@ from lxml.etree import Comment, _Comment, tostring
 from numpy.polynomial.polynomial import polyval
 
 from osimlite import __version__
+from osimlite.document.printer import to_text
 from osimlite.errors import SettingError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Values
 from osimlite.robot.build import build_robot
 from osimlite.robot.mesh_files import MeshFiles
@@ -28,26 +30,19 @@ from osimlite.translate.mjcf.contacts import add_contacts
 from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import Contact, Draft, Fit, Follower, Lead, Options, Spline, Version, add
+from osimlite.translate.mjcf.driven import add_driven
 from osimlite.translate.mjcf.forces import add_forces
 from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.paths import add_paths
 from osimlite.translate.mjcf.scenery import add_markers, add_shapes
 from osimlite.translate.survey import account_for_rest
 
-PASSES: tuple[Callable[[Draft], None], ...] = (
-    add_bodies,
-    add_couplings,
-    add_coordinates,
-    add_constraints,
-    add_contacts,
-    add_paths,
-    add_forces,
-    add_shapes,
-    add_markers,
-    add_frames,
-    add_keyframe,
-)
-"""What makes a file of a model, in this order: bodies and joints come before what is fixed to them or acts on them."""
+Pass = Callable[[Draft], None]
+
+MECHANISM: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
+LAWS: tuple[Pass, ...] = (add_contacts, add_paths, add_forces)
+LOOKS: tuple[Pass, ...] = (add_shapes, add_markers, add_frames, add_keyframe)
+"""What makes a file of a model, in this order: bodies and joints come before what acts on them or is fixed to them."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +54,9 @@ class Mjcf:
         text: the MJCF.
         fidelity: what became of every component, exact where there is no record of it.
         robot: the neutral robot that was written; its joints and links have MuJoCo's names.
-        files: mesh files that the text names, by name relative to it.
+        files: mesh files that the text names, and what the driver needs, by name relative to it.
         followers: what equality constraints make of joints, by name.
+        functions: what the driver makes of them, by name: functions of the joint that is followed.
         leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
     """
 
@@ -71,6 +67,7 @@ class Mjcf:
     files: dict[str, bytes] = field(default_factory=dict)
     leads: Mapping[int, Lead] = field(default_factory=dict)
     followers: Mapping[str, Follower] = field(default_factory=dict)
+    functions: Mapping[str, Function] = field(default_factory=dict)
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
@@ -104,6 +101,7 @@ def to_mjcf(
     contact: Contact = "native",
     fit: Fit = "none",
     spline: Spline = "quartic",
+    driver: bool = False,
     folder: str | Path | None = None,
     geometry: Sequence[str | Path] = (),
     name: str | None = None,
@@ -121,6 +119,8 @@ def to_mjcf(
             curves and lengths of muscles to their isometric forces too; ``"none"`` keeps all numbers of the model.
         spline: ``"quartic"`` fits one quartic to a function that is none, ``"series"`` a quartic of a quartic, which
             takes a helper joint for each and is about twice as close.
+        driver: write the file that `osimlite.mjcf.Driver` moves, which has no forces: the driver computes them from
+            the model, of which a copy is among the files.
         folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
         geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
             separated as in PATH, follow them.
@@ -141,27 +141,30 @@ def to_mjcf(
         raise SettingError(f"spline is 'quartic' or 'series', not '{spline}'")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
-    mesh_files = MeshFiles(MeshFolders(None if folder is None else Path(folder), [Path(place) for place in geometry]))
+    place = None if folder is None else Path(folder)
+    mesh_files = MeshFiles(MeshFolders(place, [Path(each) for each in geometry]))
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
     robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
-    draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact, fit, spline), mesh_files)
+    draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact, fit, spline, driver), place, mesh_files)
     _add_settings(draft)
     fidelity.translated["/"] = f"mujoco {mechanism.name}"
-    for make in PASSES:
+    for make in (*MECHANISM, *((add_driven,) if driver else LAWS), *LOOKS):
         make(draft)
     account_for_rest(draft.tree, fidelity)
     for section in list(draft.root):
         if not section.attrib and not len(section) and not isinstance(section, _Comment):
             draft.root.remove(section)
+    name = legal(model.name or "model") if name is None else name
     text = tostring(draft.root, pretty_print=True, xml_declaration=True, encoding="utf-8").decode()
     return Mjcf(
-        legal(model.name or "model") if name is None else name,
+        name,
         text,
         fidelity,
         robot,
-        mesh_files.files,
+        mesh_files.files | ({f"{name}.osim": to_text(model).encode()} if driver else {}),
         draft.leads,
         draft.followers,
+        draft.functions,
     )
 
 
