@@ -17,7 +17,10 @@ TEXTS["model.osim"] = gzip.decompress((SETUPS / "model.osim.gz").read_bytes()).d
 
 
 class Fault(NamedTuple):
-    """Replace a text of a file by another. The finding is in the line where that is, or where another text is."""
+    """Replace a text of a file by another. The finding is in the line where that is, or where another text is.
+
+    What else is changed is told before it.
+    """
 
     number: int | str
     file: str
@@ -25,6 +28,7 @@ class Fault(NamedTuple):
     new: str
     found_in: str = ""
     line_of: str = ""
+    also: tuple[tuple[str, str, str], ...] = ()
 
 
 def line(name: str, beginning: str) -> str:
@@ -108,8 +112,28 @@ def constraint(tag: str, text: str) -> str:
     return f'</goals><path_constraints><{tag} name="d">{text}</{tag}></path_constraints>'
 
 
+PATHS = re.sub(r"(?<=\t)(\w+)", r"/jointset/j/\1/value", LABELS)
+BARE = re.sub(r"</?OpenSimDocument.*\n", "", TEXTS["ik.xml"])
+NEVER_SEEN = re.sub(r"(?m)^(\d+\t[\d.]+)(\t[^\t]*){3}", r"\1\tNaN\tNaN\tNaN", TEXTS["walk.trc"])
+TOO_FEW = re.sub(r"(<IK\w+Task name=\"(?!Sternum|R.ASIS|L.ASIS)[^>]*>\s*<apply>)true", r"\1false", TEXTS["ik.xml"])
+STATES = "\n".join(["states", "version=1", "nRows=61", "nColumns=11", "inDegrees=no", "endheader", LABELS, *COORDS])
+PRESCRIBED = """<OpenSimDocument Version="30000"><ForceSet name="loads"><objects>
+    <PrescribedForce name="push"><body>calcn_r</body></PrescribedForce>
+</objects></ForceSet></OpenSimDocument>"""
+
+KNEE, HIP = (
+    part("model.osim", f'<Coordinate name="{name}">.*?</Coordinate>') for name in ("knee_angle_r", "hip_flexion_l")
+)
+CLAMPED = KNEE.replace("<clamped>false", "<clamped>true").replace("-2.0943950999999998 0.17453293", "0 0.01")
+LOCKED = KNEE.replace("<locked>false", "<locked>true")
+MARKERS = part("model.osim", "<MarkerSet .*?</MarkerSet>")
+GROUPS = part("model.osim", r"<groups />\s*</ForceSet>")
+GROUPED = '<groups><ObjectGroup name="some"><members>soleus_r</members></ObjectGroup></groups></ForceSet>'
+
 FAULTS = [
     # Any setup
+    Fault(1, "ik.xml", "every:InverseKinematicsTool", "AnalyzeTool"),
+    Fault(5, "ik.xml", 'Version="40600"', 'Version="20201"', "", "<InverseKinematicsTool"),
     Fault(0, "ik.xml", "<InverseKinematicsTool>", "<InverseKinemtaticsTool>"),
     Fault(4, "ik.xml", 'Version="40600"', 'Version="four"'),
     Fault(6, "ik.xml", "<accuracy>1e-005</accuracy>", "<acuracy>1e-005</acuracy>"),
@@ -164,7 +188,15 @@ FAULTS = [
     Fault(53, "ik.xml", "<results_directory>./", "<results_directory>not/there"),
     Fault(54, "ik.xml", "<output_motion_file>ik_out.mot", "<output_motion_file>nothere/ik_out.mot"),
     Fault(55, "ik.xml", "<output_motion_file>ik_out.mot", "<output_motion_file>"),
+    Fault(56, "ik.xml", "model.osim", "model.osim", "", 'IKCoordinateTask name="knee_angle_r"',
+          (("model.osim", KNEE, CLAMPED),)),
+    Fault(282, "ik.xml", "model.osim", "model.osim", "", 'IKCoordinateTask name="knee_angle_r"',
+          (("model.osim", KNEE, LOCKED),)),
+    Fault(283, "ik.xml", "model.osim", "model.osim", "", "<coordinate_file>",
+          (("model.osim", HIP, HIP.replace("<locked>false", "<locked>true")),)),
+    Fault(284, "ik.xml", TEXTS["ik.xml"], TOO_FEW, "", "<IKTaskSet>"),
     # Markers
+    Fault(77, "walk.trc", TEXTS["walk.trc"], NEVER_SEEN, "", "Frame#"),
     Fault(57, "walk.trc", "\tmm\t", "\tm\t"),
     Fault(58, "walk.trc", "\tmm\t", "\t\t"),
     Fault(59, "walk.trc", "\tmm\t", "\tmillimetres\t"),
@@ -273,6 +305,9 @@ FAULTS = [
     Fault(298, "loads.xml", "applied_to_body>calcn_r</applied_to_body", "aplied_to_body>calcn_r</aplied_to_body"),
     Fault(299, "loads.xml", ">calcn_r<", ">femur_l_offset<"),
     # Inverse dynamics
+    Fault(137, "id.xml", ">loads.xml<", ">Unassigned<"),
+    Fault(166, "id.xml", "> Muscles<", ">soleus_r<", also=(("model.osim", GROUPS, GROUPED),)),
+    Fault(177, "id.xml", ">Results<", ">/proc/nowhere<"),
     Fault(162, "id.xml", "model.osim", "nomodel.osim"),
     Fault(163, "id.xml", "> Muscles<", ">nosuch<"),
     Fault(164, "id.xml", "> Muscles<", "><"),
@@ -291,6 +326,14 @@ FAULTS = [
     Fault(179, "id.xml", ">subject01_walk_ID.sto<", ">out/id.sto<"),
     Fault(302, "coords.mot", LABELS, LABELS.replace("\t", "\t/jointset/j/"), "id.xml", "<coordinates_file>"),
     # Analyses
+    Fault(184, "so.xml", ">reserves.xml<", "><", "", "<StaticOptimization"),
+    Fault(206, "so.xml", ">loads.xml<", "><"),
+    Fault(209, "so.xml", "coordinates>6<", "coordinates>-1<"),
+    Fault(220, "so.xml", "<point_name>knee", "<point_name>"),
+    Fault(231, "so.xml", "states>true<", "states>false<"),
+    Fault(331, "loads.xml", TEXTS["loads.xml"], PRESCRIBED, "so.xml", "<external_loads_file>"),
+    Fault(306, "forward.xml", "<states_file />", "<states_file>coords.mot</states_file>",
+          also=(("coords.mot", TEXTS["coords.mot"], STATES),)),
     Fault(180, "so.xml", ">reserves.xml<", ">noreserve.xml<"),
     Fault(181, "reserves.xml", "<coordinate>hip_flexion_r<", "<coordinate>hip_flexion_rx<"),
     Fault(182, "reserves.xml", "<body>pelvis<", "<body>pelvus<"),
@@ -340,6 +383,8 @@ FAULTS = [
     Fault(304, "so.xml", "<results_directory>results", "<results_directory>not/there"),
     Fault(305, "so.xml", ">reserves.xml<", ">reserves.xml other.xml<"),
     # Scaling
+    Fault(234, "scale.xml", "markers.xml", "Unassigned", also=(("model.osim", MARKERS, ""),)),
+    Fault(255, "scale.xml", "<mass>72.6", "<mass>-1"),
     Fault(232, "scale.xml", "model.osim", "nomodel.osim"),
     Fault(233, "scale.xml", "markers.xml", "nomarkers.xml"),
     Fault(235, "markers.xml", "/bodyset/torso", "/bodyset/trunk"),
@@ -461,14 +506,25 @@ STUDIES = [
 """More that OpenSim refuses in a study."""
 
 HARMLESS = [
+    Fault(2, "ik.xml", TEXTS["ik.xml"], BARE),
+    Fault(3, "ik.xml", 'Version="40600"', 'Version="99999"'),
+    Fault(153, "loads.xml", ">ground_torque_<", "><"),
+    Fault(156, "loads.xml", "<data_source_name>Unassigned", "<data_source_name>other.mot"),
+    Fault(165, "id.xml", "> Muscles<", ">ALL<"),
+    Fault(223, "so.xml", "list>all</moment", "list> all </moment"),
+    Fault(288, "loads.xml", ">1_ground_torque_<", "><"),
+    Fault(291, "loads.xml", ">ground_force_v<", "> ground_force_v <"),
+    Fault(295, "grf.mot", "inDegrees=yes", "inDegrees=no"),
+    Fault(301, "id.xml", "> Muscles<", ">some<", also=(("model.osim", GROUPS, GROUPED),)),
+    Fault(303, "coords.mot", LABELS, PATHS, "so.xml"),
+    Fault(281, "ik.xml", "model.osim", "./model.osim"),
+    Fault(327, "so.xml", "coords.mot", "./coords.mot"),
     Fault(18, "ik.xml", "<IKTaskSet>", "<!-- Z\u00fcrich --><IKTaskSet>"),
     Fault(52, "ik.xml", "<constraint_weight>Inf", "<constraint_weight>20"),
     Fault(70, "walk.trc", f"\n\n{TRC[0]}", f"\n{TRC[0]}"),
     Fault(71, "walk.trc", "every:\n", "\r\n"),
-    Fault(74, "walk.trc", TRC[20], "\t".join([*TRC[20].split("\t")[:5], "", "", "", *TRC[20].split("\t")[8:]])),
-    Fault(
-        76, "walk.trc", TRC[20], "\t".join([*TRC[20].split("\t")[:5], "NaN", "NaN", "NaN", *TRC[20].split("\t")[8:]])
-    ),
+    Fault(74, *unseen(20, "")),
+    Fault(76, *unseen(20, "NaN")),
     Fault(102, "coords.mot", "inDegrees=yes", "inDegrees = yes"),
     Fault(112, *without("coords.mot", "version")),
     Fault(113, "coords.mot", "version=1", "version=3"),
@@ -478,11 +534,25 @@ HARMLESS = [
     Fault(143, "loads.xml", ">calcn_r<", ">/bodyset/calcn_r<"),
     Fault(258, "scale.xml", "<preserve_mass_distribution>true", "<preserve_mass_distribution>false"),
 ]
-"""What OpenSim takes, with the same results."""
+"""What OpenSim takes, with the same results; or that is for a user to choose (301: forces of a group do not act)."""
+
+UNTOLD = {
+    19: "there is no file; the program says so",
+    267: "no file says that the motion was to start elsewhere than in the default pose of the model",
+    325: "the folder that OpenSim runs in is another",
+    326: "the folder that OpenSim runs in is another",
+    328: "the folder that OpenSim runs in is another",
+    329: "the folder that OpenSim runs in is another",
+}
+"""What the files do not tell."""
 
 
 def put_in(folder: Path, fault: Fault) -> int:
     """Change the file, and return the line of the change."""
+    for name, old, new in fault.also:
+        text = (folder / name).read_text()
+        assert old in text, f"'{old}' is not in {name}"
+        (folder / name).write_text(text.replace(old, new, 1))
     path = folder / fault.file
     text = path.read_bytes().decode()
     if fault.number == 92:

@@ -8,7 +8,7 @@ import pytest
 
 from osimlite.lint.engine import run, subject_of
 from osimlite.lint.suffixes import is_document, is_table
-from tests.lint.setup_faults import FAULTS, HARMLESS, STUDIES, TEXTS, Fault, put_in
+from tests.lint.setup_faults import FAULTS, HARMLESS, STUDIES, TEXTS, UNTOLD, Fault, put_in
 
 
 @pytest.fixture(scope="module")
@@ -69,4 +69,9 @@ def test_a_model_may_be_named_by_its_absolute_path(pipeline):
 @pytest.mark.parametrize("fault", HARMLESS, ids=lambda fault: str(fault.number))
 def test_what_is_harmless_is_not_found(pipeline, fault):
     put_in(pipeline, fault)
-    assert checked(*sorted(pipeline.iterdir())) == []
+    assert checked(*([pipeline / fault.found_in] if fault.found_in else sorted(pipeline.iterdir()))) == []
+
+
+def test_every_fault_of_the_table_is_accounted_for():
+    numbers = {fault.number for fault in [*FAULTS, *HARMLESS] if isinstance(fault.number, int)}
+    assert sorted(numbers | UNTOLD.keys()) == [*range(332)]

@@ -9,6 +9,7 @@ from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import nearest_name
+from osimlite.schema.states import variables
 from osimlite.text import listed
 
 
@@ -18,7 +19,8 @@ def missing_column(setup: Setup, found: Found) -> None:
 
     ## What it does
     Compares the columns of a table of coordinates with the coordinates of the model: inverse dynamics takes plain names
-    alone, analyses take paths too. A task whose value is to come from a file needs its column there.
+    alone, analyses take paths too. A task whose value is to come from a file needs its column there, and a table of
+    states one for every state of the model.
 
     ## Why is this bad
     OpenSim gives a coordinate without a column its default value, without a word or with a line in the log: the motion
@@ -79,6 +81,12 @@ def missing_column(setup: Setup, found: Found) -> None:
                 "OpenSim leaves the column out",
                 item, tag="states_file",
             )  # fmt: skip
+        lacking = _lacking_states(setup, states) if states is not None and states.labels else []
+        if lacking:
+            found(
+                f"'{item.states_file}' has no column for {listed(lacking)}: OpenSim takes the default value",
+                item, tag="states_file",
+            )  # fmt: skip
     for user in setup.having("ik_task_set"):
         for task in members(user.ik_task_set, "IKCoordinateTask"):
             if task.apply and task.value_type == "from_file":
@@ -107,6 +115,19 @@ def _is_state(setup: Setup, column: str) -> bool:
             setup.tree.walk(path, "", "Component").target is not None or path.rpartition("/")[2] in setup.tree.by_name
         )
     return column.partition(".")[0].removesuffix("_u") in setup.tree.by_name
+
+
+def _lacking_states(setup: Setup, table: Table) -> list[str]:
+    """The states of the model that no label of a table names: by its path, the end of it, or in the old way."""
+    columns = set(table.columns)
+    ends = {"/".join(column.split("/")[-2:]) for column in columns}
+    lacking = []
+    for path in variables(setup.tree, "state variable") if setup.tree is not None else ():
+        owner, state = path.split("/")[-2:]
+        old = {"value": owner, "speed": f"{owner}_u"}.get(state, f"{owner}.{state}")
+        if f"{owner}/{state}" not in ends and old not in columns:
+            lacking.append(path)
+    return lacking
 
 
 def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:

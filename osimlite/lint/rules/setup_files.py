@@ -8,6 +8,7 @@ from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import NOTHING, UNGIVEN, Naming, Setup, is_of
 from osimlite.lint.suffixes import is_table
 from osimlite.lint.words import called
+from osimlite.schema.base import Object
 from osimlite.schema.fields import Reference
 
 _NEEDED = {
@@ -23,6 +24,13 @@ _NEEDED = {
     "ExternalLoads": ("datafile",),
 }
 """Without which files OpenSim refuses a tool, or crashes."""
+
+_SHARED = {
+    "external_loads_file": "applies the loads of {}",
+    "lowpass_cutoff_frequency_for_coordinates": "filters at {:g} Hz",
+    "lowpass_cutoff_frequency": "filters at {:g} Hz",
+}
+"""Settings that should be those of all tools that are given the same motion."""
 
 
 @rule("OSIM821", "missing-input", severity=ERROR, mends="safe", about="document")
@@ -192,6 +200,11 @@ def lost_output(setup: Setup, found: Found) -> None:
                 f"of '{naming.name}' OpenSim makes the last folder only: its results are lost",
                 naming.item, tag=naming.spec.tag,
             )  # fmt: skip
+        elif os.path.isabs(naming.name) and not os.path.isdir(naming.name):
+            found(
+                f"'{naming.name}' is not there: if OpenSim may not make it, the results are lost", naming.item,
+                tag=naming.spec.tag, severity=INFO,
+            )  # fmt: skip
     # A tool makes its own folder before it writes.
     made = {os.path.normpath(naming.name) for naming in setup.named_files("output-folder")}
     for naming in setup.named_files("output-file"):
@@ -221,3 +234,67 @@ def lost_output(setup: Setup, found: Found) -> None:
         )
         if tag is not None and not getattr(item, tag).strip():
             found(f"{called(item)} names no {tag}: its results get no proper file", item, tag=tag)
+
+
+@rule("OSIM824", "tools-differ", severity=INFO, about="document")
+def tools_differ(setup: Setup, found: Found) -> None:
+    """A tool leaves out what another tool takes into account for the same motion.
+
+    ## What it does
+    Compares a tool with all others in its folder that are given the same file of coordinates: whether they have
+    measured loads, and whether they filter the motion.
+
+    ## Why is this bad
+    Joint moments without the ground, or muscle forces from a motion that is not filtered, are results like any others,
+    and do not fit those of the other tool.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <time_range>0 0.5</time_range>
+            <coordinates_file>motion.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseDynamicsTool name="id">
+            <model_file>leg.osim</model_file>
+            <time_range>0 0.5</time_range>
+            <external_loads_file>leg_grf.xml</external_loads_file>
+            <coordinates_file>motion.mot</coordinates_file>
+        </InverseDynamicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    if setup.tool is None or setup.tool[1] is not setup.top or not (mine := _motion_of(*setup.tool)):
+        return
+    here = os.path.realpath(setup.tool[0])
+    told: set[str] = set()
+    for file, other in setup.neighbours:
+        place = os.path.realpath(file)
+        if place == here or os.path.dirname(place) != os.path.dirname(here) or _motion_of(file, other) != mine:
+            continue
+        for tag, what in _SHARED.items():
+            one, two = (getattr(tool, tag, None) for tool in (setup.top, other))
+            if one is not None and two is not None and _says(two) and not _says(one) and tag not in told:
+                told.add(tag)
+                found(
+                    f"'{os.path.basename(file)}' {what.format(two)} for the same motion, this tool does not",
+                    setup.top, tag=tag,
+                )  # fmt: skip
+
+
+def _motion_of(file: str, tool: Object) -> str:
+    """Where the coordinates are that a tool is given."""
+    name = getattr(tool, "coordinates_file", getattr(tool, "desired_kinematics_file", "")).strip()
+    return "" if name.lower() in NOTHING else os.path.realpath(os.path.join(os.path.dirname(file), name))
+
+
+def _says(value: str | float) -> bool:
+    """Whether a setting is not left at nothing."""
+    return value.strip().lower() not in NOTHING if isinstance(value, str) else value > 0.0

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from typing import Any
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.posture import angles_of
 from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.words import called
+from osimlite.text import listed
 
 
 @rule("OSIM851", "task-weight", severity=ERROR, about="document")
@@ -64,3 +68,93 @@ def task_weight(setup: Setup, found: Found) -> None:
                     f"the value of {called(task)} is {task.value:g}, and is in radians or metres", task, tag="value",
                     severity=WARNING,
                 )  # fmt: skip
+
+
+@rule("OSIM854", "unreachable-task", severity=WARNING, about="document")
+def unreachable_task(setup: Setup, found: Found) -> None:
+    """A coordinate that is to be fitted cannot move, or not there.
+
+    ## What it does
+    Looks for tasks of locked coordinates, for values of which most are outside the range of a clamped coordinate, and
+    for locked coordinates that move in the file of values.
+
+    ## Why is this bad
+    Inverse kinematics keeps a locked coordinate where the model has it, and a clamped one in its range, without a word:
+    knees stay straight, and other joints bend in their place.
+
+    ## Example
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>clamped.osim</model_file>
+            <marker_file>leg.trc</marker_file>
+            <output_motion_file>ik.mot</output_motion_file>
+            <IKTaskSet>
+                <objects>
+                    <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                    <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+                    <IKCoordinateTask name="knee_angle">
+                        <weight>1</weight> <value_type>manual_value</value_type> <value>1</value>
+                    </IKCoordinateTask>
+                </objects>
+            </IKTaskSet>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+
+    ## Use instead
+    ```setup
+    <OpenSimDocument Version="40600">
+        <InverseKinematicsTool name="ik">
+            <model_file>clamped.osim</model_file>
+            <marker_file>leg.trc</marker_file>
+            <output_motion_file>ik.mot</output_motion_file>
+            <IKTaskSet>
+                <objects>
+                    <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                    <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+                    <IKCoordinateTask name="knee_angle">
+                        <weight>1</weight> <value_type>manual_value</value_type> <value>-1</value>
+                    </IKCoordinateTask>
+                </objects>
+            </IKTaskSet>
+        </InverseKinematicsTool>
+    </OpenSimDocument>
+    ```
+    """
+    coordinates: dict[str, Any] = {} if setup.tree is None else setup.tree.of_class("Coordinate")
+    angles = angles_of(setup)
+    for user in setup.having("ik_task_set", "coordinate_file"):
+        table = setup.table(user.coordinate_file)
+        given: dict[str, list[float]] = {}
+        for place, column in enumerate(table.columns if table is not None else (), 1):
+            # Whatever the header says, this file is taken to be in degrees.
+            turn = math.pi / 180.0 if column in angles else 1.0
+            rows = table.rows.samples if table is not None else []
+            given[column] = [row[place] * turn for row in rows if place < len(row) and row[place] == row[place]]
+        for task in user.ik_task_set.objects:
+            coordinate = coordinates.get(task.name)
+            if coordinate is None or not is_of(task, "IKCoordinateTask") or not task.apply:
+                continue
+            values = {"manual_value": [task.value], "from_file": given.pop(task.name, [])}.get(task.value_type, [])
+            low, high = coordinate.range
+            outside = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
+            if coordinate.locked:
+                found(f"{called(coordinate)} is locked: the task moves nothing", task, attribute="name")
+            elif coordinate.clamped and 2 * outside > len(values):
+                found(
+                    f"most values for {called(coordinate)} are outside the range from {low:.4g} to {high:.4g} that it "
+                    "is clamped to",
+                    task, attribute="name",
+                )  # fmt: skip
+        still = [
+            name
+            for name, values in given.items()
+            if values and name in coordinates and coordinates[name].locked and max(values) - min(values) > 0.1
+        ]
+        if still:
+            found(
+                f"{listed(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and moves in "
+                f"'{user.coordinate_file}'",
+                user, tag="coordinate_file",
+            )  # fmt: skip

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from typing import Any
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import NOTHING, UNGIVEN, Setup, is_of, members
 from osimlite.lint.words import called, nearest_name
+from osimlite.text import listed
 
 
 @rule("OSIM852", "tool-setting", severity=ERROR, mends="unsafe", about="document")
@@ -16,8 +18,9 @@ def tool_setting(setup: Setup, found: Found) -> None:
 
     ## What it does
     Looks for accuracies and error tolerances that are not positive or far too large, tools without an analysis,
-    analyses with one name, that are off, or whose step is not positive, static optimization without the model's forces
-    or with an exponent of 1 or less, forces that replace those of the model, and controllers that are off.
+    analyses with one name, that are off, or whose step is not positive, static optimization without the model's forces,
+    without an actuator for the joint to ground, or with an exponent of 1 or less, muscles that are analyzed without
+    being in equilibrium, forces that replace those of the model, and controllers that are off.
 
     ## Why is this bad
     Some make OpenSim crash or run for ever, some give other results without a word.
@@ -97,6 +100,12 @@ def tool_setting(setup: Setup, found: Found) -> None:
                 severity=WARNING,
             )  # fmt: skip
         if is_of(analysis, "StaticOptimization"):
+            carrying = _carried_by_none(setup)
+            if carrying:
+                found(
+                    f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails", analysis,
+                    severity=WARNING,
+                )  # fmt: skip
             if not analysis.use_model_force_set:
                 found("without the forces of the model OpenSim crashes", analysis, tag="use_model_force_set")
             if not analysis.activation_exponent > 1.0:
@@ -117,6 +126,19 @@ def tool_setting(setup: Setup, found: Found) -> None:
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
                 found(f"{called(analysis)} names no {what}: nothing is written", analysis, tag=tag, severity=WARNING)
+        if is_of(analysis, "PointKinematics") and not analysis.point_name.strip():
+            found("results of a point without a name get no proper file", analysis, tag="point_name", severity=WARNING)
+        if is_of(analysis, "MuscleAnalysis") and analysis.on:
+            for tool in setup.named("AnalyzeTool"):
+                if (
+                    tool.coordinates_file.strip().lower() not in NOTHING
+                    and not tool.solve_for_equilibrium_for_auxiliary_states
+                ):
+                    found(
+                        "coordinates tell nothing of fibers, which stay at their default lengths: "
+                        "solve_for_equilibrium_for_auxiliary_states is false",
+                        tool, tag="solve_for_equilibrium_for_auxiliary_states", severity=WARNING,
+                    )  # fmt: skip
         if is_of(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
                 if word not in ("child", "parent"):
@@ -141,6 +163,24 @@ def tool_setting(setup: Setup, found: Found) -> None:
     for controller in setup.named("Controller") if setup.tool is not None else ():
         if not controller.enabled:
             found(f"{called(controller)} is off", controller, tag="enabled", severity=INFO)
+
+
+def _carried_by_none(setup: Setup) -> list[str]:
+    """The free coordinates of joints to ground, if nothing but paths between bodies acts in the model."""
+    if setup.tree is None or not setup.tree.of_class("Actuator"):
+        return []
+    files = setup.having("force_set_files")
+    if any(len(tool.force_set_files) > len(setup.added) for tool in files):
+        return []
+    added = [force for _, top in setup.added for force in top.walk() if is_of(force, "Actuator")]
+    if any(not is_of(force, "PathActuator") for force in (*setup.tree.of_class("Actuator").values(), *added)):
+        return []
+    parts: list[Any] = setup.tree.components
+    if any(is_of(part, "AbstractPathPoint") and str(part.socket_parent_frame) == "/ground" for part in parts):
+        return []
+    joints: Any = setup.tree.of_class("Joint").values()
+    on_ground = (joint for joint in joints if str(joint.socket_parent_frame).rpartition("/")[2].startswith("ground"))
+    return [item.name for joint in on_ground for item in joint.coordinates if not setup.is_bound(item.name)]
 
 
 @rule("OSIM853", "scale-setting", severity=ERROR, mends="both", about="document")
@@ -186,7 +226,8 @@ def scale_setting(setup: Setup, found: Found) -> None:
     ```
     """
     for tool in setup.named("ScaleTool"):
-        if tool.mass == 0.0:
+        scaler = tool.model_scaler
+        if tool.mass == 0.0 or (tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution):
             found(f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is", tool, tag="mass", severity=WARNING)
     for scaler in setup.named("ModelScaler"):
         if not scaler.apply:
