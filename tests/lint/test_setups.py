@@ -74,7 +74,8 @@ def test_loads_are_checked_with_the_model_of_the_tool_that_names_them(project, f
     assert (finding.code, finding.line) == ("OSIM831", 6)
 
 
-TOOLS = sorted(tag for tag, module in MODULES.items() if module.startswith("osimlite.schema.tools"))
+KINDS = ("osimlite.schema.tools", "osimlite.schema.moco")
+TOOLS = sorted(tag for tag, module in MODULES.items() if module.startswith(KINDS))
 
 
 @pytest.mark.parametrize("tag", TOOLS)
