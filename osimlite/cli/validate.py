@@ -51,7 +51,9 @@ def validate(
     geometry: options.Geometry = None,
     classes: Annotated[
         list[str] | None,
-        typer.Option(metavar="FILE", help="A file that declares classes of a plug-in.", show_default=False),
+        typer.Option(
+            metavar="FILE", help="A file that declares classes of a plug-in; may be repeated.", show_default=False
+        ),
     ] = None,
     target_version: Annotated[
         str,

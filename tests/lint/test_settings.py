@@ -67,6 +67,15 @@ def test_each_threshold_moves_the_findings_of_its_rule(rule):
         assert len(seen) > 1, f"{threshold.name} of {rule.code} changes nothing"
 
 
+def test_a_finding_is_kept_for_one_version_and_for_the_classes_of_one_day(tmp_path):
+    declared = tmp_path / "classes.json"
+    declared.write_text("{}")
+    before = key_of("x.osim", Config(classes=(str(declared),)))
+    declared.write_text('{"classes": {}}')
+    keys = {before, key_of("x.osim", Config(classes=(str(declared),))), key_of("x.osim", Config())}
+    assert len({*keys, key_of("x.osim", Config(target_version="4.5"))}) == 4
+
+
 def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed_over(tmp_path):
     (tmp_path / "osimlite.toml").write_text('select = ["references"]\n')
     (tmp_path / "sub").mkdir()
