@@ -205,7 +205,7 @@ def check_source(source: Source, config: Config | None = None) -> Report:
 
 def subject_in(source: Source, config: Config | None = None) -> Checked:
     """A text to check; what it is, the name of its file tells."""
-    _use_classes(config)
+    use_classes(config)
     if source.file is not None and is_table(source.file):
         return Table(source.data, source.file, config)
     return _subject_of(survey(source, of=_class_in(source.file)), config)
@@ -213,14 +213,14 @@ def subject_in(source: Source, config: Config | None = None) -> Checked:
 
 def subject_of(file: str, config: Config | None = None) -> Checked:
     """A file to check; MissingFileError if there is none. What it is, its name tells."""
-    _use_classes(config)
+    use_classes(config)
     if is_table(file):
         with suppress(SpecialFileError):
             return Table(read_file(file), file, config)
     return _subject_of(survey_file(file, of=_class_in(file)), config)
 
 
-def _use_classes(config: Config | None) -> None:
+def use_classes(config: Config | None) -> None:
     """Let the classes of plug-ins count that a configuration names, and no others."""
     if config is None or not config.classes:
         let_count({})

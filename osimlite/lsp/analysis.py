@@ -13,7 +13,7 @@ from osimlite.document.spans import Span
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import run, subject_in
+from osimlite.lint.engine import run, subject_in, use_classes
 from osimlite.lint.settings import settings_for
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.subject import Subject
@@ -69,8 +69,15 @@ class Analysis:
         """The text of a document; nothing is told of what stands in tables, and in XML of other programs."""
         return "" if self.is_table or self.is_foreign else self.text.content
 
+    @cached_property
+    def config(self) -> Config:
+        """What the project asks for; raises OsimliteError if that makes no sense."""
+        return settings_for(Path(self.file).resolve().parent).config_for(self.file, Config())
+
     def cursor(self, offset: int) -> Cursor:
         """What stands at an offset."""
+        # Another file may be of a project with other classes.
+        use_classes(self.config)
         return cursor_at(self.markup, min(offset, len(self.markup)))
 
     @cached_property
@@ -80,9 +87,8 @@ class Analysis:
         Raises:
             OsimliteError: the settings of the project make no sense.
         """
-        config = settings_for(Path(self.file).resolve().parent).config_for(self.file, Config())
         with collector_paused():
-            return Checked(config) if self.is_foreign else subject_in(self.source, config)
+            return Checked(self.config) if self.is_foreign else subject_in(self.source, self.config)
 
     @cached_property
     def report(self) -> Report:

@@ -262,6 +262,27 @@ async def test_a_mend_in_a_table_is_where_it_belongs_behind_letters_of_any_scrip
 
 
 @pytest.mark.asyncio
+async def test_a_class_of_a_plugin_is_offered_where_the_project_has_it(editor, ask, folder: Path) -> None:
+    classes = '{"classes": {"DragForce": {"bases": ["Force"], "properties": [{"name": "gain", "type": "double"}]}}}'
+    setup = (
+        '<ForceSet name="f">\n<objects>\n<DragForce name="d">\n<gain>1</gain>\n<\n</DragForce>\n</objects>\n</ForceSet>'
+    )
+    text = f'<OpenSimDocument Version="40600">\n{setup}\n</OpenSimDocument>\n'
+    ours, others = folder / "ours", folder / "others"
+    for place in (ours, others):
+        place.mkdir()
+    (ours / "classes.json").write_text(classes)
+    (ours / "osimlite.toml").write_text('classes = ["classes.json"]\n')
+    mine, theirs = editor(ours / "forces.xml", text), editor(others / "forces.xml", text)
+    await mine.open()
+    await theirs.open()
+    for _ in range(2):
+        assert "appliesForce" in await ask.completion(mine, "<\n", 1)
+        assert "appliesForce" not in await ask.completion(theirs, "<\n", 1)
+    assert "gain" in await ask.hover(mine, "gain>", 1)
+
+
+@pytest.mark.asyncio
 async def test_xml_of_others_is_left_alone(client, editor, ask, tmp_path: Path) -> None:
     pom = editor(tmp_path / "pom.xml", "<project>\n  <Body name='a'><mass>1</mass></Body>\n  <\n</project>")
     assert await pom.open() == []
