@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
@@ -32,7 +34,8 @@ def impossible_bounds(setup: Setup, found: Found) -> None:
 
     ## What it does
     Compares both ends of all bounds, bounds at the start and at the end with those of the whole phase, and the times at
-    which a phase begins and ends. Points out a state or control that has bounds twice.
+    which a phase begins and ends. Points out a state or control that has bounds twice, and bounds of an angle that
+    look like degrees.
 
     ## Why is this bad
     The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds the last counts,
@@ -71,7 +74,16 @@ def impossible_bounds(setup: Setup, found: Found) -> None:
                     f"{tag} of {called(item)} are outside its bounds from {whole[0]:g} to {whole[-1]:g}: OpenSim fails",
                     item, tag=tag,
                 )  # fmt: skip
+    angles = angles_of(setup)
     for phase in setup.named("MocoPhase"):
+        for info in phase.state_infos:
+            bounds = (*info.bounds, *info.initial_bounds, *info.final_bounds)
+            largest = max(filter(math.isfinite, map(abs, bounds)), default=0.0)
+            if info.name.endswith("/value") and coordinate_of(info.name) in angles and largest > 10.0:
+                found(
+                    f"a bound of {largest:g} for the angle '{info.name}' is in radians: in degrees?", info,
+                    severity=WARNING,
+                )  # fmt: skip
         starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
         if starts and ends and ends[-1] < starts[0]:
             found(

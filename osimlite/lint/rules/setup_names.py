@@ -40,7 +40,7 @@ WORDS = {
     "relative_to_body_name": {"none", "ground"},
     "body_name": {"ground"},
     "wrt_body": {"center_of_mass", "-1"},
-    "express_body": {"center_of_mass", "-1"},
+    "express_body": {"ground", "-1"},
     "forces_to_exclude": {"ALL", "ACTUATORS", "MUSCLES"},
 }
 """What a property takes besides names."""

@@ -85,6 +85,11 @@ def tool_setting(setup: Setup, found: Found) -> None:
                 "replace them",
                 tool, tag="replace_force_set",
             )  # fmt: skip
+        if is_of(tool, "RRATool") and tool.adjust_com_to_reduce_residuals and not str(tool.adjusted_com_body).strip():
+            found(
+                f"{called(tool)} is to move a center of mass, and adjusted_com_body names no body: OpenSim refuses it",
+                tool, tag="adjusted_com_body",
+            )  # fmt: skip
         if is_of(tool, "AnalyzeTool") and not tool.analysis_set.objects:
             found(f"{called(tool)} has no analysis: OpenSim refuses it", tool)
     names = Counter(item.name for item in setup.named("Analysis"))
