@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -319,3 +320,16 @@ def test_a_tool_cannot_name_all_actuators_of_its_model() -> None:
     text = f'<OpenSimDocument Version="40500">{tool}</OpenSimDocument>'
     (change,) = read_document(Source(text.encode()), of=Object).changes
     assert change.lost is not None and "all actuators" in change.lost
+
+
+def test_actuators_without_a_version_push_backwards_as_in_opensim() -> None:
+    text = """<ForceSet> <objects>
+<PointActuator name="given"> <direction>0 2 0</direction> <force_is_global>false</force_is_global> </PointActuator>
+<PointActuator name="bare" />
+<TorqueActuator name="torque"> <axis>1 0 0</axis> </TorqueActuator>
+<TorqueActuator name="about" />
+</objects> </ForceSet>"""
+    top: Any = read_document(Source(text.encode()), of=Object).top
+    given, bare, torque, about = top.objects
+    assert (given.direction, given.force_is_global) == ((0.0, -2.0, 0.0), False)
+    assert (bare.direction, torque.axis, about.axis) == ((-1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0))
