@@ -189,3 +189,9 @@ def test_numbers_beyond_computation_raise_nothing(tag, number, tmp_path):
         values = [number, *words] if words else [number] * len(text[start:end].split())
         file.write_text(text[:start] + " ".join(values) + text[end:])
         validate(file)
+
+
+def test_a_byte_that_is_no_character_is_placed_by_the_characters_before_it():
+    text = "<!-- äöü -->".encode() + b"<OpenSimDocument Version='40600'><Model name='\xe4'/></OpenSimDocument>"
+    (finding,) = validate(Source(text), select="OSIM002")
+    assert (finding.line, finding.column) == (1, 13 + len("<OpenSimDocument Version='40600'><Model name='"))

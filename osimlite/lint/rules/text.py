@@ -132,9 +132,10 @@ def encoding(subject: Subject, found: Found) -> None:
     try:
         source.data.decode(name)
     except UnicodeDecodeError as error:
+        before = source.data[: error.start].decode(name).removeprefix("\ufeff")
         found(
             f"byte 0x{source.data[error.start]:02X} is not {name}; the text is read as {source.encoding}",
-            at=source.position(error.start),
+            at=source.position(len(before)),
         )
     except LookupError:
         found(f"the encoding '{name}' is not known; the text is read as {source.encoding}", at=source.position(0))
