@@ -113,6 +113,7 @@ class StorageHeader:
         entries: the first word of each line and the rest, by that word.
         labels: of all columns, with that of the time.
         label_line: the number of their line.
+        has_tabs: whether there are tabs in it.
         rows: the offset behind it.
         row_line: the number of the line there.
     """
@@ -141,7 +142,8 @@ class StorageHeader:
         self.row_line = self.label_line + 1
         # The newer of OpenSim's readers takes a label up to a tab, the older up to a blank.
         line = _text(data[max(start, mark) : min(self.rows, start + LONGEST_LINE)])
-        self.labels = words(line, self.label_line, _BETWEEN_TABS if self.is_strict and "\t" in line else _WORD)
+        self.has_tabs = "\t" in line
+        self.labels = words(line, self.label_line, _BETWEEN_TABS if self.is_strict and self.has_tabs else _WORD)
 
     def value(self, key: str) -> str:
         """What it says under a key, or nothing."""

@@ -30,14 +30,17 @@ _TOLD = 50
 """Faults of a kind that are told, one for each column."""
 _PLAIN = re.compile(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
+_LETTER = re.compile(rb"[A-Za-z]")
+_OF_ROW = re.compile(rb"\d|\b(?:nan|inf)", re.IGNORECASE)
 _FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 
 
 class Fault(NamedTuple):
     """Something wrong in the rows: of what kind, in which column of the table, where it is met first, and how often.
 
-    `kind` is ``cell`` (no number), ``row`` (`text` says how many cells), ``comment``, ``blank``, ``order``, ``time``
-    (no number), ``part`` (a part of a marker), ``zero`` (a marker at the origin) or ``frame`` (a wrong number).
+    `kind` is ``cell`` (no number), ``row`` (`number` says how many cells, `text` more), ``comment``, ``blank``,
+    ``order``, ``time`` (no number), ``part`` (a part of a marker), ``zero`` (a marker at the origin) or ``frame`` (a
+    wrong number).
     `others` is how many more columns have such a fault that is not told.
     """
 
@@ -212,14 +215,17 @@ class Scan:
                 self._note("blank", 0, line, 0, b"")
             return
         rows = self.rows
+        if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (_LETTER.search(text) and not _OF_ROW.search(text)):
+            self._note("comment", 0, line, 0, b"")
+            return
         cells, count = self._cells_of(text)
         if count != self.cells:
-            comment = text.lstrip()[:1] in (b"#", b"/", b"%", b";")
-            if comment:
-                self._note("comment", 0, line, 0, b"")
-                return
             end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
-            self._note("row", count, line, end, b"", str(count))
+            blanks = self.markers and b"\t" not in text and len(text.split(None, self.cells)) == self.cells
+            self._note("row", count, line, end, b"", "; blanks separate them, and tabs must" if blanks else "")
+            if blanks:
+                self._expect_frame(text.split(None, 1)[0], line)
+                return
         time = 1 if self.markers else 0
         for number, (start, cell) in enumerate(cells[: self.cells]):
             if self.markers and number == 0:

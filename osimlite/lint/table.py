@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice, pairwise
 from statistics import median
 from typing import ClassVar
 
@@ -17,6 +17,7 @@ from osimlite.lint.rows import Rows, Scan, number_in
 from osimlite.lint.suppressions import Suppression, suppressions_in_header
 from osimlite.tables import MARK, Entry, MarkerHeader, StorageHeader, Word
 
+_CELL = re.compile(rb"[^ \t\r\n]+")
 _ROW = re.compile(rb"[^ \t\r\n][^\n]*")
 
 
@@ -81,12 +82,15 @@ class Table(Checked):
     def rows(self) -> Rows:
         """The rows."""
         header, cells = self.header, len(self.labels)
+        # Where labels are missing or too many, the first row says how many cells a row has.
+        first = _ROW.search(self.data, header.rows)
         if isinstance(header, MarkerHeader):
+            markers = (len(first[0].rstrip().split(b"\t")) - 2) // 3 if first else 0
+            said = self.entries["NumMarkers"].value.text if "NumMarkers" in self.entries else ""
+            cells = markers if str(markers) == said else cells
             return Scan(cells * 3 + 2, markers=True).run(self.data, header.rows, header.row_line)
         if not header.labels or "," in header.labels[0].text:
             return Rows()
-        # Where labels are missing or too many, the first row says how many cells a row has.
-        first = _ROW.search(self.data, header.rows)
         if first and str(len(first[0].split())) == header.value("nColumns"):
             cells = len(first[0].split())
         return Scan(cells, header.parts).run(self.data, header.rows, header.row_line)
@@ -125,6 +129,19 @@ class Table(Checked):
         """The usual step from one time to the next, s; 0 of fewer than two rows."""
         times = self.rows.times
         return median(after - before for before, after in pairwise(times)) if len(times) > 1 else 0
+
+    def label_of(self, number: int) -> str:
+        """The label of a column by its number; of a marker file its marker's."""
+        place = (number - 2) // 3 if self.is_markers else number
+        return "Time" if place < 0 else self.labels[place].text if place < len(self.labels) else str(number)
+
+    def time_at(self, line: int) -> Position:
+        """Where the time of the row in a line is."""
+        start = self.line_start(line)
+        text = self.data[start : self.line_start(2, start)]
+        first, *rest = islice(_CELL.finditer(text), 2)
+        found = rest[0] if self.is_markers else first
+        return Position(line, found.start() + 1, len(found[0]))
 
     def suppressions(self) -> list[Suppression]:
         """The lines of the header that ignore findings; a marker file cannot have any."""

@@ -68,7 +68,7 @@ def test_a_row_of_another_length_is_found(draw, columns, count, longer):
     rows[row] = [*rows[row], "7"] if longer else rows[row][:-1]
     found = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1)
     (fault,) = found.faults.values()
-    assert (fault.kind, fault.line, fault.text) == ("row", row + 1, str(len(rows[row])))
+    assert (fault.kind, fault.line, fault.number) == ("row", row + 1, len(rows[row]))
 
 
 @given(st.binary(max_size=300), st.sampled_from(["a.sto", "a.mot", "a.trc"]), st.data())

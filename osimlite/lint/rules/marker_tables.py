@@ -106,11 +106,10 @@ def marker_gap(table: Table, found: Found) -> None:
     ```
     """
     for fault in table.rows.of("zero", "part"):
-        name = table.labels[(fault.number - 2) // 3].text
+        name = table.label_of(fault.number)
         what = "is at 0 0 0 as if it had been seen there" if fault.kind == "zero" else "lacks a part of its place"
         found(f"the marker '{name}' {what}{fault.more()}", at=Position(fault.line, fault.column, fault.length))
-    for number in sorted(table.rows.unseen):
-        label = table.labels[number]
+    for label in [label for number, label in enumerate(table.labels) if number in table.rows.unseen]:
         found(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
 
 

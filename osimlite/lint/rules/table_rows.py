@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
+from math import inf
 
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
@@ -91,8 +92,9 @@ def ragged_row(table: Table, found: Found) -> None:
     for fault in rows.of("row", "comment", "blank"):
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
-            fix = _without_last_tabs(table, width) if table.is_markers and int(fault.text) > width else None
-            found(f"the row has {fault.text} cells and needs {width}{fault.more()}", at=at, fix=fix)
+            fix = _without_last_tabs(table, width) if table.is_markers and fault.number > width else None
+            has = times(fault.number, "cell")
+            found(f"the row has {has} and needs {width}{fault.text}{fault.more()}", at=at, fix=fix)
         elif fault.kind == "comment":
             found(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
@@ -165,8 +167,10 @@ def not_a_number(table: Table, found: Found) -> None:
     """
     end = table.rows.line_of(table.rows.count - 1) if table.rows.count else 0
     for fault in table.rows.of("cell", "time"):
-        label = _label(table, fault.number)
-        if table.is_markers:
+        label = table.label_of(fault.number)
+        if fault.kind == "time" and (table.is_markers or table.is_strict):
+            fate = "a row without a time is none"
+        elif table.is_markers:
             fate = "OpenSim takes the marker for one that it did not see"
         elif table.is_strict:
             fate = "OpenSim takes it for NaN"
@@ -179,14 +183,6 @@ def not_a_number(table: Table, found: Found) -> None:
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING if fault.kind == "cell" and (table.is_markers or table.is_strict) else None,
         )
-
-
-def _label(table: Table, number: int) -> str:
-    """The label of a column by its number; of a marker file its marker's."""
-    if table.is_markers:
-        place = (number - 2) // 3
-        return "Time" if number < 2 else table.labels[place].text if place < len(table.labels) else str(number)
-    return table.labels[number].text if number < len(table.labels) else str(number)
 
 
 @rule("OSIM808", "time-order", severity=ERROR, about="table")
@@ -287,7 +283,7 @@ def time_gap(table: Table, found: Found) -> None:
         return
     longest = 1.5 * table.step
     steps = [after - before for before, after in pairwise(moments)]
-    if max(steps) < longest:
+    if not longest <= max(steps) < inf:
         return
     # OpenSim starts some results one step before the others.
     gaps = [row for row, step in enumerate(steps, 1) if step >= longest and row > 1]
@@ -298,5 +294,5 @@ def time_gap(table: Table, found: Found) -> None:
             lost = f": {times(missing, 'row')} seem to be missing" if missing else ""
             found(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
-                at=Position(rows.line_of(row), 1),
+                at=table.time_at(rows.line_of(row)),
             )

@@ -7,7 +7,7 @@ from math import nan
 
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.table import Table
 from osimlite.lint.words import times
 from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
@@ -64,7 +64,11 @@ def table_header(table: Table, found: Found) -> None:
         if words.startswith(b"PathFileType"):
             found("these are markers over time; a file of them is called .trc", at=start)
         elif header.end.at.line == 1:
-            found("there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it", at=start)
+            ends = "; its lines end with CR alone" if b"\r" in table.data[:1000] and b"\n" not in table.data else ""
+            found(
+                f"there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it{ends}",
+                at=start,
+            )  # fmt: skip
         elif header.end.text:
             found(
                 "the header must end with 'endheader' in small letters: OpenSim takes all that follows for header",
@@ -261,6 +265,11 @@ def table_setting(table: Table, found: Found) -> None:
         rate = entries.get("DataRate")
         if rate is not None and not _is_positive(rate.value.text):
             found(f"'DataRate' is '{rate.value.text}' and no frequency", at=rate.value.at, severity=WARNING)
+        elif rate is not None and table.step > 0 and not 0.9 < float(rate.value.text) * table.step < 1.1:
+            found(
+                f"'DataRate' is '{rate.value.text}', and by the times of the frames it is {1 / table.step:.6g}",
+                at=rate.value.at, severity=INFO,
+            )  # fmt: skip
         return
     for key, entry in entries.items():
         right = next((known for known in ("inDegrees", "version", *COUNTS) if known.lower() == key.lower()), key)
@@ -353,6 +362,12 @@ def column_label(table: Table, found: Found) -> None:
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
                     at=word.at, suggestion=nearest(word.text, [right], cutoff=60), certain=True,
                 )  # fmt: skip
+        cells = header.lines[3].split("\t") if header.lines[3:] else []
+        empty = [place for place in range(2, len(cells) - 2, 3) if not cells[place].strip()]
+        if empty and len(labels) < len(cells[2:]) // 3:
+            found(
+                "a marker has no label: OpenSim refuses the file", at=Position(4, len("\t".join(cells[: empty[0]])) + 2)
+            )
         for label in labels:
             if " " in label.text:
                 found(f"the marker '{label.text}' has a blank in its name, which no marker of a model has", at=label.at)
@@ -372,6 +387,11 @@ def column_label(table: Table, found: Found) -> None:
             )  # fmt: skip
         else:
             found(f"the first column is '{first}': OpenSim takes it for the time", at=at)
+    elif header.is_strict and labels[1:] and not header.has_tabs:
+        found(
+            f"blanks separate the columns of a table of version {header.form}: OpenSim's newer tools refuse it",
+            at=labels[1].at, severity=WARNING,
+        )  # fmt: skip
     places: dict[str, list[Position]] = {}
     for label in labels:
         places.setdefault(label.text, []).append(label.at)
