@@ -64,9 +64,11 @@ class Fault(NamedTuple):
 class Rows:
     """What is known of the rows of a table.
 
-    `samples` are the numbers of a few rows (NaN for what is none), `unseen` the markers that no row has.
+    `cells` is how many cells a row should have, `samples` are the numbers of a few rows (NaN for what is none),
+    `unseen` the markers that no row has.
     """
 
+    cells: int = 0
     count: int = 0
     times: array[float] = field(default_factory=lambda: array("d"))
     lines: list[tuple[int, int]] = field(default_factory=list)
@@ -106,6 +108,7 @@ class Scan:
 
     def run(self, data: bytes, start: int, line: int) -> Rows:
         """Look at the rows from an offset on, which is in this line of the file."""
+        self.rows.cells = self.cells
         if self.markers:
             self.rows.unseen = set(range((self.cells - 2) // 3))
             # Before the first frame OpenSim passes over lines that have no number of one.

@@ -88,13 +88,12 @@ def ragged_row(table: Table, found: Found) -> None:
     ```
     """
     rows = table.rows
-    width = len(table.labels) * 3 + 2 if table.is_markers else len(table.labels)
     for fault in rows.of("row", "comment", "blank"):
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
-            fix = _without_last_tabs(table, width) if table.is_markers and fault.number > width else None
+            fix = _without_last_tabs(table, rows.cells) if table.is_markers and fault.number > rows.cells else None
             has = times(fault.number, "cell")
-            found(f"the row has {has} and needs {width}{fault.text}{fault.more()}", at=at, fix=fix)
+            found(f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}", at=at, fix=fix)
         elif fault.kind == "comment":
             found(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):

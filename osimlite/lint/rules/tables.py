@@ -204,8 +204,7 @@ def table_count(table: Table, found: Found) -> None:
         elif severity is ERROR:
             fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim takes numbers for others"
         # Where a row has as many cells as the header says, it is a label that is wrong.
-        plain = not isinstance(table.header, MarkerHeader) and table.header.parts == 1
-        in_rows = len(rows.samples[0]) if key == "nColumns" and plain and rows.samples else count
+        in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
         found(
             f"'{entry.key.text}' is '{said}', and there are {count} {what}{fate}",
