@@ -145,7 +145,8 @@ def translate(
 
     if len(made.fidelity):
         plain_console().print(_table(made.fidelity, to.upper()))
-    robot = made.robot
+    robot, (same, otherwise, lost) = made.robot, made.fidelity.counts()
+    say(f"{same} components as they are, {otherwise} in another way, {lost} left out")
     say(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
         + listed([str(path) for path in written], most=4)

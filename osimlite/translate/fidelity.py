@@ -123,6 +123,12 @@ class Fidelity:
             found.setdefault((record.kind, record.cannot_say, record.done), []).append(record)
         return [Group(*key, tuple(records)) for key, records in found.items()]
 
+    def counts(self) -> tuple[int, int, int]:
+        """How many components are in the target as they are, in another way, and not at all."""
+        dropped = {record.component for record in self.records if record.how == "dropped"}
+        changed = {record.component for record in self.records} - dropped
+        return len(self.translated.keys() - changed - dropped), len(changed), len(dropped)
+
     def left_out(self, paths: Iterable[str]) -> list[str]:
         """Those of the paths that nothing accounts for: neither translated nor recorded, nor below a record."""
         recorded = {record.component for record in self.records}

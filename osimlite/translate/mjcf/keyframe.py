@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from numpy.polynomial.polynomial import polyder, polyval
 
+from osimlite.errors import SimulationError
 from osimlite.translate.mjcf.draft import Draft, add
 
 
 def add_keyframe(draft: Draft) -> None:
     """Add the default pose and speeds, which fulfil the constraints; joints that follow others stand where these do."""
     q, u = draft.default_state
+    try:
+        draft.mechanism.acceleration(q, u)
+    except SimulationError as error:
+        done = "as it is: the file can be posed, but what its motions are means nothing"
+        draft.fidelity.add(
+            "singular", "/", "a motion without inertia, which OpenSim has no acceleration for", done, error.message
+        )
     qdot = draft.mechanism.coordinate_rates(q, u)
     values = draft.robot.joint_values(q)
     rates = dict(zip(values, (draft.robot.joint_jacobian(q) @ qdot).tolist(), strict=True))

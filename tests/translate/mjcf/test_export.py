@@ -134,7 +134,8 @@ def test_what_mujoco_would_refuse_is_told_and_mended():
     below = model.ground
     for name, mass, inertia in (("ghost", 0.0, (0.0,) * 6), ("odd", 1.0, (1.0, 1.0, 5.0, 0.1, 0, 0))):
         body = model.add(Body(name=name, mass=mass, inertia=inertia))
-        joint = SliderJoint(name=f"j_{name}", coordinates=[Coordinate(name=f"q_{name}")])
+        kind = PinJoint if name == "ghost" else SliderJoint
+        joint = kind(name=f"j_{name}", coordinates=[Coordinate(name=f"q_{name}")])
         model.add(joint.between(below, body))
         below = body
     mjcf = to_mjcf(model)
@@ -143,8 +144,12 @@ def test_what_mujoco_would_refuse_is_told_and_mended():
     assert "balanceinertia" in told["inertia"].done and told["inertia"].errors["moment"].max == pytest.approx(
         3.1, abs=0.2
     )
+    assert "singular" not in told
     compiled = mujoco.MjModel.from_xml_string(mjcf.text)
     assert compiled.body("ghost").mass < 1e-12
+    model["/bodyset/odd"].mass, model["/bodyset/odd"].inertia = 0.0, (0.0,) * 6
+    (record,) = (record for record in to_mjcf(model).fidelity if record.kind == "singular")
+    assert "moves no mass" in record.detail
 
 
 @pytest.mark.parametrize(
