@@ -61,6 +61,7 @@ _MODULES = (
     "topology",
     "joints",
     "custom_joints",
+    "gimbals",
     "bodies",
     "physics",
     "coordinates",

@@ -16,7 +16,7 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite.lint.axes import axes_of
+from osimlite.lint.axes import axes_of, coordinates_of
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Unknown
@@ -175,6 +175,32 @@ def _motion(joint: Joint, given: Mapping[str, float] | None) -> Pose | None:
         case FreeJoint():
             return fixed((values[0], values[1], values[2]), (values[3], values[4], values[5]))
     return None
+
+
+def turning_axes(joint: Joint) -> list[tuple[str, Vector]]:
+    """What the rotations of a gimbal or custom joint turn about in the default pose.
+
+    Returns:
+        The coordinate of each rotation and its axis, a unit vector in the parent frame. Nothing for a joint of another
+        class, and where a rotation does not follow one coordinate of its own or cannot be computed.
+    """
+    values = {item.name: item.default_value for item in coordinates_of(joint)}
+    turns: list[tuple[str, Vector, float | None]] = []
+    if isinstance(joint, GimbalJoint):
+        turns = [(name, axis, value) for (name, value), axis in zip(values.items(), (X, Y, Z), strict=False)]
+    elif is_a(joint, "CustomJoint"):
+        for turn in axes_of(cast("CustomJoint", joint))[:3]:
+            if len(turn.coordinates) == 1 and not isinstance(turn.function, Constant):
+                turns.append((str(turn.coordinates[0]), turn.axis, _along(turn, values, rough=False)))
+    found: dict[str, Vector] = {}
+    turned = Pose()
+    for name, axis, angle in turns:
+        length = math.sqrt(dot(axis, axis))
+        if angle is None or name not in values or length == 0.0:
+            return []
+        found[name] = turned.turned((axis[0] / length, axis[1] / length, axis[2] / length))
+        turned = turned.then(about(axis, angle))
+    return list(found.items())
 
 
 def _custom(joint: CustomJoint, values: dict[str, float], *, rough: bool) -> Pose | None:
