@@ -13,7 +13,8 @@ from osimlite.document.source import Position
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.rows import Rows, Scan, number_in
+from osimlite.lint.rows import Rows
+from osimlite.lint.scan import Scan, number_in
 from osimlite.lint.suppressions import Suppression, suppressions_in_header
 from osimlite.tables import MARK, Entry, MarkerHeader, StorageHeader, Word
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from osimlite.lint import Config
 from osimlite.lint.engine import run, subject_of
 from osimlite.lint.many import check_files
-from osimlite.lint.rows import Scan
+from osimlite.lint.scan import Scan
 from osimlite.lint.table import Table
 
 
@@ -104,7 +104,7 @@ def test_a_table_is_taken_from_the_cache(fixtures, tmp_path, monkeypatch):
 
 
 def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
-    monkeypatch.setattr("osimlite.lint.rows.BLOCK", 60)
+    monkeypatch.setattr("osimlite.lint.scan.BLOCK", 60)
     lines = [f"{row / 100:.2f}\t{row}\t-1.5" for row in range(200)]
     lines[150] = lines[150].replace("-1.5", "nan")
     path = tmp_path / "walk.sto"

@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.rows import number_in
+from osimlite.lint.scan import number_in
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import nearest_name, times

@@ -1,0 +1,282 @@
+"""Going once through the rows of a table: what is no number, what is missing, and the times.
+
+Rows are looked at by the block. Those that look as rows of numbers do are known by that alone; others are looked at
+cell by cell.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import groupby, islice, pairwise
+from math import inf, nan, nextafter
+from operator import lt
+
+from osimlite.lint.rows import Fault, Rows
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
+
+BLOCK = 16_000
+"""Bytes that are looked at together: few enough for the fastest memory of a processor."""
+
+_LONGEST = 4_000_000
+"""Bytes of a line whose look would take too much memory."""
+_SAMPLES, _SAMPLED = 64, 200_000
+"""Rows of which all are samples, and the numbers in them at most; of further ones fewer and fewer are."""
+_PLAIN = re.compile(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+_WORD = re.compile(rb"\S+")
+_LETTER = re.compile(rb"[A-Za-z]")
+_OF_ROW = re.compile(rb"\d|\b(?:nan|inf)", re.IGNORECASE)
+_FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
+
+
+@dataclass(slots=True)
+class Scan:
+    """Goes once through the rows of a table.
+
+    Args:
+        cells: how many numbers a row has; of a marker table with the number of the frame.
+        parts: how many numbers, with commas between, make a cell.
+        markers: whether these are markers (.trc): a tab ends every cell, cells may be empty, and the time is the
+            second. Else blanks and tabs separate, and the time comes first.
+    """
+
+    cells: int
+    parts: int = 1
+    markers: bool = False
+    rows: Rows = field(default_factory=Rows)
+    _frame: int = 0
+
+    def run(self, data: bytes, start: int, line: int) -> Rows:
+        """Look at the rows from an offset on, which is in this line of the file."""
+        self.rows.cells = self.cells
+        if self.markers:
+            self.rows.unseen = set(range((self.cells - 2) // 3))
+            # Before the first frame OpenSim passes over lines that have no number of one.
+            frame = _FRAME.search(data, start)
+            first = frame.start() if frame else len(data)
+            start, line = first, line + data.count(b"\n", start, first)
+        layout = MARKERS if self.markers else VECTORS if self.parts > 1 else ROWS
+        whole = (b"\t" if self.markers else b"").join([b",".join([b"0"] * self.parts)] * self.cells)
+        for block in _blocks(data, start):
+            lines = block.split(b"\n")
+            lines.pop()
+            looks, zeros = _looks(block, layout) if len(block) < _LONGEST else (b"!\n" * len(lines), False)
+            if looks == (whole + b"\n") * len(lines):
+                self._take(lines, [whole] * len(lines), line, zeros)
+            else:
+                forms = looks.split(b"\n")
+                kinds = [form and (form == whole or self._is_good(form)) for form in forms]
+                for kind, group in groupby(range(len(lines)), kinds.__getitem__):
+                    places = list(group)
+                    if kind:
+                        part = slice(places[0], places[-1] + 1)
+                        self._take(lines[part], forms[part], line + places[0], zeros)
+                    elif kind is False:
+                        for place in places:
+                            self._odd(lines[place], line + place)
+                    elif self.rows.count:
+                        self._note("blank", 0, line + places[0], 0, b"", times=len(places))
+            line += len(lines)
+        if not self.rows.count:
+            self.rows.unseen.clear()
+        return self.rows
+
+    def _is_good(self, form: bytes) -> bool:
+        """Whether a form other than that of a whole row is one of a good row."""
+        return self.markers and _seen(form, self.cells) is not None
+
+    def _take(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
+        """Note times and samples of good rows."""
+        rows = self.rows
+        self._begin(line)
+        if self.markers:
+            times = self._marker_times(lines, line)
+            looks = set(forms)
+            rows.unseen.difference_update(*(_seen(form, self.cells) or () for form in looks if rows.unseen))
+            if zeros or any(b"\t\t" in form for form in looks):
+                for number, (text, form) in enumerate(zip(lines, forms, strict=True)):
+                    if b"\t\t" in form or b"\t\t\t" in text.translate(None, b"0.-+"):
+                        self._look_at_markers(text, line + number)
+        else:
+            times = [float(text.split(None, 1)[0]) for text in lines]
+        if not times[0] > self._last() or not all(map(lt, times, islice(times, 1, None))):
+            for number, (before, now) in enumerate(pairwise([self._last(), *times])):
+                if not now > before:
+                    self._order(lines[number], line + number, now, before)
+        rows.times.extend(times)
+        rows.count += len(lines)
+        if self._samples() > 0:
+            rows.samples += [self._numbers(text, float) for text in lines[: self._samples()]]
+        elif len(rows.samples) ** 2 < 2 * rows.count:
+            rows.samples.append(self._numbers(lines[0], float))
+
+    def _marker_times(self, lines: list[bytes], line: int) -> list[float]:
+        """The times of frames, which are looked at; of one without a time the next number after that before."""
+        heads = [text.split(b"\t", 2)[:2] for text in lines]
+        if [frame for frame, _ in heads] != [b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)]:
+            for number, (frame, _) in enumerate(heads, line):
+                self._expect_frame(frame.strip(), number)
+        else:
+            self._frame += len(heads)
+        times = [float(moment.strip() or b"nan") for _, moment in heads]
+        for number, time in enumerate(times):
+            if time != time:
+                self._note("time", 1, line + number, len(heads[number][0]) + 1, heads[number][1])
+                times[number] = nextafter(times[number - 1] if number else self._last(), inf)
+        return times
+
+    def _look_at_markers(self, text: bytes, line: int) -> None:
+        """Look for markers at the origin, and for parts of markers."""
+        cells = text.split(b"\t")
+        start = 0
+        for number, cell in enumerate(cells[: self.cells]):
+            if number > 1 and number % 3 == 2:
+                place = [part.strip() for part in cells[number : number + 3]]
+                seen = [part.lower() not in (b"", b"nan") for part in place]
+                if any(seen) and not all(seen):
+                    self._note("part", number, line, start, cell)
+                elif all(seen) and not b"".join(place).strip(b"0.-+"):
+                    self._note("zero", number, line, start, cell)
+            start += len(cell) + 1
+
+    def _samples(self) -> int:
+        """How many more rows are samples."""
+        return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(self.rows.samples)
+
+    def _numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
+        """The numbers of a row, NaN where there is none."""
+        if not self.markers:
+            return list(map(read, text.replace(b",", b" ").split()))
+        return [read(cell.strip() or b"nan") for cell in text.split(b"\t")]
+
+    def _odd(self, text: bytes, line: int) -> None:
+        """Look at one row that is not good."""
+        # A byte for each character, so that places are those of characters.
+        text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
+        if not text.strip():
+            if self.rows.count:
+                self._note("blank", 0, line, 0, b"")
+            return
+        rows = self.rows
+        if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (_LETTER.search(text) and not _OF_ROW.search(text)):
+            self._note("comment", 0, line, 0, b"")
+            return
+        cells, count = self._cells_of(text)
+        if count != self.cells:
+            end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
+            blanks = self.markers and b"\t" not in text and len(text.split(None, self.cells)) == self.cells
+            self._note("row", count, line, end, b"", "; blanks separate them, and tabs must" if blanks else "")
+            if blanks:
+                self._expect_frame(text.split(None, 1)[0], line)
+                return
+        time = 1 if self.markers else 0
+        for number, (start, cell) in enumerate(cells[: self.cells]):
+            if self.markers and number == 0:
+                self._expect_frame(cell, line)
+            elif number == time:
+                value = number_in(cell)
+                if value != value:
+                    self._note("time", time, line, start, cell)
+                elif not value > self._last():
+                    self._order(text, line, value, self._last())
+            elif not (self.markers and cell.lower() in (b"", b"nan")):
+                parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
+                if len(parts) != self.parts or any(number_in(part) != number_in(part) for part in parts):
+                    self._note("cell", number, line, start, cell)
+        if count == self.cells > time:
+            self._begin(line)
+            value = number_in(cells[time][1])
+            rows.times.append(value if value == value else nextafter(self._last(), inf))
+            rows.count += 1
+            if self.markers:
+                form = b"\t".join(b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells)
+                rows.unseen -= _seen(form, self.cells) or set()
+                self._look_at_markers(text, line)
+            if self._samples() > 0:
+                rows.samples.append(self._numbers(text, number_in))
+
+    def _cells_of(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
+        """The cells of a row with their places, of too many one more than there should be; and how many there are."""
+        if not self.markers:
+            words = _WORD.finditer(text)
+            cells = [(match.start(), match[0]) for match in islice(words, self.cells + 1)]
+            return cells, len(cells) + sum(1 for _ in words)
+        cells, start = [], 0
+        for cell in text.split(b"\t", self.cells + 1)[: self.cells + 1]:
+            cells.append((start + len(cell) - len(cell.lstrip()), cell.strip()))
+            start += len(cell) + 1
+        count = text.count(b"\t") + 1
+        # A tab may end the last cell, too.
+        ends = count == self.cells + 1 and not cells[-1][1]
+        return cells[: len(cells) - ends], count - ends
+
+    def _last(self) -> float:
+        """The time of the last row."""
+        return self.rows.times[-1] if self.rows.times else -inf
+
+    def _begin(self, line: int) -> None:
+        """Note in which line the next row is, where it does not follow the one before."""
+        if line != self.rows.line_of(self.rows.count):
+            self.rows.lines.append((self.rows.count, line))
+
+    def _expect_frame(self, cell: bytes, line: int) -> None:
+        number = int(cell) if cell.isdigit() and len(cell) < 20 else None
+        if number is None or (self._frame and number != self._frame + 1):
+            self._note("frame", 0, line, 0, cell)
+        self._frame = number if number is not None else self._frame + 1
+
+    def _order(self, text: bytes, line: int, time: float, before: float) -> None:
+        place = _WORD.search(text, text.find(b"\t") if self.markers else 0)
+        start, word = (place.start(), place[0]) if place else (0, b"")
+        self._note("order", int(time < before), line, start, word, f"{time:.9g} {before:.9g}")
+
+    def _note(
+        self, kind: str, number: int, line: int, start: int, cell: bytes, text: str | None = None, times: int = 1
+    ) -> None:
+        faults = self.rows.faults
+        if (kind, number) in faults:
+            known = faults[kind, number]
+            faults[kind, number] = known._replace(times=known.times + times)
+        else:
+            told = cell.decode("latin-1") if text is None else text
+            faults[kind, number] = Fault(kind, number, line, start + 1, max(1, len(cell)), told, times)
+
+
+def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:
+    """What lines look like, those of markers without NaN, which stands for one that was not seen."""
+    if b"\r" in block:
+        block = block.replace(b"\r\n", b"\n")
+    if layout is MARKERS and b"N" in block:
+        # Twice, since one of two that follow on each other takes the tab from the other.
+        block = block.replace(b"\tNaN\t", b"\t\t").replace(b"\tNaN\t", b"\t\t").replace(b"\tNaN\n", b"\t\n")
+    return shapes(block, layout)
+
+
+@lru_cache(maxsize=256)
+def _seen(form: bytes, cells: int) -> frozenset[int] | None:
+    """The markers that are in a row of markers, by what the row looks like; None if that is no row of markers."""
+    numbers = form.split(b"\t")
+    if len(numbers) == cells + 1 and not numbers[-1]:
+        numbers.pop()
+    if len(numbers) != cells or set(numbers) - {b"", b"0"}:
+        return None
+    return frozenset(marker for marker in range((cells - 2) // 3) if all(numbers[3 * marker + 2 : 3 * marker + 5]))
+
+
+def _blocks(data: bytes, start: int) -> Iterator[bytes]:
+    """Whole lines from an offset on, each with its end; blank lines at the end of all left out."""
+    size = len(data)
+    while size > start and data[size - 1] in b"\r\n" and data[size - 2] in b"\r\n":
+        size -= 1
+    while start < size:
+        end = data.rfind(b"\n", start, min(start + BLOCK, size)) + 1 or data.find(b"\n", start, size) + 1 or size
+        block = data[start:end]
+        yield block if block.endswith(b"\n") else block + b"\n"
+        start = end
+
+
+def number_in(cell: bytes) -> float:
+    """A number; NaN for a text that is none as C++ reads numbers, which knows neither NaN nor infinity."""
+    return float(cell) if _PLAIN.fullmatch(cell) else nan
