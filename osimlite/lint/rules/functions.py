@@ -35,7 +35,8 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     A GCVSpline is refused. A SimmSpline divides by the difference without a word and gives values in the millions;
-    piecewise functions take the wrong piece. A moment arm or a moving point is then anywhere.
+    piecewise functions take the wrong piece. A moment arm or a moving point is then anywhere. Where the same point
+    stands twice, a SimmSpline has no slope (a warning).
 
     ## Example
     ```xml
@@ -74,7 +75,11 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
         for index in range(1, len(function.x)):
             before, here = function.x[index - 1], function.x[index]
             if here < before or (strictly and here == before):
-                fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "its values are wrong"
+                refused = isinstance(function, GCVSpline)
+                level = (
+                    here == before and not refused and function.y[index - 1 : index] == function.y[index : index + 1]
+                )
+                fate = "OpenSim refuses it" if refused else "it is level there" if level else "its values are wrong"
                 relation = "repeats" if here == before else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
                 found(
@@ -84,8 +89,10 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
                     tag="x",
                     word=word,
                     nth=nth,
+                    severity=WARNING if level else None,
                 )
-                break
+                if not level:
+                    break
 
 
 @rule("OSIM602", "unequal-points", severity=ERROR)
