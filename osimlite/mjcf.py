@@ -38,7 +38,7 @@ Integrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
 
 class _Followed(NamedTuple):
-    """A joint that follows another, or stands still: equality, address and dof, and those of the leader (or -1)."""
+    """A joint that follows another, or time: equality, address and dof, and those of the leader (-1: time)."""
 
     equality: int
     own: int
@@ -50,8 +50,16 @@ class _Followed(NamedTuple):
 
     def at(self, data: Any) -> tuple[float, float, float]:
         """What the function has the joint at, its slope and its curvature."""
-        value, (slope,), ((curvature,),) = self.function.evaluate(data.qpos[[self.address]])
+        value, (slope,), ((curvature,),) = self.function.evaluate(np.array((self.argument(data),)))
         return value, float(slope), float(curvature)
+
+    def argument(self, data: Any) -> float:
+        """What the function is of."""
+        return float(data.qpos[self.address] if self.leader >= 0 else data.time)
+
+    def rate(self, data: Any) -> float:
+        """Of the argument."""
+        return float(data.qvel[self.leader]) if self.leader >= 0 else 1.0
 
 
 class Driver:
@@ -118,11 +126,6 @@ class Driver:
         led = set(self.mjcf.leads)
         self._following = {k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led}
         self._followed = [self._followed_by(name) for name in self.mjcf.followers]
-        self._prescribed: list[tuple[int, Function, float, float]] = [
-            (self.model.equality(lead.joint).id, info.prescribed, *lead.line)
-            for place, lead in self.mjcf.leads.items()
-            if (info := mechanism.coordinates[place]).prescribed is not None
-        ]
         self._rates: list[float] = []
         self._failure: BaseException | None = None
         self.reset()
@@ -233,19 +236,22 @@ class Driver:
         count = len(self._followed)
         rows, wanted = np.zeros((count + 1, self.model.nv)), np.zeros(count)
         for row, followed in enumerate(self._followed):
+            _, slope, curvature = followed.at(data)
             rows[row, followed.dof] = 1.0
             if followed.leader >= 0:
-                _, slope, curvature = followed.at(data)
                 rows[row, followed.leader] = -slope
-                wanted[row] = curvature * data.qvel[followed.leader] ** 2
+            wanted[row] = curvature * followed.rate(data) ** 2
         rows[count] = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
         solved = np.empty_like(rows)
         self._mujoco.mj_solveM(self.model, data, solved, rows)
         jacobian = rows[:count]
         forces = np.linalg.solve(jacobian @ solved[:count].T, wanted - jacobian @ solved[count])
         data.qfrc_passive += forces @ jacobian
-        # The rows of equalities stand first, in the order of the equalities.
-        data.efc_aref[np.searchsorted(data.efc_id[: data.ne], [item.equality for item in self._followed])] += wanted
+        # The rows of equalities stand first, in the order of the equalities. Those that `_follow` writes are for the
+        # start of a step: within it they have no errors to take back.
+        places = np.searchsorted(data.efc_id[: data.ne], [item.equality for item in self._followed])
+        written = [item.fitted for item in self._followed]
+        data.efc_aref[places] = np.where(written, 0.0, data.efc_aref[places]) + wanted
 
     def _change(self, _: Any, data: Any, actuator: int) -> float:
         """Rates of the auxiliary states, which `_push` has computed at the same evaluation."""
@@ -275,12 +281,12 @@ class Driver:
             if followed.fitted:
                 value, slope, curvature = followed.at(self.data)
                 self.data.qpos[followed.own] = value
-                self.data.qvel[followed.dof] = slope * self.data.qvel[followed.leader]
-                x, bend = self.data.qpos[followed.address], 0.5 * curvature
+                self.data.qvel[followed.dof] = slope * followed.rate(self.data)
+                if followed.leader < 0:
+                    slope = curvature = 0.0
+                x, bend = followed.argument(self.data), 0.5 * curvature
                 polynomial = value + x * (bend * x - slope), slope - curvature * x, bend, 0.0, 0.0
                 self.model.eq_data[followed.equality, :5] = polynomial
-        for number, prescribed, scale, start in self._prescribed:
-            self.model.eq_data[number, 0] = scale * prescribed.evaluate(np.array((self.data.time,)))[0] + start
 
     # ------------------------------------------------------------------------------------------------ making ready
     def _restore_inertias(self) -> None:
@@ -305,14 +311,12 @@ class Driver:
         )
 
     def _open_controls(self) -> None:
-        """Add a number to every control of the model, and find where in the numbers of the forces it is."""
+        """Add MuJoCo's controls to those of the model: numbers, whose places among those of the forces are found."""
         controls = self.system.forces.controls
-        zeros, ones = (
-            controls.driven(dict.fromkeys(controls.names, Constant(value))).record()[1] for value in (0.0, 1.0)
-        )
-        self.system.drive(controls.driven(dict.fromkeys(controls.names, Constant(0.0))))
+        none, one = (controls.driven(dict.fromkeys(controls.names, Constant(value))) for value in (0.0, 1.0))
+        self.system.drive(none)
         place = self.system.structure[layout.CONTROLS]
         first = self.system.structure[place + layout.NUMBERS] if place else 0
-        self._controls = first + np.flatnonzero(np.array(zeros) != np.array(ones))
+        self._controls = first + np.flatnonzero(np.array(none.record()[1]) != np.array(one.record()[1]))
         names = [self.model.actuator(k).name for k in range(self.model.nu)]
         self._states = names.index(STATES) if STATES in names else -1

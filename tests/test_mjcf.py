@@ -17,8 +17,11 @@ from osimlite import (
     Body,
     Coordinate,
     CoordinateActuator,
+    LinearFunction,
     Model,
+    PrescribedController,
     SimmSpline,
+    Sine,
     SpringGeneralizedForce,
 )
 from osimlite.translate.mjcf.driven import COMPUTED
@@ -103,6 +106,22 @@ def test_controls_and_states_are_mujocos():
     assert driver.data.joint("q1").qfrc_passive[0] == pytest.approx(2.0 * driver.data.act[0])
     driver.reset()
     assert driver.data.time == 0.0 and driver.data.act[0] == 0.5
+
+
+def test_a_prescribed_coordinate_follows_time_and_its_controller_the_control():
+    model = chain(CoordinateActuator(name="f", coordinate="q3", optimal_force=2.0))
+    wave = Sine(amplitude=0.3, omega=5.0, phase=0.2)
+    model["/jointset/j1/q1"].prescribed, model["/jointset/j1/q1"].prescribed_function = True, wave
+    brain = PrescribedController(name="brain", socket_actuators=("/forceset/f",))
+    brain.ControlFunctions.objects.append(LinearFunction(coefficients=(1.0, 0.5)))
+    model.add(brain)
+    trajectory = osimlite.simulate(model, to=0.2, accuracy=1e-9, controls={"f": 0.25})
+    driver = osimlite.mjcf.Driver(model)
+    driver.data.actuator("f").ctrl = 0.25
+    driver.step(200)
+    q, u, _ = driver.state()
+    np.testing.assert_allclose(q, trajectory.values[-1], rtol=0.0, atol=1e-8)
+    assert u[1] == pytest.approx(1.5 * np.cos(1.2), rel=1e-9) and not driver.mjcf.fidelity.records
 
 
 def test_callbacks_of_others_come_back_and_are_called():

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from osimlite.multibody.functions import Linear
+from osimlite.robot.drivers import Composed
 from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, ScapulothoracicJoint
 from osimlite.translate.mjcf.draft import Draft, Follower
 
@@ -32,6 +34,9 @@ def add_coordinates(draft: Draft) -> None:
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
             draft.follow(lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,)))
+            if draft.options.driver:
+                draft.functions[lead.joint] = Composed(Linear(*lead.line), info.prescribed)
+                continue
             note(
                 "prescribed",
                 info.path,
