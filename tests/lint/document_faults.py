@@ -67,6 +67,8 @@ def _reference(project: Project, draw: random.Random) -> tuple[str, Text, int, i
         for element in text.named.get(tag, ()):
             match = re.search(r'name="([^"]+)"', text.head(element))
             assert match is not None
+            if re.search(r"<apply>\s*false", text.whole(element)):
+                continue
             found.setdefault(tag, []).append((element.start + match.start(1), element.start + match.end(1)))
     if not found:
         return None
@@ -122,7 +124,7 @@ def name_in_the_model(project: Project, draw: random.Random) -> Change | None:
     return Change("model.osim", f"{old!r} is called {new!r}", whole.sub(new, model), lines, (old,), sure=True)
 
 
-_TEXT_FORNUMBER = ("abc", "1,5", "--1", "1e", "one", "0x10", "1.2.3", "true")
+_TEXT_FOR_NUMBER = ("abc", "1,5", "--1", "1e", "one", "0x10", "1.2.3", "true")
 
 
 def _is_numeric(text: str) -> bool:
@@ -134,8 +136,11 @@ def text_for_a_number(project: Project, draw: random.Random) -> Change | None:
     if leaf is None:
         return None
     words = leaf[1].inside(leaf[2]).split()
-    words[draw.randrange(len(words))] = draw.choice(_TEXT_FORNUMBER)
-    return new_value(*leaf, " ".join(words), sure=True)
+    at = draw.randrange(len(words))
+    words[at] = draw.choice(_TEXT_FOR_NUMBER)
+    # Of lists a comma parts the numbers; frames that joints do not need are called by a number.
+    is_other = words[at] == "1,5" or leaf[2].tag in ("wrt_body", "express_body")
+    return new_value(*leaf, " ".join(words), sure=not is_other)
 
 
 def number_out_of_range(project: Project, draw: random.Random) -> Change | None:

@@ -78,10 +78,12 @@ def label(project: Project, draw: random.Random) -> Change | None:
          "", f"{old}/value")
     )  # fmt: skip
     text = table.with_cells(table.label_line, [*table.labels[:at], new, *table.labels[at + 1 :]])
-    is_known = new in project.names and new not in others
+    # Of what only its beginning is asked for, the last letter may be another.
+    asked = old if project.places_of(old) or old in project.components else old[:-1]
+    is_known = (new in project.names and new not in others) or new.startswith(asked)
     return Change(
         table.name, f"label {old!r} -> {new!r}", text, (table.label_line + 1, table.label_line + 2), (old, old[:-1]),
-        sure=new != old and not is_known and at != table.time and not new.startswith(old),
+        sure=new != old and not is_known and at != table.time,
     )  # fmt: skip
 
 

@@ -60,7 +60,8 @@ def scale_factor(setup: Setup, found: Found) -> None:
         table = setup.table(scaler.marker_file)
         if table is None or setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
             continue
-        places, unit = marker_places(setup), METRES.get(table.entries["Units"].value.text, math.nan)
+        said = table.entries.get("Units")
+        places, unit = marker_places(setup), METRES.get(said.value.text, math.nan) if said else math.nan
         rows, columns = list(rows_between(table, scaler.time_range)), dict(cells_of(table))
         for measurement in members(scaler.measurement_set, "Measurement") if rows else ():
             pairs = members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ()

@@ -176,6 +176,10 @@ def unknown_name(setup: Setup, found: Found) -> None:
                     f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
                     severity=WARNING if follows else None, suggestion=nearest_name(control.name, sorted(actuators)),
                 )  # fmt: skip
+            elif follows and not control.is_model_control:
+                found(
+                    f"{called(control)} bounds no control of the model: OpenSim fails", control, tag="is_model_control"
+                )
         for controller in setup.named("ControlSetController") if plain else ():
             table = setup.table(controller.controls_file)
             lost = [column for column in table.columns if column not in actuators] if table is not None else []
