@@ -34,14 +34,14 @@ from osimlite.translate.mjcf.driven import add_driven
 from osimlite.translate.mjcf.forces import add_forces
 from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.paths import add_paths
-from osimlite.translate.mjcf.scenery import add_markers, add_shapes
+from osimlite.translate.mjcf.scenery import add_camera, add_markers, add_shapes
 from osimlite.translate.survey import account_for_rest
 
 Pass = Callable[[Draft], None]
 
 MECHANISM: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
 LAWS: tuple[Pass, ...] = (add_contacts, add_paths, add_forces)
-LOOKS: tuple[Pass, ...] = (add_shapes, add_markers, add_frames, add_keyframe)
+LOOKS: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_keyframe)
 """What makes a file of a model, in this order: bodies and joints come before what acts on them or is fixed to them."""
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from osimlite.multibody.spatial import cross
 from osimlite.robot.shapes import Ball, Box, MeshFile, Tube, Visual
 from osimlite.translate.mjcf.draft import Draft, Value, add, pose
 
@@ -28,6 +31,20 @@ def add_shapes(draft: Draft) -> None:
                 **shape(draft, visual),
             )
             draft.fidelity.translated[visual.source] = f"geom {name}"
+
+
+def add_camera(draft: Draft) -> None:
+    """Add a camera that sees the default pose upright: MuJoCo takes z for up, where models of OpenSim have y."""
+    state = draft.mechanism.at(draft.default_state[0])
+    spots = np.array([np.zeros(3), *(state.transform(index)[:3, 3] for index in range(len(draft.mechanism.bodies)))])
+    low, high = spots.min(axis=0), spots.max(axis=0)
+    fall = draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
+    up = -fall / np.linalg.norm(fall)
+    right = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
+    right = right - (right @ up) * up
+    right /= np.linalg.norm(right)
+    place = 0.5 * (low + high) + (1.0 + 2.0 * float(np.linalg.norm(high - low))) * cross(right, up)
+    add(draft.section("worldbody"), "camera", name="side", pos=place, xyaxes=(*right, *up))
 
 
 def add_markers(draft: Draft) -> None:

@@ -106,6 +106,8 @@ def test_names_are_those_of_the_model_and_paths_where_two_share_one():
     # Nothing that is only looked at touches anything, or has a mass.
     assert not model.geom_contype.any() and not model.geom_conaffinity.any()
     assert model.body("leg_l").mass == 1.0
+    # The camera looks along the horizon, upright.
+    np.testing.assert_allclose(model.camera("side").mat0.reshape(3, 3), np.eye(3), rtol=0.0, atol=1e-12)
     assert model.key("default").qpos.tolist() == [0.2, 0.2]
 
 
