@@ -22,7 +22,12 @@ def project(fixtures, tmp_path, monkeypatch):
     folder.mkdir()
     for file in (fixtures / "lint").glob("leg*"):
         copy(file, folder)
-    for code, name in (("OSIM821", "pass-ik.xml"), ("OSIM853", "pass-scale.xml"), ("OSIM852", "pass-analyze.xml")):
+    for code, name in (
+        ("OSIM821", "pass-ik.xml"),
+        ("OSIM853", "pass-scale.xml"),
+        ("OSIM852", "pass-analyze.xml"),
+        ("OSIM862", "pass-markers.omoco"),
+    ):
         text = (fixtures / "lint" / code / name).read_text().replace("../", "")
         (folder / name.removeprefix("pass-")).write_text(text)
     (folder / "pom.xml").write_text("<project/>")
@@ -34,8 +39,8 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     (project / "leg_no_knee.mot").unlink()
     (project / "leg_degrees.mot").unlink()
     assert validate_paths(["."], cached=False) == 0
-    assert capsys.readouterr().out.startswith("Nothing found in 11")
-    assert validate(".").checked == 11
+    assert capsys.readouterr().out.startswith("Nothing found in 12")
+    assert validate(".").checked == 12
     # The name of a marker is changed in the model alone.
     model = project / "leg.osim"
     model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
@@ -90,7 +95,7 @@ def test_every_class_of_setups_is_checked_by_every_rule(project, tag):
         run(subject_of("setup.xml"))
 
 
-@pytest.mark.parametrize("name", ["ik.xml", "scale.xml", "analyze.xml", "leg_grf.xml"])
+@pytest.mark.parametrize("name", ["ik.xml", "scale.xml", "analyze.xml", "leg_grf.xml", "markers.omoco"])
 def test_no_damage_makes_the_check_fail(project, name):
     good = (project / name).read_bytes()
     draw = random.Random(2)
