@@ -80,6 +80,12 @@ class Setup(Subject):
             found.setdefault(type(item), []).append(item)
         return found
 
+    @cached_property
+    def own(self) -> list[Object]:
+        """The objects that are no part of a model that the document holds, in the order of the document."""
+        inside = {id(part) for model in self.by_class.get(Model, ()) for part in model.walk()}
+        return [item for item in self.items if id(item) not in inside]
+
     def having(self, *properties: str) -> Iterator[Any]:
         """Every object whose class has these properties, class by class."""
         for cls, items in self.by_class.items():
@@ -104,7 +110,7 @@ class Setup(Subject):
 
     def named_files(self, *rules: str) -> Iterator[Naming]:
         """Every file that an object of the document names, by the rules of its properties."""
-        for item in self.items:
+        for item in self.own:
             for spec in reference_specs(type(item)):
                 if isinstance(spec.kind, Reference) and spec.kind.rule in rules:
                     value = getattr(item, spec.name)
@@ -201,15 +207,10 @@ class Setup(Subject):
         """Every name that stands in the document, of a component or of something else."""
         found: list[Use] = []
         named: dict[int, NamesOf | None] = {}
-        inside: set[int] = set()
-        for item in self.items:
+        for item in self.own:
             cls = type(item)
             # What is named in a setup is looked up in the model: nothing in the document owns it.
             owner: Any = item if self.tree is None else self.tree.model
-            if id(item) in inside:
-                continue
-            if cls is Model:
-                inside |= set(map(id, item.walk()))
             names = named.get(id(item))
             if item.name and (names is not None or cls.name_reference is not None):
                 found.append(Use(item, owner, name_spec(cls, names), item.name))

@@ -118,9 +118,9 @@ def study_data(setup: Setup, found: Found) -> None:
     """A table that a study follows, or starts from, does not fit its model.
 
     ## What it does
-    Looks for tables that are not named, for motions that do not say whether they are in degrees, for columns that are
-    no state, control, generalized force or marker of the model, and for states and controls that an initial guess
-    lacks.
+    Looks for tables that are not named, for motions that do not say whether they are in degrees, for times that a table
+    does not have, for columns that are no state, control, generalized force or marker of the model, and for states and
+    controls that an initial guess lacks.
 
     ## Why is this bad
     OpenSim refuses the study.
@@ -179,6 +179,16 @@ def study_data(setup: Setup, found: Found) -> None:
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
                     found(f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study", held, tag=tag)
+            followed = setup.table(name) if is_of(item, "MocoTool") else None
+            if followed is not None and followed.span is not None:
+                first, last = followed.span
+                for time in ("initial_time", "final_time"):
+                    wanted = getattr(item, time)
+                    if wanted is not None and not first <= wanted <= last:
+                        found(
+                            f"'{name}' has {first!r} to {last!r} s, and not {wanted!r} s: OpenSim refuses the tool",
+                            item, tag=time,
+                        )  # fmt: skip
             allowed = any(getattr(item, flag, False) for flag in _ALLOW)
             for column in [] if allowed else _strangers(setup, spec, held, name):
                 found(
