@@ -104,7 +104,8 @@ class Curves(NamedTuple):
         """Those of an actuator by its length range (m), and its numbers of gain and bias."""
         (low, high), (first, last) = lengthrange, gain[:2]
         fiber = (high - low) / (last - first)
-        shift = (gain[0] - bias[0]) if bias[1] - bias[0] == last - first else math.nan
+        same_scale = math.isclose(bias[1] - bias[0], last - first, rel_tol=1e-9)
+        shift = gain[0] - bias[0] if same_scale else math.nan
         return cls(low - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift)
 
     def numbers(self, vmax: float, fvmax: float) -> tuple[Array, Array]:

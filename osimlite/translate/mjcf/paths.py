@@ -24,8 +24,8 @@ from osimlite.translate.mjcf.poses import Poses, Truth, random_poses
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
 
-CHOOSING, FITTING, HELD_OUT = 150, 250, 150
-"""How many random poses a tendon is chosen by, fitted to, and measured in."""
+CHOSEN, FITTED, TRIED, HELD_OUT = 100, 250, 500, 100
+"""How many random poses a tendon is chosen by, or fitted to and tried in once more, and measured in."""
 EXACT = 1e-9
 """Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
 WRAPS = 4
@@ -43,8 +43,9 @@ def add_paths(draft: Draft) -> None:
         return
     exact = Paths(draft.model)
     fits = draft.options.fit != "none"
-    poses, truth = random_poses(exact, FITTING if fits else CHOOSING, 0)
+    poses, truth = random_poses(exact, FITTED if fits else CHOSEN, 0)
     held, held_truth = random_poses(exact, HELD_OUT, 1)
+    others, other_truth = random_poses(exact, TRIED, 2) if fits else (poses, truth)
     writer = _Writer(draft)
     for path, given in owners.items():
         route = exact.routes[path]
@@ -56,7 +57,9 @@ def add_paths(draft: Draft) -> None:
         router = Router(route, truth[path], poses, draft.options.version)
         tendon = router.best()
         if fits:
-            tendon = fitted(router, tendon)
+            # What is better only where it was fitted, snaps off elsewhere.
+            judge = Router(route, other_truth[path], others, draft.options.version)
+            tendon = min(tendon, fitted(router, tendon), key=judge.error)
         name = writer.tendon(path, tendon)
         draft.tendons[path] = Tied(name, truth[path].lengths, held_truth[path].lengths)
         draft.account(own, f"tendon {name}")

@@ -37,7 +37,7 @@ def test_fibers_and_tendons_keep_their_lengths(corpus):
 
 @pytest.mark.parametrize("activation", [0.0, 0.3, 1.0])
 def test_tension_is_mujocos(activation):
-    curves = Curves(0.2, 0.1, 500.0, 0.4, 1.7, 1.5, 1.2, 0.1)
+    curves = Curves(0.2, 0.1, 500.0, 0.4, 1.7, 1.5, 1.2, 0.13)
     gain, bias = (" ".join(map(str, row)) for row in curves.numbers(10.0, 1.4))
     model = mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody><site name="a"/>
         <body><joint name="x" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="b"/></body>
