@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from osimlite._require import require
 from osimlite.errors import OsimliteError
@@ -53,6 +54,8 @@ LENGTHS = 24
 """So many lengths, evenly spread over those that occur."""
 LEAST, GREATEST = (0.0, 1.05, 1.05, 0.0), (0.95, 4.0, 6.0, 20.0)
 """Bounds of the ends of the active curve, and of end and height of the passive one."""
+MOST = 3.0
+"""Tensions, as parts of the greatest isometric force, beyond which a pose is none that a body could take."""
 SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
 FREE = 0.25
@@ -153,7 +156,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     if lags:
         draft.activations[name] = getattr(force, "default_activation", 0.0)
     draft.account(path, f"actuator {name}")
-    off = (curves.tensions(lengths) - tensions) / force.max_isometric_force
+    off = ((curves.tensions(lengths) - tensions) / force.max_isometric_force)[_counts(tensions, own)]
     draft.fidelity.add(
         "muscle",
         path,
@@ -161,7 +164,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         "a muscle of MuJoCo's, "
         + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths"),
         f"actuator {name}",
-        {"isometric force": Error.of(off[np.isfinite(off)], "Fmax")} if np.isfinite(off).any() else {},
+        {"isometric force": Error.of(off, "Fmax")} if len(off) else {},
     )
     return f"actuator {name}"
 
@@ -170,6 +173,11 @@ def _isometric(force: Muscle, lengths: Array) -> tuple[Array, Array]:
     """Lengths (L,) spread as those that occur, and the muscle's tensions (A, L) there."""
     spread = np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS))
     return spread, isometric_tension(force, spread, ACTIVATIONS)
+
+
+def _counts(tensions: Array, own: Curves) -> NDArray[np.bool_]:
+    """Which tensions (A, L) are compared."""
+    return np.nan_to_num(tensions, nan=np.inf) < MOST * own.force
 
 
 def _rates(force: Muscle, cos: float) -> tuple[float, float]:
@@ -181,7 +189,7 @@ def _rates(force: Muscle, cos: float) -> tuple[float, float]:
 
 def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
     """The curves nearest to tensions (A, L) at lengths (L,), with tendon, fibers and strength too if `free`."""
-    known = np.isfinite(tensions)
+    known = _counts(tensions, own)
     if not known.any():
         return own
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
