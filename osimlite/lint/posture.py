@@ -25,14 +25,18 @@ def coordinate_of(column: str) -> str:
 
 
 def poses_in(setup: Setup, motion: Table, time: float) -> dict[int, Pose]:
-    """The pose in ground of each body (by identity), at a time of a motion given as coordinates."""
+    """The pose in ground of each body (by identity), at a time of a motion given as coordinates; worked out once."""
+    key = f"poses at {time} of {motion.file}"
+    if key in setup.kept:
+        return cast("dict[int, Pose]", setup.kept[key])
     angles = angles_of(setup)
     turn = math.pi / 180.0 if isinstance(motion.header, StorageHeader) and motion.header.in_degrees else 1.0
     values = {
         name: value * turn if name in angles else value
         for name, value in zip(map(coordinate_of, motion.columns), motion.row_at(time)[1:], strict=False)
     }
-    return poses_at(_model_of(setup), values)
+    setup.kept[key] = found = poses_at(_model_of(setup), values)
+    return found
 
 
 def marker_places(setup: Setup) -> dict[str, Vector]:

@@ -13,7 +13,7 @@ from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.text import listed
 
-_TIMES = 24
+_TIMES = 16
 """How many times of a motion are looked at."""
 _NEAR = 0.4
 """How far from the origin of its body, m, a measured force may act. Of 24 public gaits none is farther than 0.29."""
