@@ -176,6 +176,8 @@ def unknown_name(setup: Setup, found: Found) -> None:
                     f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
                     severity=WARNING if follows else None, suggestion=nearest_name(control.name, sorted(actuators)),
                 )  # fmt: skip
+            elif not follows and getattr(control, "x_nodes", None) == []:
+                found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
             elif follows and not control.is_model_control:
                 found(
                     f"{called(control)} bounds no control of the model: OpenSim fails", control, tag="is_model_control"

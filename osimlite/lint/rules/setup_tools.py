@@ -20,7 +20,8 @@ def tool_setting(setup: Setup, found: Found) -> None:
     Looks for accuracies and error tolerances that are not positive or far too large, tools without an analysis,
     analyses with one name, that are off, or whose step is not positive, static optimization without the model's forces,
     without an actuator for the joint to ground, or with an exponent of 1 or less, muscles that are analyzed without
-    being in equilibrium, forces that replace those of the model, and controllers that are off.
+    being in equilibrium, forces that replace those of the model, and forces and
+    controllers that are off.
 
     ## Why is this bad
     Some make OpenSim crash or run for ever, some give other results without a word.
@@ -165,6 +166,10 @@ def tool_setting(setup: Setup, found: Found) -> None:
                     f"the model has a force '{force.name}' already, whose place this one takes", force,
                     attribute="name", severity=WARNING,
                 )  # fmt: skip
+    for forces in setup.named("ForceSet"):
+        for force in members(forces, "Force"):
+            if not force.appliesForce:
+                found(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
     for controller in setup.named("Controller") if setup.tool is not None else ():
         if not controller.enabled:
             found(f"{called(controller)} is off", controller, tag="enabled", severity=INFO)
