@@ -16,10 +16,14 @@ import pytest
 from osimlite.lint.diagnostic import Finding
 from osimlite.lint.engine import run, subject_of
 from tests.lint.project_faults import faults, harmless
-from tests.lint.projects import Fault, Project, pendulum, walking
+from tests.lint.projects import FIXTURES, Fault, Project, pendulum, walking
 
 WANTED = int(os.environ.get("OSIMLITE_FAULTS", "300"))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
+
+
+NODES = (FIXTURES / "setups" / "controls.xml").read_text().partition("<x_nodes>")[2].partition("</x_nodes>")[0]
+"""The control curve of a setup."""
 
 
 class Folder:
@@ -96,7 +100,7 @@ def test_a_fault_is_found_where_it_is(folder):
         (walking, "constraints.xml", "hamstrings_r.excitation", "hamstrings_r"),
         (walking, "constraints.xml", "<is_model_control> true", "<is_model_control> false"),
         (walking, "reserves.xml", "<isDisabled>false", "<isDisabled>true"),
-        (walking, "controls.xml", "x_nodes>", "x_node>"),
+        (walking, "controls.xml", f"<x_nodes>{NODES}</x_nodes>", "<x_nodes />"),
         (walking, "controls.xml", "hamstrings_r.excitation", "/forceset/hamstrings_r.excitation"),
         (walking, "forward.xml", ">controls.xml<", ">coords.mot<"),
         (walking, "ik.xml", "> model.osim <", ">walk.trc<"),
