@@ -219,7 +219,7 @@ def table_setting(table: Table, found: Found) -> None:
 
     ## What it does
     Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at `version`, `DataType`,
-    and of marker files at `Units` (m, cm, mm) and `DataRate`.
+    and of marker files at `Units` (m, cm, mm) and `DataRate`, which is compared with the times (for information).
 
     ## Why is this bad
     For OpenSim `inDegrees=true` is no: the angles are taken for radians without a word. Unknown units make it refuse
@@ -322,7 +322,8 @@ def column_label(table: Table, found: Found) -> None:
 
     ## What it does
     The first column of a storage file is `time`, in small letters. Every column has a label of its own. Labels of
-    markers have no blanks, and the time and the frame before them are called `Time` and `Frame#`.
+    markers have no blanks, every marker has one, and the time and the frame before them are called `Time` and `Frame#`.
+    In a storage file of version 2 or 3 tabs separate the labels (a warning).
 
     ## Why is this bad
     Without a column `time` OpenSim refuses the table. Of two columns with one label it finds the first (a warning), and
