@@ -34,7 +34,6 @@ from osimlite.schema.moco.parts import (
     OfStates,
     PatternOfControls,
     PatternOfStates,
-    StateWeights,
 )
 from osimlite.schema.moco.path_constraints import MocoPathConstraint
 from osimlite.schema.model import Model
@@ -250,7 +249,9 @@ class MocoTrack(MocoTool):
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
     """How much deviations of states count."""
-    states_weight_set: StateWeights = made(MocoWeightSet, name="states_weight_set")
+    states_weight_set: Annotated[Single[MocoWeightSet], NamesOf(OfStates.reference, refused=False)] = made(
+        MocoWeightSet, name="states_weight_set"
+    )
     """Weights by paths of states."""
     scale_state_weights_with_range: Flag = False
     """Whether deviations are divided by the ranges of the coordinates."""
