@@ -9,6 +9,7 @@ from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Unknown
 from osimlite.schema.fields import Reference
+from osimlite.schema.specs import reference_specs
 from osimlite.schema.states import variables
 from osimlite.text import listed
 
@@ -112,6 +113,12 @@ def unknown_name(setup: Setup, found: Found) -> None:
     model = tree.model
     known: dict[tuple[str, str], set[str]] = {}
     off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
+    for cls, items in setup.by_class.items():
+        for spec in reference_specs(cls) if is_of(items[0], "Force") else ():
+            what = _IN_MODEL.get(spec.kind.rule) if isinstance(spec.kind, Reference) and spec.kind.required else None
+            for item in items if what else ():
+                if getattr(item, spec.name) in ("", None):
+                    found(f"{called(item)} names no {what}: OpenSim refuses it", item, tag=spec.tag)
     for use in setup.uses:
         item, kind, tag, text = use.holder, use.reference, use.spec.tag, str(use.value).strip()
         what = _IN_MODEL.get(kind.rule)
