@@ -38,28 +38,22 @@ Integrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
 
 class _Followed(NamedTuple):
-    """A joint that follows another, or time: equality, address and dof, and those of the leader (-1: time)."""
+    """A joint that follows others, or time: its equality, address and dof, addresses and dofs of what it follows."""
 
     equality: int
     own: int
     dof: int
-    leader: int
-    address: int
+    addresses: list[int]
+    leaders: list[int]
     function: Function
     fitted: bool
 
-    def at(self, data: Any) -> tuple[float, float, float]:
-        """What the function has the joint at, its slope and its curvature."""
-        value, (slope,), ((curvature,),) = self.function.evaluate(np.array((self.argument(data),)))
-        return value, float(slope), float(curvature)
-
-    def argument(self, data: Any) -> float:
-        """What the function is of."""
-        return float(data.qpos[self.address] if self.leader >= 0 else data.time)
-
-    def rate(self, data: Any) -> float:
-        """Of the argument."""
-        return float(data.qvel[self.leader]) if self.leader >= 0 else 1.0
+    def at(self, data: Any) -> tuple[float, Array, float, float]:
+        """Where the function has the joint, its gradient, its rate, and what its curvature adds to the acceleration."""
+        x, rates = (data.qpos[self.addresses], data.qvel[self.leaders]) if self.leaders else (data.time, 1.0)
+        value, gradient, hessian = self.function.evaluate(np.atleast_1d(x))
+        rates = np.atleast_1d(rates)
+        return value, gradient, float(gradient @ rates), float(rates @ hessian @ rates)
 
 
 class Driver:
@@ -108,6 +102,7 @@ class Driver:
         else:
             self.model = self._mujoco.MjModel.from_xml_path(str(file))
         self.model.opt.timestep = timestep
+        self.model.opt.jacobian = self._mujoco.mjtJacobian.mjJAC_DENSE
         self.model.opt.integrator = getattr(self._mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
         self.data = self._mujoco.MjData(self.model)
         self._mechanism = mechanism = self.mjcf.robot.mechanism
@@ -126,6 +121,7 @@ class Driver:
         led = set(self.mjcf.leads)
         self._following = {k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led}
         self._followed = [self._followed_by(name) for name in self.mjcf.followers]
+        self._free = np.setdiff1d(np.arange(self.model.nv), [followed.dof for followed in self._followed])
         self._rates: list[float] = []
         self._failure: BaseException | None = None
         self.reset()
@@ -139,7 +135,8 @@ class Driver:
         y = self.system.state.pack(q.tolist(), u.tolist())
         if self._equilibrate:
             y = self.system.equilibrated(0.0, y)
-        self.data.act[:] = self.system.state.auxiliary(y)
+        if self._states >= 0:
+            self.data.act[:] = self.system.state.auxiliary(y)
         self.set_state(q, u)
 
     def forward(self) -> None:
@@ -202,7 +199,7 @@ class Driver:
 
     def _push(self, data: Any) -> None:
         """Add the generalized forces of the model's laws to the passive ones."""
-        if self._failure is not None:
+        if self._failure is not None or not self.model.nv:
             return
         try:
             q, u, slopes = self._coordinates(data)
@@ -226,32 +223,43 @@ class Driver:
         self._hold(data)
 
     def _hold(self, data: Any) -> None:
-        """Add the forces that let joints accelerate with those that they follow.
+        """Add the forces of all equalities, with which joints accelerate as those that they follow.
 
-        MuJoCo's own equalities leave a ten-thousandth of the difference. With these forces, and told what the curvature
-        asks for, which MuJoCo leaves out, nothing is left to them but to take back errors of position and speed.
+        MuJoCo's own leave a ten-thousandth of the difference. With these forces, and told what the curvature asks for,
+        which MuJoCo leaves out, nothing is left to them but to take back errors of position and speed.
         """
-        if not self._followed:
+        if not data.ne:
             return
-        count = len(self._followed)
-        rows, wanted = np.zeros((count + 1, self.model.nv)), np.zeros(count)
-        for row, followed in enumerate(self._followed):
-            _, slope, curvature = followed.at(data)
-            rows[row, followed.dof] = 1.0
-            if followed.leader >= 0:
-                rows[row, followed.leader] = -slope
-            wanted[row] = curvature * followed.rate(data) ** 2
-        rows[count] = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
-        solved = np.empty_like(rows)
-        self._mujoco.mj_solveM(self.model, data, solved, rows)
-        jacobian = rows[:count]
-        forces = np.linalg.solve(jacobian @ solved[:count].T, wanted - jacobian @ solved[count])
-        data.qfrc_passive += forces @ jacobian
-        # The rows of equalities stand first, in the order of the equalities. Those that `_follow` writes are for the
-        # start of a step: within it they have no errors to take back.
+        # Accelerations are moves @ those of the other joints + wanted.
+        moves, wanted = np.eye(self.model.nv), np.zeros(self.model.nv)
+        for followed in self._followed:
+            _, gradient, _, wanted[followed.dof] = followed.at(data)
+            moves[followed.dof, followed.dof] = 0.0
+            if followed.leaders:
+                moves[followed.dof, followed.leaders] = gradient
+        moves = moves[:, self._free]
+        # The rows of equalities stand first, in the order of the equalities.
         places = np.searchsorted(data.efc_id[: data.ne], [item.equality for item in self._followed])
-        written = [item.fitted for item in self._followed]
-        data.efc_aref[places] = np.where(written, 0.0, data.efc_aref[places]) + wanted
+        others = np.setdiff1d(np.arange(data.ne), places)
+        rows = data.efc_J.reshape(-1, self.model.nv)[others]
+        applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
+        inertia = np.array([self._weighed(data, column) for column in moves.T.copy()]) @ moves
+        known = np.append(moves.T @ (applied - self._weighed(data, wanted)), data.efc_aref[others] - rows @ wanted)
+        held = rows @ moves
+        matrix = np.block([[inertia, held.T], [held, np.zeros((len(others), len(others)))]])
+        found = np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
+        accelerations = moves @ found[: len(self._free)] + wanted
+        data.qfrc_passive += self._weighed(data, accelerations) - applied
+        # What `_follow` writes is for the start of a step: within it there are no errors to take back.
+        for place, item in zip(places, self._followed, strict=True):
+            rest = 0.0 if item.fitted else data.efc_aref[place]
+            data.efc_aref[place] = rest + (wanted if len(item.leaders) == 1 else accelerations)[item.dof]
+
+    def _weighed(self, data: Any, accelerations: Array) -> Array:
+        """The mass matrix times accelerations (nv,)."""
+        forces = np.empty(self.model.nv)
+        self._mujoco.mj_mulM(self.model, data, forces, accelerations)
+        return forces
 
     def _change(self, _: Any, data: Any, actuator: int) -> float:
         """Rates of the auxiliary states, which `_push` has computed at the same evaluation."""
@@ -279,13 +287,14 @@ class Driver:
         """Put joints where they must follow others, and write value, slope and curvature into the equalities."""
         for followed in self._followed:
             if followed.fitted:
-                value, slope, curvature = followed.at(self.data)
-                self.data.qpos[followed.own] = value
-                self.data.qvel[followed.dof] = slope * followed.rate(self.data)
-                if followed.leader < 0:
-                    slope = curvature = 0.0
-                x, bend = followed.argument(self.data), 0.5 * curvature
-                polynomial = value + x * (bend * x - slope), slope - curvature * x, bend, 0.0, 0.0
+                value, gradient, rate, _ = followed.at(self.data)
+                self.data.qpos[followed.own], self.data.qvel[followed.dof] = value, rate
+                polynomial = np.zeros(5)
+                polynomial[0] = value
+                if len(followed.leaders) == 1:
+                    x, slope = self.data.qpos[followed.addresses[0]], gradient[0]
+                    bend = 0.5 * followed.function.evaluate(np.array((x,)))[2][0, 0]
+                    polynomial[:3] = value + x * (bend * x - slope), slope - 2.0 * bend * x, bend
                 self.model.eq_data[followed.equality, :5] = polynomial
 
     # ------------------------------------------------------------------------------------------------ making ready
@@ -298,14 +307,15 @@ class Driver:
         self._mujoco.mj_setConst(self.model, self.data)
 
     def _followed_by(self, name: str) -> _Followed:
-        follower, functions = self.mjcf.followers[name], self.mjcf.functions
-        leader = None if follower.leader is None else self.model.joint(follower.leader)
+        follower, functions, own = self.mjcf.followers[name], self.mjcf.functions, self.model.joint(name)
+        names = self.mjcf.arguments.get(name, () if follower.leader is None else (follower.leader,))
+        leaders = [self.model.joint(each) for each in names]
         return _Followed(
             self.model.equality(name).id,
-            self.model.joint(name).qposadr[0],
-            self.model.joint(name).dofadr[0],
-            -1 if leader is None else leader.dofadr[0],
-            -1 if leader is None else leader.qposadr[0],
+            own.qposadr[0],
+            own.dofadr[0],
+            [leader.qposadr[0] for leader in leaders],
+            [leader.dofadr[0] for leader in leaders],
             functions.get(name) or Polynomial(follower.polynomial[::-1]),
             name in functions,
         )

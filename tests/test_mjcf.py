@@ -15,8 +15,11 @@ from osimlite import (
     ActivationCoordinateActuator,
     BallJoint,
     Body,
+    ConstantDistanceConstraint,
     Coordinate,
     CoordinateActuator,
+    CoordinateCouplerConstraint,
+    EllipsoidJoint,
     LinearFunction,
     Model,
     PrescribedController,
@@ -78,6 +81,55 @@ def test_a_ball_joint_turns_by_its_angular_velocity():
     driver.step(200)
     np.testing.assert_allclose(driver.state()[0], trajectory.values[-1], rtol=0.0, atol=1e-7)
     np.testing.assert_allclose(driver.state()[1], trajectory.speeds[-1], rtol=0.0, atol=1e-6)
+
+
+def slung() -> Model:
+    """A body on an ellipsoid."""
+    model = Model(name="shoulder")
+    body = model.add(Body(name="scapula", mass=1.0, inertia=(0.1, 0.1, 0.1, 0, 0, 0), mass_center=(0.0, 0.0, 0.1)))
+    values = zip("abc", (0.3, 0.4, -0.2), strict=True)
+    coordinates = [Coordinate(name=name, default_value=value) for name, value in values]
+    joint = EllipsoidJoint(name="j", radii_x_y_z=(0.1, 0.25, 0.18), coordinates=coordinates)
+    model.add(joint.between(model.ground, body, at=(0.1, 0.2, 0.3), turned=(0.2, 0.1, 0.5)))
+    return model
+
+
+def tied() -> Model:
+    """A chain whose coordinates are coupled, and whose end is at a distance from a point."""
+    model = chain()
+    couple = CoordinateCouplerConstraint(
+        name="c",
+        coupled_coordinates_function=SPLINE,
+        independent_coordinate_names=("q1",),
+        dependent_coordinate_name="q4",
+    )
+    rod = ConstantDistanceConstraint(
+        name="d",
+        socket_body_1="/ground",
+        socket_body_2="/bodyset/b2",
+        location_body_1=(0.2, -0.3, 0),
+        constant_distance=0.9,
+    )
+    model.constraint_set.objects += [couple, rod]
+    return model
+
+
+@pytest.mark.parametrize("make", [slung, tied])
+def test_bodies_on_ellipsoids_and_under_constraints_accelerate_as_they_must(make):
+    driver = osimlite.mjcf.Driver(make())
+    mechanism = driver.mjcf.robot.mechanism
+    q, u = mechanism.default_state()
+    driver.set_state(q, u)
+    found = [driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))]
+    wanted = mechanism.rate_matrix(q) @ mechanism.acceleration(q, u) + mechanism.rate_bias(q, u)
+    np.testing.assert_allclose(found, wanted, rtol=1e-8, atol=1e-8)
+    driver.step(50)
+    q, u, _ = driver.state()
+    state = mechanism.at(q, u)
+    mujoco.mj_kinematics(driver.model, driver.data)
+    for index, body in enumerate(mechanism.bodies):
+        np.testing.assert_allclose(driver.data.body(body.name).xpos, state.transform(index)[:3, 3], rtol=0, atol=1e-12)
+    assert all(np.abs(item.position_errors(state)).max() < 1e-5 for item in mechanism.constraints)
 
 
 def test_a_force_on_a_coordinate_without_a_joint_acts_on_the_one_that_leads_it():

@@ -33,7 +33,8 @@ def add_couplings(draft: Draft) -> None:
         if len(joint.coordinates) == 1 and line is not None and line.slope:
             draft.leads.setdefault(joint.coordinates[0], Lead(joint.name, line))
     draft.leads |= {place: Lead(joint.name, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
-    add_ellipsoids(draft)
+    if not draft.options.driver:
+        add_ellipsoids(draft)
     drivers = coordinate_drivers(robot)
     by_coupler = {item.dependent: item.name for item in couplers(robot) if item.dependent in drivers}
     for joint in robot.moving:
@@ -139,9 +140,14 @@ def along(line: Line, polynomial: Array) -> tuple[float, ...]:
 
 
 def _hold(draft: Draft, joint: RobotJoint) -> None:
-    """Hold a joint that is a function of several coordinates where the default pose has it."""
+    """Hold a joint that is a function of several coordinates where the default pose has it, but for the driver."""
     value = joint.value(draft.default_state[0])
     draft.follow(joint.name, Follower(None, (value,)))
+    leads = [draft.leads.get(place) for place in joint.coordinates]
+    if draft.options.driver and all(lead is not None and lead.line == (1.0, 0.0) for lead in leads):
+        draft.functions[joint.name] = joint.function
+        draft.arguments[joint.name] = tuple(lead.joint for lead in leads if lead is not None)
+        return
     places, random = list(joint.coordinates), np.random.default_rng(0)
     low, high = np.array([draft.mechanism.coordinates[place].range for place in places]).T
     off = [joint.function.evaluate(random.uniform(low, high))[0] - value for _ in range(500)]

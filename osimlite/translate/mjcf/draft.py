@@ -109,6 +109,7 @@ class Draft:
         followers: what equality constraints make of joints, by name.
         helpers: those of them that move nothing, but are what others follow.
         functions: that a joint exactly is of the joint that it follows, by name, where the polynomial is fitted.
+        arguments: the joints that a function of several is of, by the name of the joint that it puts somewhere.
         starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
         tendons: of paths, by the absolute path of their owners.
         activations: at the start, of the actuators that have one, by name.
@@ -130,6 +131,7 @@ class Draft:
     activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)
     functions: dict[str, Function] = field(default_factory=dict)
+    arguments: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _names: dict[str, set[str]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 

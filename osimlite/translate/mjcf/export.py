@@ -56,7 +56,8 @@ class Mjcf:
         robot: the neutral robot that was written; its joints and links have MuJoCo's names.
         files: mesh files that the text names, and what the driver needs, by name relative to it.
         followers: what equality constraints make of joints, by name.
-        functions: what the driver makes of them, by name: functions of the joint that is followed.
+        functions: what the driver makes of them, by name: functions of the joint that is followed, or of time.
+        arguments: the joints that such a function is of, where they are several.
         leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
     """
 
@@ -68,6 +69,7 @@ class Mjcf:
     leads: Mapping[int, Lead] = field(default_factory=dict)
     followers: Mapping[str, Follower] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
+    arguments: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
@@ -165,6 +167,7 @@ def to_mjcf(
         draft.leads,
         draft.followers,
         draft.functions,
+        draft.arguments,
     )
 
 
