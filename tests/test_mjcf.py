@@ -27,6 +27,7 @@ from osimlite import (
     Sine,
     SpringGeneralizedForce,
 )
+from osimlite.errors import OsimliteError
 from osimlite.translate.mjcf.driven import COMPUTED
 from tests.translate.mjcf.test_couplings import coupled, on_a_function
 from tests.translate.mjcf.test_forces import chain
@@ -203,3 +204,27 @@ def test_an_edited_file_is_driven(tmp_path):
     assert driver.model.geom("rock").id >= 0
     driver.step(3)
     assert driver.data.time == pytest.approx(0.003)
+
+
+NEARLY = {"m0163": 1e-3, "m0466": 1e-3}
+"""Relative errors of models with a shoulder that a constraint nearly holds twice, and with a helper of 1 g."""
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_real_models_accelerate_as_the_mechanism_does(corpus_model):
+    try:
+        driver = osimlite.mjcf.Driver(osimlite.read(corpus_model.path), folder=corpus_model.path.parent)
+        mechanism, layout = driver.mjcf.robot.mechanism, driver.system.state
+        if not driver.mjcf.leads:
+            pytest.skip("nothing moves")
+        q, u, z = driver.state()
+        row = driver.system.applied(0.0, layout.pack(q.tolist(), u.tolist(), z.tolist()))
+        forces, order = np.zeros(len(q)), list(layout.order)
+        forces[order] = row[len(order) : 2 * len(order)]
+        wanted = mechanism.rate_matrix(q) @ mechanism.acceleration(q, u, forces) + mechanism.rate_bias(q, u)
+    except OsimliteError as error:
+        pytest.skip(f"osimlite cannot move it: {error.message[:80]}")
+    for place, (joint, line) in driver.mjcf.leads.items():
+        found = driver.data.joint(joint).qacc[0] / line.slope
+        tolerance = NEARLY.get(corpus_model.id, 1e-8) * max(1.0, np.abs(wanted).max())
+        assert found == pytest.approx(wanted[place], rel=0.0, abs=tolerance), mechanism.coordinates[place].path
