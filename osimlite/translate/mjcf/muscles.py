@@ -56,6 +56,8 @@ LEAST, GREATEST = (0.0, 1.05, 1.05, 0.0), (0.95, 4.0, 6.0, 20.0)
 """Bounds of the ends of the active curve, and of end and height of the passive one."""
 MOST = 3.0
 """Tensions, as parts of the greatest isometric force, beyond which a pose is none that a body could take."""
+CLOSE = 1e-5
+"""Relative change of the curves' error, or of their numbers, at which the search for them ends."""
 SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
 FREE = 0.25
@@ -131,10 +133,11 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         raise Unsayable("its lengths or its force are not positive")
     fits = draft.options.fit == "force"
     try:
-        curves = _fitted(own, *_isometric(force, tied.lengths), free=fits)
-        lengths, tensions = _isometric(force, tied.held_out)
+        spread = [np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS)) for lengths in (tied.lengths, tied.held_out)]
+        tensions, held_out = np.split(isometric_tension(force, np.concatenate(spread), ACTIVATIONS), 2, axis=1)
     except OsimliteError as error:
         raise Unsayable(f"its tension cannot be computed: {error.message}") from error
+    curves = _fitted(own, spread[0], tensions, free=fits)
     name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
     rise, fall = (getattr(force, f"{word}_time_constant", 0.0) for word in ("activation", "deactivation"))
     lags = rise > 0.0 and fall > 0.0 and not force.ignore_activation_dynamics
@@ -156,7 +159,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     if lags:
         draft.activations[name] = getattr(force, "default_activation", 0.0)
     draft.account(path, f"actuator {name}")
-    off = ((curves.tensions(lengths) - tensions) / force.max_isometric_force)[_counts(tensions, own)]
+    off = ((curves.tensions(spread[1]) - held_out) / force.max_isometric_force)[_counts(held_out, own)]
     draft.fidelity.add(
         "muscle",
         path,
@@ -167,12 +170,6 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         {"isometric force": Error.of(off, "Fmax")} if len(off) else {},
     )
     return f"actuator {name}"
-
-
-def _isometric(force: Muscle, lengths: Array) -> tuple[Array, Array]:
-    """Lengths (L,) spread as those that occur, and the muscle's tensions (A, L) there."""
-    spread = np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS))
-    return spread, isometric_tension(force, spread, ACTIVATIONS)
 
 
 def _counts(tensions: Array, own: Curves) -> NDArray[np.bool_]:
@@ -209,5 +206,6 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         start, low, high = [*start, *[0.0] * 4], [*low, *[-FREE] * 4], [*high, *[FREE] * 4]
     # The curves have kinks: the way from one start may end at one.
     starts = start, [0.2, 2.2, *start[2:]]
-    best = min((search(off, each, bounds=(low, high)) for each in starts), key=lambda found: found.cost)
+    found = [search(off, each, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts]
+    best = min(found, key=lambda each: each.cost)
     return curves(best.x)
