@@ -5,5 +5,9 @@ elements to the draft and accounts for the components in the draft's fidelity. W
 name at the end. A kind of thing is added as one function in a module of its own, and one place in the list.
 
 What a pass finds in the draft: elements of bodies by index (`bodies`), the joint of a coordinate (`leads`), frames by
-socket (`placement`), new names (`name`), sites (`site`), components that nobody has spoken of (`components`).
+socket (`placement`), new names (`name`), sites (`site`), components that nobody has spoken of (`components`), tendons
+of paths by their owners (`tendons`).
+
+A path is read as the simulation reads it (`poses`) and becomes the nearest tendon (`routes`, `fits`), which is measured
+as MuJoCo would (`tendons`, `wrapping`) and written (`paths`); muscles and springs act on it (`muscles`, `path_forces`).
 """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 
@@ -19,9 +18,8 @@ from osimlite.schema.geometry import Brick, Cylinder, Mesh, Sphere
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.export import Mjcf
 from tests.translate.mjcf.compiled import Compiled
+from tests.translate.mjcf.conftest import OLDER
 from tests.translate.test_export import unaccounted
-
-OLDER = "3.3.7"
 
 # Prints where all bodies of each file are at its keyframe.
 READER = """
@@ -34,23 +32,6 @@ for path in sys.argv[1:]:
     mujoco.mj_forward(model, data)
     print(json.dumps([mujoco.__version__, data.xpos.tolist()]))
 """
-
-
-@pytest.fixture(scope="session")
-def older(request) -> str:
-    """A Python that has MuJoCo 3."""
-    place = request.config.cache.mkdir(f"mujoco-{OLDER}")
-    python = place / ("Scripts" if sys.platform == "win32" else "bin") / "python"
-    uv = shutil.which("uv")
-    make = [uv, "venv", "-q", "--clear", "-p", sys.executable, place] if uv else [sys.executable, "-m", "venv", place]
-    pip = [uv, "pip", "install", "-q", "-p", python] if uv else [python, "-m", "pip", "install", "-q"]
-    if not (place / "ready").exists():
-        for command in (make, [*pip, f"mujoco=={OLDER}"]):
-            made = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-            if made.returncode:
-                pytest.skip(f"MuJoCo {OLDER} cannot be installed beside this one: {made.stderr.strip()[-200:]}")
-        (place / "ready").touch()
-    return str(python)
 
 
 def test_both_versions_of_mujoco_have_the_same_bodies(older, corpus, tmp_path):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import mujoco
+import json
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -10,34 +13,47 @@ from osimlite.translate.mjcf.wrapping import bend
 
 RADIUS = 0.5
 
+# Prints the version, and the length of the tendon with its ends at each of the pairs of places.
+READER = """
+import json, sys, mujoco
+text, ends = json.load(sys.stdin)
+model = mujoco.MjModel.from_xml_string(text)
+data = mujoco.MjData(model)
+lengths = []
+for pair in ends:
+    data.mocap_pos[:] = pair
+    mujoco.mj_fwdPosition(model, data)
+    lengths.append(data.ten_length[0])
+print(json.dumps([mujoco.__version__, lengths]))
+"""
 
-def lengths(kind, ends, side):
-    """Lengths (P,) of a tendon from `ends` (2, P, 3) around a geom at the origin, as the installed MuJoCo has them."""
+
+def text(kind, side):
+    """A tendon between two bodies that can be put anywhere, around a geom at the origin."""
     where = "" if side is None else f'<site name="side" pos="{" ".join(map(repr, side.tolist()))}"/>'
-    model = mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody>{where}
+    return f"""<mujoco><worldbody>{where}
         <geom name="geom" type="{kind}" size="{RADIUS} {1 if kind == "cylinder" else ""}" contype="0" conaffinity="0"/>
         <body mocap="true"><site name="a"/></body><body mocap="true"><site name="b"/></body></worldbody>
         <tendon><spatial><site site="a"/><geom geom="geom" {"" if side is None else 'sidesite="side"'}/><site site="b"/>
-        </spatial></tendon></mujoco>""")
-    data = mujoco.MjData(model)
-    found = []
-    for pair in ends.swapaxes(0, 1):
-        data.mocap_pos[:] = pair
-        mujoco.mj_fwdPosition(model, data)
-        found.append(data.ten_length[0])
-    return np.array(found)
+        </spatial></tendon></mujoco>"""
 
 
 @pytest.mark.parametrize("distance", [None, 0.1, 0.45, 1.0])
 @pytest.mark.parametrize("kind", ["sphere", "cylinder"])
-def test_as_mujoco(kind, distance):
+@pytest.mark.parametrize("which", ["installed", "older"])
+def test_as_mujoco(which, kind, distance, request):
+    python = sys.executable if which == "installed" else request.getfixturevalue("older")
     random = np.random.default_rng(3)
     ends, direction = random.normal(size=(2, 400, 3)), random.normal(size=3)
     side = None if distance is None else distance * direction / np.linalg.norm(direction)
+    given = json.dumps([text(kind, side), ends.swapaxes(0, 1).tolist()])
+    made = subprocess.run([python, "-c", READER], input=given, capture_output=True, text=True, check=True)
+    version, lengths = json.loads(made.stdout)
+
     first, second = ends
-    version = int(mujoco.__version__.partition(".")[0])
-    found = bend(kind, RADIUS, first, second, None if side is None else np.broadcast_to(side, first.shape), version)
+    site = None if side is None else np.broadcast_to(side, first.shape)
+    found = bend(kind, RADIUS, first, second, site, int(version.partition(".")[0]))
     around = np.linalg.norm(found.first - first, axis=1) + found.length + np.linalg.norm(second - found.second, axis=1)
     whole = np.where(found.touches, around, np.linalg.norm(second - first, axis=1))
     assert 0.05 < found.touches.mean() < 0.95
-    np.testing.assert_allclose(whole, lengths(kind, ends, side), rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(whole, lengths, rtol=0.0, atol=1e-11)
