@@ -98,7 +98,7 @@ def translate(
         bool | None,
         typer.Option(
             "--driver",
-            help="Write what osimlite.mjcf.Driver moves with OpenSim's own laws; without it the file has no forces.",
+            help="Write what osimlite.mjcf.Driver moves by OpenSim's own laws: the file itself has no forces.",
             rich_help_panel="MJCF",
         ),
     ] = None,
