@@ -24,6 +24,7 @@ MEANINGS = {
     "--pictures": "of a basin, or of a walk",
     "--force": "over results of a sweep, or of a search",
     "--budget": "runs, or models",
+    "--check": "of how text is laid out, or of a file of MuJoCo's",
     "--perturb": "once or often",
     "--samples": "of a sweep, or walkers",
     "--report-interval": "of the result files, or of what a measure looks at",
