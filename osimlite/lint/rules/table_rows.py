@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
-from math import inf
 
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
@@ -282,15 +281,15 @@ def time_gap(table: Table, found: Found) -> None:
         return
     longest = 1.5 * table.step
     steps = [after - before for before, after in pairwise(moments)]
-    if not longest <= max(steps) < inf:
+    if max(steps) < longest:
         return
     # OpenSim starts some results one step before the others.
     gaps = [row for row, step in enumerate(steps, 1) if step >= longest and row > 1]
     even = sum(abs(step - table.step) <= 0.2 * table.step for step in steps)
     if len(gaps) <= max(1, len(steps) // 50) and even + len(gaps) >= 0.95 * len(steps):
         for row in gaps[:20]:
-            missing = round(steps[row - 1] / table.step) - 1
-            lost = f": {times(missing, 'row')} seem to be missing" if missing else ""
+            missing = steps[row - 1] / table.step - 1
+            lost = f": {times(round(missing), 'row')} seem to be missing" if 0.5 <= missing < 1e9 else ""
             found(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
                 at=table.time_at(rows.line_of(row)),
