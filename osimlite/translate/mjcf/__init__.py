@@ -8,6 +8,7 @@ What a pass finds in the draft: elements of bodies by index (`bodies`), the join
 socket (`placement`), new names (`name`), sites (`site`), components that nobody has spoken of (`components`), tendons
 of paths by their owners (`tendons`).
 
-A path is read as the simulation reads it (`poses`) and becomes the nearest tendon (`routes`, `fits`), which is measured
-as MuJoCo would (`tendons`, `wrapping`) and written (`paths`); muscles and springs act on it (`muscles`, `path_forces`).
+A path is read as the simulation reads it (`poses`) and becomes the nearest tendon (`routes`, `surfaces`, `fits`), which
+is measured as MuJoCo would (`tendons`, `wrapping`) and written (`paths`); muscles and springs act on it (`muscles`,
+`path_forces`).
 """

@@ -78,11 +78,17 @@ class Truth:
 
 
 def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:
-    """Values (count, n) of the coordinates, spread evenly over the ranges of those that move by themselves."""
+    """Values (count, n) of the coordinates, spread evenly over the ranges of those that move by themselves.
+
+    Where a range is none, they are within 1 of the default.
+    """
     coupled = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     values = np.tile(mechanism.values({}), (count, 1))
     for place in free_coordinates(mechanism):
-        low, high = mechanism.coordinates[place].range
+        info = mechanism.coordinates[place]
+        low, high = info.range
+        if not 0.0 <= high - low < np.inf:
+            low, high = info.default_value - 1.0, info.default_value + 1.0
         values[:, place] = np.random.default_rng((seed, place)).uniform(low, high, count)
     for item in coupled:
         values[:, item.dependent] = [item.function.evaluate(row[list(item.independent)])[0] for row in values]

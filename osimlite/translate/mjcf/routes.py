@@ -7,7 +7,7 @@ point counts) is decided here once: every way to say it that MuJoCo has is measu
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain, combinations, groupby, pairwise, product
 
@@ -18,6 +18,7 @@ from osimlite.simulation.elements.geometries.paths.geometry_path import Node, Th
 from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth
+from osimlite.translate.mjcf.surfaces import stand_ins, z_to
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
 
 DIRECTIONS = 12
@@ -144,7 +145,13 @@ class Router:
         best: dict[int, Around] = {}
         options: list[Tendon]
         for number in sorted(numbers, key=lambda number: np.mean(self._turn(number, numbers))):
-            options = [(sided,) for each in self._stand_ins(number) for sided in self._sides(number, each, DIRECTIONS)]
+            options = [
+                (sided,)
+                for each in stand_ins(self.route.surfaces[number], self._touched(number))
+                for sided in self._sides(number, each, DIRECTIONS)
+            ]
+            if not options:
+                continue
             (found,) = choose(options)
             assert isinstance(found, Around)
             best[number] = found
@@ -154,35 +161,6 @@ class Router:
                 sides = product(self._sides(one, first, 0), self._sides(two, second, 0))
                 options += [(sided, middle, other) for sided, other in sides]
         return choose(options)
-
-    def _stand_ins(self, number: int) -> Iterator[Around]:
-        """Spheres and cylinders in the place of a surface."""
-        surface = self.route.surfaces[number]
-        own = Around(surface.tangent.body, surface.tangent.frame, "sphere", 0.0, name=surface.tangent.name)
-        sizes = surface.numbers[4:]
-        match surface.law:
-            case "wrap_sphere":
-                yield replace(own, radius=sizes[0])
-            case "wrap_cylinder":
-                yield replace(own, kind="cylinder", radius=sizes[0], length=sizes[1])
-            case "wrap_ellipsoid":
-                touched = self._touched(number)
-                for radius in {*sizes, float(np.linalg.norm(touched, axis=1).mean())}:
-                    yield replace(own, radius=radius)
-                for axis in range(3):
-                    across = np.delete(touched, axis, axis=1)
-                    turned = own.frame @ transform(_z_to(np.eye(3)[axis]))
-                    for radius in {*np.delete(sizes, axis).tolist(), float(np.linalg.norm(across, axis=1).mean())}:
-                        yield replace(own, kind="cylinder", frame=turned, radius=radius, length=2.0 * sizes[axis])
-            case "wrap_torus":
-                # OpenSim's path bends around the tube where that is nearest.
-                tube, ring = sizes
-                x, y, _ = self._touched(number).mean(0)
-                out = np.array((x, y, 0.0)) / np.hypot(x, y)
-                turned = transform(_z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
-                yield replace(own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube)
-                # Or it runs through a ball in the hole, whose side site is inside.
-                yield replace(own, radius=ring - tube, side=Spot(own.body, own.frame[:3, 3]))
 
     def _touched(self, number: int) -> Array:
         """The tangent points (2 k, 3) on a surface, in its own frame."""
@@ -199,7 +177,7 @@ class Router:
         if sign:
             yield around.sided(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
-        yield around.sided((middles / np.linalg.norm(middles, axis=1, keepdims=True)).mean(0))
+        yield around.sided(_unit(middles).mean(0))
         for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
             yield around.sided(np.array((np.cos(turn), np.sin(turn), 0.0)))
         if directions and around.kind == "sphere":
@@ -242,6 +220,8 @@ class Router:
             at = spot(self.route.points[other])
             there = self.poses.points(at.body, at.place)
             toward = self._in_body(point.body, np.arange(len(there)), there).mean(0) - point.place
+            if not toward.any():
+                continue
             direction = toward / np.linalg.norm(toward)
             side = Spot(point.body, point.place, node.coordinate, np.eye(5)[1], np.outer(direction, parabola))
             yield (Around(point.body, transform(None, point.place), "sphere", SPECK, side, name=point.name),)
@@ -264,7 +244,9 @@ class Router:
             np.einsum("pji,pj->pi", self.poses.rotations[body][poses], way).mean(0)
             for way in (turning, _unit(after) - _unit(before))
         )
-        frame = transform(_z_to(normal))
+        if not normal.any() or not into.any():
+            return
+        frame = transform(z_to(normal))
         chord = frame[:3, :3].T @ (points[-1].place - points[0].place)
         into = np.array((*(frame[:3, :3].T @ into)[:2], 0.0))
         if len(run) > 1:
@@ -289,20 +271,12 @@ def spot(point: Node) -> Spot:
     return Spot(point.body, place, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name)
 
 
-def _z_to(axis: Array) -> Array:
-    """A rotation that takes z to a direction."""
-    z = axis / np.linalg.norm(axis)
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
-    return np.stack((x, np.cross(z, x), z), axis=1)
-
-
 def _choose_of(options: Sequence[Tendon], choose: Choose) -> Tendon:
     return choose(options)
 
 
 def _unit(vectors: Array) -> Array:
-    found: Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    found: Array = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
     return found
 
 

@@ -61,7 +61,7 @@ class Around:
 
     def sided(self, direction: Array | None) -> Around:
         """The same with the side site in a direction (3,), in the frame of the surface, well outside; or without."""
-        if direction is None:
+        if direction is None or not direction.any():
             return replace(self, side=None)
         place = self.frame[:3, :3] @ (direction * (2.0 * self.radius / np.linalg.norm(direction))) + self.frame[:3, 3]
         return replace(self, side=Spot(self.body, place))

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
+import mujoco
 import numpy as np
 
 import osimlite
+from osimlite.schema.frames import Body
+from osimlite.schema.joints import SliderJoint
+from osimlite.schema.model import Model
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint, PathWrap
+from osimlite.schema.wrapping import WrapCylinder
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.poses import random_values
 from tests.translate.mjcf.compiled import Compiled
@@ -58,3 +67,24 @@ def test_a_locked_coordinate_moves_no_point(corpus):
     _, found = errors(model)
     assert np.abs(found["vasti_r"]).max() < 3e-4
     assert np.abs(found["soleus_r"]).max() < 1e-9
+
+
+def test_odd_paths_come_to_an_end():
+    model = Model(name="odd")
+    body = model.add(Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    slide = SliderJoint(name="slide")
+    slide.coordinates[0].name = "x"
+    slide.coordinates[0].range = (-math.inf, math.inf)
+    model.add(slide.between(model.ground, body))
+    body.WrapObjectSet.objects.append(WrapCylinder(name="line", radius=0.0, length=1.0))
+    path = GeometryPath(name="path")
+    middle = ConditionalPathPoint(name="b", socket_coordinate="/jointset/slide/x", range=(0.2, -0.2))
+    for point, frame in ((PathPoint(name="a"), "/ground"), (middle, "/ground"), (PathPoint(name="c"), "/bodyset/arm")):
+        point.socket_parent_frame = frame
+        path.path_point_set.objects.append(point)
+    path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="line"))
+    model.add(PathActuator(name="cable", geometry_path=path, optimal_force=3.0))
+    mjcf, found = errors(model)
+    assert np.abs(found["cable"]).max() < 1e-9
+    compiled = mujoco.MjModel.from_xml_string(mjcf.text)
+    assert compiled.ntendon == compiled.nu == 1 and compiled.actuator_gear[0, 0] == -3.0
