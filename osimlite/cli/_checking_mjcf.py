@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from osimlite.cli._console import add_row, plain_console, say
-from osimlite.text import listed, visible
+from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.text import listed
 
 
 def check(file: Path, mjcf: Path, output: Path | None) -> None:
@@ -34,9 +34,7 @@ def _table(found: Any, name: str) -> Any:
 
     Last come the optimal fiber length that the file implies, over the model's, and the change of the tendon's.
     """
-    from rich.table import Table
-
-    table = Table(title=visible(f"{name}: root mean square of what is wrong"), title_justify="left")
+    table = plain_table(f"{name}: root mean square of what is wrong")
     for column in ("muscle", "length, mm", "moment arm, mm", "force, Fmax", "fiber, x", "tendon, mm"):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
     for muscle in sorted(found.muscles, key=lambda each: -each.worst_arm.rms):

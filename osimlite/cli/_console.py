@@ -105,6 +105,14 @@ def plain_console(**choices: Any) -> Console:
     return Console(**{"markup": False, "emoji": False, **choices})
 
 
+def plain_table(title: str = "", **choices: Any) -> Table:
+    """A table without lines, as all commands print theirs."""
+    from rich.table import Table
+
+    style = {"box": None, "pad_edge": False, "padding": (0, 2, 0, 0), "header_style": "bold", "title_justify": "left"}
+    return Table(title=visible(title) or None, **{**style, **choices})
+
+
 def add_row(table: Table, *cells: str) -> None:
     """Add a row to a table of the console, whatever names its cells hold."""
     table.add_row(*map(visible, cells))
@@ -123,9 +131,7 @@ class Facts:
 
     def show(self) -> None:
         """Print them as a table; a long name goes on in the next line."""
-        from rich.table import Table
-
-        table = Table(title=visible(self.title), title_justify="left", show_header=False)
+        table = plain_table(self.title, show_header=False)
         table.add_column(style="bold", overflow="fold")
         table.add_column(overflow="fold")
         for row in self.rows:

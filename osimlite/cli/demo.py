@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from osimlite.cli._console import add_row, plain_console, say, show
+from osimlite.cli._console import add_row, plain_console, plain_table, say, show
 from osimlite.cli._progress import motion_bar, progress_bar
-from osimlite.text import visible
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
@@ -72,9 +71,7 @@ class _Tour:
 
     def table(self) -> None:
         """Print everything that was done."""
-        from rich.table import Table
-
-        table = Table(title=visible(f"Everything is in {self.folder}/"), title_justify="left")
+        table = plain_table(f"Everything is in {self.folder}/")
         table.add_column("step", overflow="fold")
         table.add_column("result", overflow="fold")
         table.add_column("file", no_wrap=True)

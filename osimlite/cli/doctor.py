@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from osimlite.cli._console import add_row, plain_console, say
+from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.cli._progress import progress_bar
 
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -79,7 +79,6 @@ def doctor(
 
     Example: osimlite doctor gait2392.osim
     """
-    from rich.table import Table
     from rich.text import Text
 
     from osimlite import __version__
@@ -99,7 +98,7 @@ def doctor(
         for count, name in enumerate(every, 1):
             found[name] = examine(name)
             progress(count)
-    table = Table(box=None, pad_edge=False)
+    table = plain_table()
     for heading in ("extra", "for", "packages"):
         table.add_column(heading, overflow="fold")
     for extra, names in wanted.items():

@@ -95,11 +95,9 @@ def info(
 
 def _facts(rows: Sequence[tuple[str, str]]) -> None:
     """Print what is worth a line each."""
-    from rich.table import Table
+    from osimlite.cli._console import add_row, plain_console, plain_table
 
-    from osimlite.cli._console import add_row, plain_console
-
-    facts = Table(show_header=False, box=None, pad_edge=False)
+    facts = plain_table(show_header=False)
     facts.add_column(style="bold")
     facts.add_column(overflow="fold")
     for name, value in rows:

@@ -144,16 +144,15 @@ def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, Mu
 def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> None:
     """A table that fits a terminal: what is least and greatest, or the largest differences."""
     import numpy as np
-    from rich.table import Table
 
-    from osimlite.cli._console import add_row, plain_console
+    from osimlite.cli._console import add_row, plain_console, plain_table
 
     first = curves[0]
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
     lengths = {"length": "length (mm)"} if len(arms) < 2 else {}
     shown = {**lengths, **arms, "normalized_fiber_length": "fiber / optimal", "tendon_force": "tendon (N)"}
-    title = f"Largest differences of {compare.name} from {file.name}" if compare is not None else None
-    table = Table("Muscle", title=title, box=None, pad_edge=False, header_style="bold", title_justify="left")
+    table = plain_table(f"Largest differences of {compare.name} from {file.name}" if compare is not None else "")
+    table.add_column("Muscle")
     for label in shown.values():
         table.add_column(label, justify="right")
     for place, path in enumerate(first.muscles):

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from osimlite.cli import _options as options
-from osimlite.cli._console import add_row, plain_console, say
-from osimlite.text import listed, visible
+from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.text import listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -155,9 +155,7 @@ def translate(
 
 def _table(fidelity: Fidelity, target: str) -> Any:
     """What is lost, one row for all components of which the same is said."""
-    from rich.table import Table
-
-    table = Table(title=visible(f"What {target} cannot say of {fidelity.model}"), title_justify="left", show_lines=True)
+    table = plain_table(f"What {target} cannot say of {fidelity.model}", padding=(0, 2, 1, 0))
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("done about it", overflow="fold", ratio=3)
     table.add_column("where", overflow="fold", ratio=3)
@@ -165,7 +163,9 @@ def _table(fidelity: Fidelity, target: str) -> Any:
     if measured:
         table.add_column("worst error", overflow="fold", ratio=2)
     for group in fidelity.groups():
-        names = dict.fromkeys(path.rsplit("/", 1)[1] or "the model" for path in group.components)
+        # Nobody knows a path but by the name of its muscle.
+        owners = (component.removesuffix("/path") for component in group.components)
+        names = dict.fromkeys(owner.rsplit("/", 1)[1] or "the model" for owner in owners)
         worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
         add_row(
             table, group.cannot_say, group.done, listed(list(names), most=3), *([", ".join(worst)] if measured else [])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from osimlite.cli import _options as options
-from osimlite.cli._console import add_row, plain_console, say
+from osimlite.cli._console import add_row, plain_console, plain_table, say
 
 if TYPE_CHECKING:
     from osimlite.document.reader import Document
@@ -59,14 +59,13 @@ def upgrade(
 
 def _report(document: Document) -> None:
     """Print what was done, one line for each step, then every loss."""
-    from rich.table import Table
-
     steps: dict[str, list[Change]] = {}
     done = document.changes
     for change in done:
         steps.setdefault(change.what, []).append(change)
     if steps:
-        table = Table("What changed", box=None, pad_edge=False, header_style="bold")
+        table = plain_table()
+        table.add_column("What changed")
         table.add_column("Places", justify="right")
         table.add_column("First line", justify="right")
         for what, changes in sorted(steps.items(), key=lambda item: item[1][0].below):

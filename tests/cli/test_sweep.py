@@ -144,7 +144,7 @@ def test_what_looks_like_markup_is_shown_as_it_is(folder: Path, capsys: pytest.C
     Path("own.py").write_text("def picky(run):\n    raise ValueError('[/x] is no [red] :bug:')\n")
     words = ["sweep", "walker.osim", "--vary", "RHip_rz=0:1:2", "--to", "0.05"]
     assert run(*words, "--measure", "own.py:picky", "-o", "a[b]") == 1
-    shown = " ".join(word for word in capsys.readouterr().out.split() if word != "│")
+    shown = " ".join(capsys.readouterr().out.split())
     assert "ValueError: [/x] is no [red] :bug:" in shown and "a[b]" in shown
 
 
@@ -153,8 +153,7 @@ def test_long_names_are_shown_whole(folder: Path, capsys: pytest.CaptureFixture[
     paths = [f"/forceset/{side}FootForce/contact_parameters/static_friction" for side in "RL"]
     ranges = [word for path in paths for word in ("--vary", f"{path}=0.5:0.9")]
     assert run("optimize", "walker.osim", "--objective", "distance", "--to", "0.05", "--budget", "2", *ranges) == 0
-    rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if "│" in line]
-    names = "".join(row[1].strip() for row in rows)
+    names = "".join(line.partition("  ")[0] for line in capsys.readouterr().out.splitlines())
     assert all(path in names for path in paths) and "…" not in names
 
 

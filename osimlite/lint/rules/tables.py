@@ -202,7 +202,7 @@ def table_count(table: Table, found: Found) -> None:
             lost = count - number
             severity, fate = (ERROR, f": OpenSim leaves out the last {lost:g}") if lost > 0 else (WARNING, "")
         elif severity is ERROR:
-            fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim takes numbers for others"
+            fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim puts numbers into the wrong columns"
         # Where a row has as many cells as the header says, it is a label that is wrong.
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
