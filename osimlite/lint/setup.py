@@ -164,17 +164,21 @@ class Setup(Subject):
 
     @cached_property
     def tool(self) -> tuple[str, Object] | None:
-        """The tool that this is, or that reads this; with the path of its setup."""
+        """The tool that this is, or the first that reads this; with the path of its setup."""
+        return next(self.readers(), None)
+
+    def readers(self) -> Iterator[tuple[str, Object]]:
+        """The tool that this is, or all that read this; with the paths of their setups."""
         if self.top is None or self.file is None:
-            return None
+            return
         if _model_named_by(self.top) is not None:
-            return self.file, self.top
+            yield self.file, self.top
+            return
         here = os.path.realpath(self.file)
         for file, top in self.neighbours:
             folder = os.path.dirname(file)
             if any(os.path.realpath(os.path.join(folder, name)) == here for name in _files_read_by(top)):
-                return file, top
-        return None
+                yield file, top
 
     @cached_property
     def model_file(self) -> str | None:

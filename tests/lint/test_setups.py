@@ -79,6 +79,14 @@ def test_loads_are_checked_with_the_model_of_the_tool_that_names_them(project, f
     assert (finding.code, finding.line) == ("OSIM831", 6)
 
 
+def test_loads_that_several_tools_read_are_looked_at_with_the_motion_that_is_there(project, fixtures):
+    for name in ("fail-01-pelvis.xml", "pass-id-pelvis.xml"):
+        text = (fixtures / "lint" / "OSIM849" / name).read_text().replace("../", "")
+        (project / name).write_text(text)
+    (project / "a_first.xml").write_text(text.replace("leg.mot", "later.mot"))
+    assert "OSIM849" in validate(project / "fail-01-pelvis.xml").codes
+
+
 KINDS = ("osimlite.schema.tools", "osimlite.schema.moco")
 TOOLS = sorted(tag for tag, module in MODULES.items() if module.startswith(KINDS))
 

@@ -271,13 +271,13 @@ def tools_differ(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
-    if setup.tool is None or setup.tool[1] is not setup.top or not (mine := _motion_of(*setup.tool)):
+    if setup.tool is None or setup.tool[1] is not setup.top or not (mine := motion_of(*setup.tool)):
         return
     here = os.path.realpath(setup.tool[0])
     told: set[str] = set()
     for file, other in setup.neighbours:
         place = os.path.realpath(file)
-        if place == here or os.path.dirname(place) != os.path.dirname(here) or _motion_of(file, other) != mine:
+        if place == here or os.path.dirname(place) != os.path.dirname(here) or motion_of(file, other) != mine:
             continue
         for tag, what in _SHARED.items():
             one, two = (getattr(tool, tag, None) for tool in (setup.top, other))
@@ -289,7 +289,7 @@ def tools_differ(setup: Setup, found: Found) -> None:
                 )  # fmt: skip
 
 
-def _motion_of(file: str, tool: Object) -> str:
+def motion_of(file: str, tool: Object) -> str:
     """Where the coordinates are that a tool is given."""
     name = getattr(tool, "coordinates_file", getattr(tool, "desired_kinematics_file", "")).strip()
     return "" if name.lower() in NOTHING else os.path.realpath(os.path.join(os.path.dirname(file), name))

@@ -8,6 +8,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.placement import Pose, Vector, dot
 from osimlite.lint.posture import poses_in
+from osimlite.lint.rules.setup_files import motion_of
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
@@ -154,13 +155,14 @@ def load_place(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
-    if setup.tree is None or setup.tool is None:
+    if setup.tree is None:
         return
-    tool: Any = setup.tool[1]
-    motion = setup.table_of_tool(getattr(tool, "coordinates_file", getattr(tool, "desired_kinematics_file", "")))
+    # Of several tools that read the same loads, some have no motion yet.
+    motions = (setup.table_of_tool(motion_of(*reader)) for reader in setup.readers())
+    motion = next((table for table in motions if table is not None and not table.is_markers), None)
     model: Any = setup.tree.model
     weight = math.hypot(*model.gravity)
-    if motion is None or motion.is_markers or not weight:
+    if motion is None or not weight:
         return
     up = tuple(-part / weight for part in model.gravity)
     for loads in setup.named("ExternalLoads"):
