@@ -66,12 +66,13 @@ def run(
     files = project_files(paths, only_ours=only_ours)
     failed = False
     if diff:
-        changed = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
-        return int(any(changed))
+        shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
+        count, left = (sum(counts[place] for counts in shown) for place in (0, 1))
+        say(f"Would mend {_places(count)}{_more(left)}.", err=True)
+        return int(count > 0)
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
-        more = f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
-        say(f"Mended {_places(count)}{more}.", err=True)
+        say(f"Mended {_places(count)}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=cached, progress=progress)
     if write_baseline is not None:
@@ -175,17 +176,18 @@ def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
     return count, left
 
 
-def _show_diff(path: str, given: Config, unsafe: bool) -> bool:
-    """Print what mending would change; whether it would change anything."""
+def _more(left: int) -> str:
+    return f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
+
+
+def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
+    """Print what mending would change; how many mends that are, and how many guesses are left."""
     from osimlite.document.source import Source
 
     source = _source(path)
     after, count, left = _mended(source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file))
-    if not count:
-        guess = f"can be mended with certainty; --unsafe-fixes would mend {_places(left)}" if left else "to mend"
-        say(f"{path}: nothing {guess}.", err=True)
     print_diff(source.text, after.text, path, path)
-    return bool(count)
+    return count, left
 
 
 def _width() -> int:
