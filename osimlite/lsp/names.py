@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from osimlite.lint.beside import beginning, folders_in, table_at
-from osimlite.lint.rules.setup_names import WORDS
 from osimlite.lint.setup import Setup
 from osimlite.lint.suffixes import TABLES
 from osimlite.lsp.analysis import Analysis
@@ -74,7 +73,7 @@ def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Elem
             for text, component in variables(analysis.tree, reference.target).items():
                 yield Name(text, type(component).tag)
         else:
-            yield from (Name(word) for word in sorted(WORDS.get(cursor.around[-1].tag, ())))
+            yield from map(Name, sorted(reference.words))
             yield from _in_tool(setup, analysis.tree, reference)
 
 

@@ -21,6 +21,7 @@ T = TypeVar("T")
 Scalar = Literal["double", "int", "bool", "string"]
 Shape = Literal["single", "optional", "list", "vector", "Vec2", "Vec3", "Vec6", "Transform"]
 Form = Literal["single", "unnamed", "optional", "list"]
+Fate = Literal["refused", "left out", "ignored"]
 
 UNBOUNDED: Final = None
 _FIXED_SIZE: Final = {"Vec2": 2, "Vec3": 3, "Vec6": 6, "Transform": 6}
@@ -103,6 +104,8 @@ class Reference(Kind):
 
     `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim class that the
     named component must be. In Python the component itself may be given; the printer turns it into the right text.
+    In a setup `words` may stand there besides names, and `fate` says what OpenSim does with a name that leads to
+    nothing: refuse it, leave it out, or ignore the property anyway.
     """
 
     rule: str
@@ -110,6 +113,8 @@ class Reference(Kind):
     shape: Literal["single", "optional", "list"] = "single"
     required: bool = True
     legacy: bool = False
+    words: tuple[str, ...] = ()
+    fate: Fate = "refused"
 
     def check(self, value: Any, accepts: type | None) -> Any:
         """Return the text or the component, or a tuple of them; ValueError if a component is of another class."""
@@ -175,12 +180,10 @@ LEGACY: Final = Legacy()
 class NamesOf:
     """Says of what a property holds names: its words, the names of its objects, the labels of its table.
 
-    Classes such as sets of weights are used for many things; only the property that holds them tells for what. OpenSim
-    refuses a name that leads to nothing, or passes over it.
+    Classes such as sets of weights are used for many things; only the property that holds them tells for what.
     """
 
     reference: Reference
-    refused: bool = True
 
 
 def note_change(owner: Any) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from osimlite.schema.base import Component
-from osimlite.schema.fields import LEGACY, Reference
+from osimlite.schema.fields import LEGACY, Fate, Reference
 
 Named = str | Component
 Names = tuple[Named, ...]
@@ -43,7 +43,9 @@ OwnJointCoordinates = Annotated[Names, Reference("own-joint-coordinate", "Coordi
 MaybeBodyName = Annotated[Named | None, Reference("body-name", "Body", "optional")]
 FrameName = Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame")]
 MaybeFrameName = Annotated[Named | None, Reference("frame-path-or-body-name", "PhysicalFrame", "optional")]
-ExpressedInFrame = Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False)]
+ExpressedInFrame = Annotated[
+    Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False, fate="left out")
+]
 ContactGeometryNames = Annotated[
     Names, Reference("contactgeometry-path-or-name", "ContactGeometry", "list", required=False)
 ]
@@ -70,17 +72,16 @@ def writes(content: str, *, legacy: bool = False) -> Reference:
     return Reference("output-file", f"{content} file", required=False, legacy=legacy)
 
 
+def several(rule: str, target: str, *words: str, legacy: bool = True, fate: Fate = "refused") -> Reference:
+    """Marker of a list of names, or of `words`, in what a tool is told."""
+    return Reference(rule, target, "list", required=False, legacy=legacy, words=words, fate=fate)
+
+
 # What tools name in the model that they work on, and the files that they are given and write.
 BodyName = Annotated[Named, Reference("body-name", "Body", required=False, legacy=True)]
-BodyOrCenterOfMass = Annotated[Named, Reference("body-name-or-com", "Body", required=False, legacy=True)]
-BodiesOrCenterOfMass = Annotated[Names, Reference("body-name-or-com", "Body", "list", required=False, legacy=True)]
+BodiesOrCenterOfMass = Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")]
 LegacyCoordinateName = Annotated[CoordinateName, LEGACY]
-LegacyCoordinateNames = Annotated[
-    Names, Reference("coordinate-name", "Coordinate", "list", required=False, legacy=True)
-]
-LegacyJointNames = Annotated[JointNames, LEGACY]
-LegacyActuatorNames = Annotated[ActuatorNames, LEGACY]
-MarkerNames = Annotated[Names, Reference("marker-name", "Marker", "list", legacy=True)]
+LegacyJointNames = Annotated[Names, several("joint-name", "Joint", "ALL", fate="left out")]
 InputModel = Annotated[str, reads("Model")]
 LegacyInputModel = Annotated[str, reads("Model", legacy=True)]
 LegacyOutputModel = Annotated[str, writes("Model", legacy=True)]

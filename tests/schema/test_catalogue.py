@@ -260,3 +260,17 @@ def test_bases_without_a_file_form_are_opensims_too() -> None:
         cls = getattr(import_module(module), name)
         if cls.abstract and name not in ours_alone | NOT_IN_FILES:
             assert CATALOGUE[name]["abstract"], name
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [e for e in REFERENCES if e["document"] != "model" and e["resolution"] != "column"],
+    ids=lambda entry: f"{entry['cls']}.{entry['property']}",
+)
+def test_words_besides_names_and_the_fate_of_a_missing_name(entry: dict) -> None:
+    cls = next(base for tag in tags() for base in declared(tag).__mro__ if base.__name__ == entry["cls"])
+    kind = cls.name_reference if entry["property"] == "@name" else field_specs(cls)[entry["property"]].kind
+    if isinstance(kind, Reference):
+        # Of tasks without a body the catalogue does not speak.
+        assert set(kind.words) - {"-1"} == {words.split()[0] for words in entry["wildcards"]}
+        assert (kind.fate == "refused") is entry["on_missing"].startswith("throws")

@@ -2,69 +2,26 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache
+from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called, nearest_name
-from osimlite.schema.base import Unknown
+from osimlite.schema.base import Component, Unknown
 from osimlite.schema.fields import Reference
 from osimlite.schema.specs import reference_specs
 from osimlite.schema.states import variables
+from osimlite.schema.tree import Tree, Use
 from osimlite.text import listed
 
-_IN_MODEL = {
-    "coordinate-name": "coordinate",
-    "body-name": "body",
-    "body-name-or-com": "body",
-    "joint-name": "joint",
-    "actuator-name": "actuator",
-    "muscle-name": "muscle",
-    "marker-name": "marker",
-    "frame-path-or-body-name": "frame",
-    "frame-path-or-member": "frame",
-    "model-path": "",
-    "state-path": "",
-    "pattern": "",
-}
-"""The rules of references that lead into the model, with what they lead to if that is not said by the reference."""
-WORDS = {
-    "bodies": {"all", "center_of_mass"},
-    "body_names": {"all", "center_of_mass"},
-    "coordinates": {"all"},
-    "coordinate_names": {"all"},
-    "muscle_list": {"all"},
-    "moment_arm_coordinate_list": {"all"},
-    "joints_to_report_body_forces": {"ALL"},
-    "joint_names": {"ALL"},
-    "express_in_frame": {"child", "parent", "ground"},
-    "relative_to_body_name": {"none", "ground"},
-    "body_name": {"ground"},
-    "wrt_body": {"center_of_mass", "-1"},
-    "express_body": {"ground", "-1"},
-    "forces_to_exclude": {"ALL", "ACTUATORS", "MUSCLES"},
-}
-"""What a property takes besides names."""
-_UNUSED = {"CMC_Joint": ("wrt_body", "express_body")}
-"""What a class has from its base and does not use."""
-_SETS = {"Marker": "/markerset", "Force": "/forceset"}
+_KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
+"""What the rules of references are about that look a name up in one place of the model; their names begin with it."""
+_PATHS = ("model-path", "state-path", "pattern")
+"""The other rules that lead from a setup into the model, whatever their target is."""
+_FATES = {"refused": ("OpenSim refuses it", None), "left out": ("OpenSim leaves it out", WARNING)}
+_PLACES = {"Marker": "/markerset", "Force": "/forceset"}
 """Where in the model stands what a tool adds to it; relative paths start there."""
-_SILENT = {
-    "muscle_list",
-    "moment_arm_coordinate_list",
-    "joint_names",
-    "joints_to_report_body_forces",
-    "relative_to_body_name",
-    "force_expressed_in_body",
-    "point_expressed_in_body",
-    "markers",
-    "actuator_list",
-    "actuators_to_exclude",
-    "segment",
-}
-"""Properties of which OpenSim leaves out what it does not find."""
-_SILENT_CLASSES = ("IKMarkerTask", "BodyScale", "ControlSetController")
-"""Classes of which it does so."""
 
 
 @rule("OSIM831", "unknown-name", severity=ERROR, mends="both", about="document")
@@ -109,95 +66,93 @@ def unknown_name(setup: Setup, found: Found) -> None:
     tree = setup.tree
     if tree is None:
         return
-    unknown = {item.name for item in tree.by_class.get(Unknown, ())}
-    model = tree.model
-    known: dict[tuple[str, str], set[str]] = {}
-    off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
     for cls, items in setup.by_class.items():
         for spec in reference_specs(cls) if is_of(items[0], "Force") else ():
-            what = _IN_MODEL.get(spec.kind.rule) if isinstance(spec.kind, Reference) and spec.kind.required else None
+            assert isinstance(spec.kind, Reference)
+            what = _what(spec.kind) if spec.kind.required else None
             for item in items if what else ():
                 if getattr(item, spec.name) in ("", None):
                     found(f"{called(item)} names no {what}: OpenSim refuses it", item, tag=spec.tag)
+    unknown = {item.name for item in tree.by_class.get(Unknown, ())}
+    off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
+
+    @cache
+    def known(what: str, rule: str) -> set[str]:
+        if rule in _PATHS:
+            return set(variables(tree, what))
+        return set() if what == "component" else setup.names_of({"frame": "Body"}.get(what, what.capitalize()))
+
     for use in setup.uses:
-        item, kind, tag, text = use.holder, use.reference, use.spec.tag, str(use.value).strip()
-        what = _IN_MODEL.get(kind.rule)
-        if what == "":
-            what = kind.target
-        if kind.rule == "socket" and kind.target.endswith("Frame"):
-            # Relative paths start where the model has what is added to it.
-            base = next((f"{path}/{item.name}" for cls, path in _SETS.items() if is_of(item, cls)), "")
-            if not (base or text.startswith("/")) or tree.walk(text, base, kind.target).target is not None:
-                continue
-            what = "component"
-        elif kind.rule == "socket" and is_of(item, "Controller"):
-            what = "actuator"
-            text = text.rpartition("/")[2]
-        elif what == "output" and kind.rule == "state-path" and not text.startswith("/"):
-            text = f"/{text}"
-        if tag in _UNUSED.get(type(item).__name__, ()):
-            continue
-        if what is None or not text or text in WORDS.get(tag, ()) or text.lower() == "unassigned":
-            continue
-        if is_of(item, "ObjectGroup") or (is_of(item, "Controller") and text == "ALL"):
+        item, kind, text = use.holder, use.reference, str(use.value).strip()
+        if not text or text.lower() == "unassigned" or text in kind.words or kind.fate == "ignored":
             continue
         if id(item) in off or not vars(item).get("on", True) or not vars(item).get("apply", True):
             continue
-        reference = kind if kind.rule != "body-name-or-com" else Reference("body-name", "Body")
-        if tree.lookup(reference, text, model).target is not None:
+        what, text, target = _looked_up(tree, use, text)
+        if what is None or target is not None:
             continue
-        if what == "frame" and tree.lookup(Reference("model-path", "Frame"), text, model).target is not None:
-            continue
-        key = (what, kind.target)
-        if key not in known:
-            known[key] = (
-                set()
-                if what == "component"
-                else set(variables(tree, what))
-                if not _IN_MODEL.get(kind.rule)
-                else setup.names_of({"body": "Body", "frame": "Body", "joint": "Joint"}.get(what, kind.target))
-            )
-        names = known[key]
+        names = known(what, kind.rule)
         if text in names or not unknown.isdisjoint(text.split("/")) or _is_made(setup, text):
             continue
-        silent = tag in _SILENT or any(map(partial(is_of, item), _SILENT_CLASSES))
-        silent = not use.spec.names.refused if use.spec.names is not None else silent
-        fate = "OpenSim leaves it out" if silent else "OpenSim refuses it"
-        more = "; it is written in small letters" if text == "ALL" else ""
-        of_name = tag == "@name"
+        fate, severity = _FATES[kind.fate]
+        more = "; it is written in small letters" if text == "ALL" and "all" in kind.words else ""
+        where: Any = {"attribute": "name"} if use.spec.tag == "@name" else {"tag": use.spec.tag, "word": text}
         found(
-            f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}",
-            item, tag=None if of_name else tag, word=None if of_name else text,
-            attribute="name" if of_name else None, severity=WARNING if silent else None,
-            suggestion="all" if more else nearest_name(text, sorted(names)),
+            f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}", item, **where,
+            severity=severity, suggestion="all" if more else nearest_name(text, sorted(names)),
         )  # fmt: skip
     if setup.tool is not None and is_of(setup.tool[1], "AbstractTool"):
-        # Of tools that follow a motion these are bounds, and go by the whole name.
-        follows = hasattr(setup.tool[1], "desired_kinematics_file")
-        fate = "OpenSim leaves it out" if follows else "OpenSim refuses it"
-        plain = setup.names_of("Actuator") | unknown
-        actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
-        for control in setup.named("Control") if plain else ():
-            if control.name not in actuators:
-                found(
-                    f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
-                    severity=WARNING if follows else None, suggestion=nearest_name(control.name, sorted(actuators)),
-                )  # fmt: skip
-            elif not follows and getattr(control, "x_nodes", None) == []:
-                found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
-            elif follows and not control.is_model_control:
-                found(
-                    f"{called(control)} bounds no control of the model: OpenSim fails", control, tag="is_model_control"
-                )
-        for controller in setup.named("ControlSetController") if plain else ():
-            table = setup.table(controller.controls_file)
-            lost = [column for column in table.columns if column not in actuators] if table is not None else []
-            if lost:
-                found(
-                    f"the model has no actuator for the columns {listed(map(repr, lost))} of "
-                    f"'{controller.controls_file}': OpenSim refuses it",
-                    controller, tag="controls_file",
-                )  # fmt: skip
+        _look_up_controls(setup, setup.names_of("Actuator") | unknown, found)
+
+
+def _what(kind: Reference) -> str | None:
+    """What a text of this kind names in the model, None of what it does not look for there."""
+    by_rule = (what for what in _KINDS if kind.rule.startswith(what))
+    return kind.target if kind.rule in _PATHS else next(by_rule, None)
+
+
+def _looked_up(tree: Tree, use: Use, text: str) -> tuple[str | None, str, Component | None]:
+    """What a text should name, if that is in the model, the text as it is looked up, and what it leads to."""
+    item, kind, what = use.holder, use.reference, _what(use.reference)
+    if kind.rule == "socket" and is_of(item, "Controller"):
+        return "actuator", text.rpartition("/")[2], None
+    if kind.rule == "socket" and kind.target.endswith("Frame"):
+        place = next((f"{path}/{item.name}" for cls, path in _PLACES.items() if is_of(item, cls)), "")
+        what = "component" if place or text.startswith("/") else None
+        return what, text, tree.walk(text, place, kind.target).target
+    if kind.rule == "state-path" and kind.target == "output" and not text.startswith("/"):
+        text = f"/{text}"
+    target = tree.lookup(kind, text, tree.model).target if what is not None else None
+    return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
+
+
+def _look_up_controls(setup: Setup, plain: set[str], found: Found) -> None:
+    """Tell controls, and columns of controls, that are those of no actuator."""
+    if not plain:
+        return
+    # Of tools that follow a motion these are bounds, and go by the whole name.
+    follows = hasattr(setup.tool[1], "desired_kinematics_file") if setup.tool is not None else False
+    fate, severity = _FATES["left out" if follows else "refused"]
+    actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
+    for control in setup.named("Control"):
+        if control.name not in actuators:
+            found(
+                f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
+                severity=severity, suggestion=nearest_name(control.name, sorted(actuators)),
+            )  # fmt: skip
+        elif not follows and getattr(control, "x_nodes", None) == []:
+            found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
+        elif follows and not control.is_model_control:
+            found(f"{called(control)} bounds no control of the model: OpenSim fails", control, tag="is_model_control")
+    for controller in setup.named("ControlSetController"):
+        table = setup.table(controller.controls_file)
+        lost = [column for column in table.columns if column not in actuators] if table is not None else []
+        if lost:
+            found(
+                f"the model has no actuator for the columns {listed(map(repr, lost))} of "
+                f"'{controller.controls_file}': OpenSim refuses it",
+                controller, tag="controls_file",
+            )  # fmt: skip
 
 
 def _is_made(setup: Setup, text: str) -> bool:
@@ -251,13 +206,14 @@ def excluded_force(setup: Setup, found: Found) -> None:
     for tool in setup.named("InverseDynamicsTool"):
         if not tool.forces_to_exclude and any(is_of(force, "Muscle") for force in forces.objects):
             found(f"{called(tool)} leaves out no force: muscles take part", tool, tag="forces_to_exclude")
-        for word in tool.forces_to_exclude:
-            if word.upper() in ("ALL", "ACTUATORS", "MUSCLES") or word in (groups or names):
-                continue
-            why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
-            found(
-                f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
-                "nothing out for it",
-                tool, tag="forces_to_exclude", word=word,
-                suggestion=nearest_name(word, ["MUSCLES", "ACTUATORS", "ALL", *groups, *([] if groups else names)]),
-            )  # fmt: skip
+    for use in setup.uses:
+        word, words = str(use.value), use.reference.words
+        if use.spec.tag != "forces_to_exclude" or word.upper() in words or word in (groups or names):
+            continue
+        why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
+        found(
+            f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
+            "nothing out for it",
+            use.holder, tag="forces_to_exclude", word=word,
+            suggestion=nearest_name(word, [*words, *groups, *([] if groups else names)]),
+        )  # fmt: skip

@@ -23,13 +23,13 @@ Bounds = Annotated[Reals, reals(most=2)]
 Strings = Annotated[tuple[str, ...], Value("string", "list")]
 OfStates = NamesOf(Reference("state-path", "state variable"))
 OfControls = NamesOf(Reference("state-path", "control"))
-OfFrames = NamesOf(Reference("model-path", "Frame"), refused=False)
-OfMarkers = NamesOf(Reference("marker-name", "Marker"), refused=False)
+OfFrames = NamesOf(Reference("model-path", "Frame", fate="left out"))
+OfMarkers = NamesOf(Reference("marker-name", "Marker", fate="left out"))
 OfOutputs = NamesOf(Reference("state-path", "output"))
 OfForces = NamesOf(Reference("state-path", "generalized force"))
-PatternOfStates = NamesOf(Reference("pattern", "state variable"), refused=False)
-PatternOfControls = NamesOf(Reference("pattern", "control"), refused=False)
-PatternOfForces = NamesOf(Reference("pattern", "generalized force"), refused=False)
+PatternOfStates = NamesOf(Reference("pattern", "state variable", fate="left out"))
+PatternOfControls = NamesOf(Reference("pattern", "control", fate="left out"))
+PatternOfForces = NamesOf(Reference("pattern", "generalized force", fate="left out"))
 StatePattern = Annotated[str | None, Value("string", "optional"), PatternOfStates]
 
 

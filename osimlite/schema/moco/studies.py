@@ -235,7 +235,7 @@ class MocoInverse(MocoTool):
     output_paths: Annotated[
         tuple[str, ...],
         Reference("input", "Output", "list", required=False),
-        NamesOf(Reference("pattern", "output"), refused=False),
+        NamesOf(Reference("pattern", "output", fate="left out")),
     ] = ()
     """Outputs that are computed for the solution, as patterns of `path|output`."""
     reserves_weight: Number = 1.0
@@ -249,9 +249,9 @@ class MocoTrack(MocoTool):
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
     """How much deviations of states count."""
-    states_weight_set: Annotated[Single[MocoWeightSet], NamesOf(OfStates.reference, refused=False)] = made(
-        MocoWeightSet, name="states_weight_set"
-    )
+    states_weight_set: Annotated[
+        Single[MocoWeightSet], NamesOf(Reference("state-path", "state variable", fate="left out"))
+    ] = made(MocoWeightSet, name="states_weight_set")
     """Weights by paths of states."""
     scale_state_weights_with_range: Flag = False
     """Whether deviations are divided by the ranges of the coordinates."""

@@ -150,7 +150,7 @@ class MocoGeneralizedForceTrackingGoal(MocoGoal):
     force_paths: Annotated[
         Names,
         Reference("model-path", "Force", "list", required=False),
-        NamesOf(Reference("pattern", "Force"), refused=False),
+        NamesOf(Reference("pattern", "Force", fate="left out")),
     ] = ()
     """Paths or patterns of the forces that are added up."""
     generalized_force_weights: Annotated[Single[MocoWeightSet], OfForces] = made(

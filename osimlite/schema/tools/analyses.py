@@ -21,11 +21,11 @@ from osimlite.schema.fields import (
 )
 from osimlite.schema.references import (
     BodiesOrCenterOfMass,
-    LegacyCoordinateNames,
     LegacyInputTable,
     LegacyJointNames,
     Named,
     Names,
+    several,
 )
 from osimlite.schema.sets import ObjectGroup
 
@@ -92,7 +92,7 @@ class IMUDataReporter(Analysis):
 class InducedAccelerations(Analysis):
     """What each force contributes to accelerations."""
 
-    coordinate_names: LegacyCoordinateNames = ()
+    coordinate_names: Annotated[Names, several("coordinate-name", "Coordinate", "all")] = ()
     """Coordinates whose accelerations are divided up, or `all`."""
     body_names: BodiesOrCenterOfMass = ("center_of_mass",)
     """Bodies whose accelerations are divided up, `all`, or center_of_mass."""
@@ -115,25 +115,25 @@ class JointReaction(Analysis):
     """Joints that are written, or ALL."""
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
     """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
-    express_in_frame: Annotated[
-        Names, Reference("frame-path-or-member", "Frame", "list", required=False, legacy=True)
-    ] = ("ground",)
+    express_in_frame: Annotated[Names, several("frame-path-or-member", "Frame", "child", "parent")] = ("ground",)
     """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
 
 
 class Kinematics(Analysis):
     """Values, speeds and accelerations of coordinates."""
 
-    coordinates: Annotated[Names, Reference("coordinate-name", "Coordinate", "list", required=False)] = ("all",)
+    coordinates: Annotated[Names, several("coordinate-name", "Coordinate", "all", legacy=False)] = ("all",)
     """Coordinates that are written, or `all`."""
 
 
 class MuscleAnalysis(Analysis):
     """Lengths, speeds, forces and moment arms of muscles."""
 
-    muscle_list: Annotated[Names, Reference("muscle-name", "Muscle", "list", required=False, legacy=True)] = ("all",)
+    muscle_list: Annotated[Names, several("muscle-name", "Muscle", "all", fate="left out")] = ("all",)
     """Muscles that are written, or `all`."""
-    moment_arm_coordinate_list: LegacyCoordinateNames = ("all",)
+    moment_arm_coordinate_list: Annotated[Names, several("coordinate-name", "Coordinate", "all", fate="left out")] = (
+        "all",
+    )
     """Coordinates about which moment arms are computed, or `all`."""
     compute_moments: LegacyFlag = True
     """Whether moments are computed besides moment arms."""
@@ -156,7 +156,10 @@ class PointKinematics(Analysis):
     body_name: Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame", legacy=True)] = "ground"
     """The body that the point is fixed in."""
     relative_to_body_name: Annotated[
-        Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False, legacy=True)
+        Named,
+        Reference(
+            "frame-path-or-body-name", "PhysicalFrame", required=False, legacy=True, words=("none",), fate="left out"
+        ),
     ] = "none"
     """The body along whose axes the results are given; none for ground."""
     point_name: LegacyText = "NONAME"

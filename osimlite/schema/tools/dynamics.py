@@ -13,6 +13,7 @@ from osimlite.schema.references import (
     LegacyOutputFolder,
     LegacyOutputTable,
     Names,
+    several,
 )
 from osimlite.schema.tools.analyses import AnalysisSet
 from osimlite.schema.tools.inverse_kinematics import Tool
@@ -25,7 +26,9 @@ class DynamicsTool(Tool, abstract=True):
     """The model, found from the folder that OpenSim runs in."""
     time_range: Annotated[Reals, reals("s", least=2, most=2, legacy=True)] = (float("-inf"), float("inf"))
     """First and last time."""
-    forces_to_exclude: Annotated[Names, Reference("set-member", "Force", "list", required=False, legacy=True)] = ()
+    forces_to_exclude: Annotated[
+        Names, several("set-member", "Force", "MUSCLES", "ACTUATORS", "ALL", fate="left out")
+    ] = ()
     """Forces that do not act: ALL, ACTUATORS, MUSCLES, groups of the model's forces, names of forces."""
     external_loads_file: LegacyInputLoads = "Unassigned"
     """Measured loads (.xml)."""

@@ -41,7 +41,7 @@ class IKTask(Object, abstract=True):
 class IKMarkerTask(IKTask):
     """A marker that is to be where it was measured; the name is that of the marker, in the model and in the data."""
 
-    name_reference = Reference("marker-name", "Marker")
+    name_reference = Reference("marker-name", "Marker", fate="left out")
 
 
 class IKCoordinateTask(IKTask):

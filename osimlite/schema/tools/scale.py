@@ -20,8 +20,8 @@ from osimlite.schema.references import (
     LegacyInputTable,
     LegacyOutputModel,
     LegacyOutputTable,
-    MarkerNames,
     Named,
+    Names,
     reads,
     writes,
 )
@@ -43,7 +43,7 @@ class GenericModelMaker(Object):
 class MarkerPair(Object):
     """Two markers whose distance is measured."""
 
-    markers: MarkerNames = ()
+    markers: Annotated[Names, Reference("marker-name", "Marker", "list", legacy=True, fate="left out")] = ()
     """Names of the two markers, of the model and of the data."""
 
 
@@ -59,7 +59,7 @@ class MarkerPairSet(Object):
 class BodyScale(Object):
     """A body that a measurement scales; the name is that of the body."""
 
-    name_reference = Reference("body-name", "Body")
+    name_reference = Reference("body-name", "Body", fate="left out")
 
     axes: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
     """Axes of the body along which it is scaled: X, Y, Z; other words do nothing."""
@@ -99,7 +99,7 @@ class Scale(Object):
 
     scales: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (1.0, 1.0, 1.0)
     """Factors along the x, y and z axes of the body."""
-    segment: Annotated[Named, Reference("body-name", "PhysicalFrame", legacy=True)] = "unnamed_segment"
+    segment: Annotated[Named, Reference("body-name", "PhysicalFrame", legacy=True, fate="left out")] = "unnamed_segment"
     """Name of the body."""
     apply: LegacyFlag = True
     """Whether the factors count."""

@@ -4,12 +4,14 @@ from typing import Annotated
 
 from osimlite.schema.base import Object, none
 from osimlite.schema.fields import (
+    Fate,
     LegacyFlag,
     LegacyInteger,
     LegacyMany,
     LegacyNumber,
     LegacyReals,
     Reals,
+    Reference,
     Value,
     real,
     reals,
@@ -17,12 +19,13 @@ from osimlite.schema.fields import (
 )
 from osimlite.schema.references import (
     BodyName,
-    BodyOrCenterOfMass,
-    LegacyActuatorNames,
     LegacyCoordinateName,
     LegacyInputTable,
     LegacyOutputModel,
+    Named,
+    Names,
     reads,
+    several,
 )
 from osimlite.schema.sets import ObjectGroup
 from osimlite.schema.tools.dynamics import AbstractTool
@@ -31,6 +34,11 @@ _Direction = Annotated[Reals, reals(least=3, most=3, legacy=True)]
 _TaskSetFile = Annotated[str, reads("CMC_TaskSet", legacy=True)]
 _ControlSetFile = Annotated[str, reads("ControlSet", legacy=True)]
 _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
+
+
+def _body(*words: str, fate: Fate = "refused") -> Reference:
+    """Marker of the name of a body, or of a word for something else."""
+    return Reference("body-name-or-com", "Body", required=False, legacy=True, words=words, fate=fate)
 
 
 class TrackingTask(Object, abstract=True):
@@ -53,9 +61,9 @@ class MuscleStateTrackingTask(StateTrackingTask):
 class CMC_Task(TrackingTask, abstract=True):
     """A point, an orientation or a coordinate that is to be followed."""
 
-    wrt_body: BodyOrCenterOfMass = ""
+    wrt_body: Annotated[Named, _body("center_of_mass", "-1")] = ""
     """The body whose motion is followed; coordinates do not need it."""
-    express_body: BodyOrCenterOfMass = ""
+    express_body: Annotated[Named, _body("ground", "-1")] = ""
     """The body along whose axes the motion is given; coordinates do not need it."""
     active: Annotated[tuple[bool, ...], Value("bool", "list", legacy=True)] = (False, False, False)
     """Which of the three components count; a coordinate has the first only."""
@@ -76,6 +84,8 @@ class CMC_Task(TrackingTask, abstract=True):
 class CMC_Joint(CMC_Task):
     """A coordinate that is to be followed."""
 
+    wrt_body: Annotated[Named, _body(fate="ignored")] = ""
+    express_body: Annotated[Named, _body(fate="ignored")] = ""
     coordinate: LegacyCoordinateName = ""
     """Name of the coordinate."""
     limit: LegacyNumber = 0.0
@@ -109,7 +119,7 @@ class CMCTool(AbstractTool):
     """Finds excitations of muscles that make a model follow a measured motion."""
 
     solve_for_equilibrium_for_auxiliary_states: LegacyFlag = True
-    actuators_to_exclude: LegacyActuatorNames = ()
+    actuators_to_exclude: Annotated[Names, several("actuator-name", "Actuator", fate="left out")] = ()
     """Actuators and groups of them that are not controlled."""
     desired_points_file: LegacyInputTable = ""
     """Measured points that tasks follow."""
