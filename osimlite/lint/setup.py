@@ -310,8 +310,8 @@ def is_of(item: Object, target: str) -> bool:
 
 
 def members(owner: Any, target: str) -> list[Any]:
-    """The objects of a set that are of a class: a text may put anything there."""
-    return [item for item in owner.objects if is_of(item, target)]
+    """The objects of a set, or of a list, that are of a class: a text may put anything there."""
+    return [item for item in (owner if isinstance(owner, list) else owner.objects) if is_of(item, target)]
 
 
 def _files_read_by(top: Object) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from shutil import copy
 
 import pytest
@@ -85,6 +86,51 @@ def test_loads_that_several_tools_read_are_looked_at_with_the_motion_that_is_the
         (project / name).write_text(text)
     (project / "a_first.xml").write_text(text.replace("leg.mot", "later.mot"))
     assert "OSIM849" in validate(project / "fail-01-pelvis.xml").codes
+
+
+@pytest.mark.parametrize(
+    ("sizes", "line"),
+    [((1, 1), 0), ((-1, 1), 13), ((1, 1000), 11), ((0.01, -0.01), 0)],
+    ids=["as measured", "signs turned", "newton millimetres", "a small push"],
+)
+def test_loads_that_no_subject_bears_are_told(project, fixtures, sizes, line):
+    text = (fixtures / "lint" / "OSIM822" / "pass-loads.xml").read_text().replace("../", "")
+    (project / "id.xml").write_text(text)
+    loads = (fixtures / "lint" / "OSIM849" / "pass-loads.xml").read_text().replace("../", "")
+    torque = "<torque_identifier>ground_torque_</torque_identifier></ExternalForce>"
+    (project / "leg_grf.xml").write_text(loads.replace("</ExternalForce>", torque))
+    header, _, rows = (project / "leg_grf.mot").read_text().partition("torque_z\n")
+    table = [[float(cell) for cell in row.split()] for row in rows.splitlines()]
+    scaled = [
+        [*row[:1], *(n * sizes[0] for n in row[1:4]), *row[4:7], *(n * sizes[1] for n in row[7:])] for row in table
+    ]
+    (project / "leg_grf.mot").write_text(
+        header + "torque_z\n" + "\n".join("\t".join(map(repr, row)) for row in scaled) + "\n"
+    )
+    assert [(f.code, f.line) for f in validate(project / "leg_grf.xml").findings] == [("OSIM849", line)] * bool(line)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "codes"),
+    [
+        # Two markers of the model in one place are no distance that could be scaled.
+        (
+            "leg.osim",
+            r"/bodyset/shank</socket_parent_frame>\s*<location>0 0.2 0.05",
+            "/bodyset/pelvis</socket_parent_frame><location>0.1 0.1 0.1",
+            {"OSIM855"},
+        ),
+        ("leg.trc", "Units", "units", {"OSIM801"}),
+        ("markers.omoco", "<goals>", "<state_infos><Foo/></state_infos><goals>", {"OSIM102"}),
+        ("markers.omoco", r"<ModelProcessor.*?</ModelProcessor>", '<ModelProcessor name="model"/>', {"OSIM821"}),
+        ("markers.omoco", "<goals>", '<MocoFinalBounds name="time_final_bounds"/><goals>', {"OSIM861"}),
+    ],
+)
+def test_what_mutants_have_shown(project, file, old, new, codes):
+    text = (project / file).read_text()
+    assert re.search(old, text, re.DOTALL)
+    (project / file).write_text(re.sub(old, new, text, flags=re.DOTALL))
+    assert codes <= validate(project).codes.keys()
 
 
 KINDS = ("osimlite.schema.tools", "osimlite.schema.moco")

@@ -9,7 +9,7 @@ from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.posture import angles_of, coordinate_of
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Unknown
@@ -34,8 +34,8 @@ def impossible_bounds(setup: Setup, found: Found) -> None:
 
     ## What it does
     Compares both ends of all bounds, bounds at the start and at the end with those of the whole phase, and the times at
-    which a phase begins and ends. Points out a state or control that has bounds twice, and bounds of an angle that
-    look like degrees.
+    which a phase begins and ends. Points out a state or control that has bounds twice, bounds of an angle that look
+    like degrees, and bounds of a time that are empty.
 
     ## Why is this bad
     The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds the last counts,
@@ -76,7 +76,7 @@ def impossible_bounds(setup: Setup, found: Found) -> None:
                 )  # fmt: skip
     angles = angles_of(setup)
     for phase in setup.named("MocoPhase"):
-        for info in phase.state_infos:
+        for info in members(phase.state_infos, "MocoVariableInfo"):
             bounds = (*info.bounds, *info.initial_bounds, *info.final_bounds)
             largest = max(filter(math.isfinite, map(abs, bounds)), default=0.0)
             if info.name.endswith("/value") and coordinate_of(info.name) in angles and largest > 10.0:
@@ -84,6 +84,9 @@ def impossible_bounds(setup: Setup, found: Found) -> None:
                     f"a bound of {largest:g} for the angle '{info.name}' is in radians: in degrees?", info,
                     severity=WARNING,
                 )  # fmt: skip
+        for bounds in (phase.time_initial_bounds, phase.time_final_bounds):
+            if bounds._index and not bounds.bounds:
+                found("a time without bounds may be any: the optimizer seldom ends", bounds, severity=WARNING)
         starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
         if starts and ends and ends[-1] < starts[0]:
             found(

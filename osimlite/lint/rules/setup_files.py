@@ -85,6 +85,12 @@ def missing_input(setup: Setup, found: Found) -> None:
         for tag in _NEEDED.get(type(item).__name__, ()):
             if str(getattr(item, tag)).strip().lower() in NOTHING:
                 found(f"{called(item)} names no {tag}: {UNGIVEN}", item, tag=tag, severity=WARNING)
+        if (
+            is_of(item, "MocoPhase")
+            and item is not setup.top
+            and not (item.model.filepath or getattr(item.model.model, "_index", None))
+        ):
+            found(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
         if is_of(item, "AnalyzeTool"):
             given = [tag for tag in ("states_file", "coordinates_file") if getattr(item, tag).lower() not in NOTHING]
             if len(given) != 1:

@@ -68,13 +68,13 @@ def scale_factor(setup: Setup, found: Found) -> None:
             for pair in pairs:
                 one, other = (str(name) for name in pair.markers) if len(pair.markers) == 2 else ("", "")
                 if {one, other} <= columns.keys() & places.keys() and one != other:
-                    apart = [math.dist(row[columns[one]], row[columns[other]]) * unit for row in rows]
-                    factor = sum(apart) / len(apart) / math.dist(places[one], places[other])
+                    apart = sum(math.dist(row[columns[one]], row[columns[other]]) for row in rows) * unit / len(rows)
+                    before = math.dist(places[one], places[other])
+                    factor = apart / before if before else math.inf
                     if factor < _LEAST or factor > _MOST:
                         found(
-                            f"{one} and {other} are {sum(apart) / len(apart):.3g} m apart in '{scaler.marker_file}', "
-                            f"and {math.dist(places[one], places[other]):.3g} m in the model: {called(measurement)} "
-                            f"scales by {factor:.3g}",
+                            f"{one} and {other} are {apart:.3g} m apart in '{scaler.marker_file}', and {before:.3g} m "
+                            f"in the model: {called(measurement)} scales by {factor:.3g}",
                             pair, tag="markers",
                         )  # fmt: skip
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.placement import Pose, Vector, dot
@@ -116,12 +116,15 @@ def load_place(setup: Setup, found: Found) -> None:
     ## What it does
     Puts the model into poses of the motion that the tool is given, and looks where measured forces act: at more than
     40 cm from the origin of their body nothing of a foot or a hand is. Where a force is expressed in a body, it looks
-    whether the numbers, as they are, point up more than they do when they are turned with that body.
+    whether the numbers, as they are, point up more than they do when they are turned with that body. Torques are
+    compared with what the force would do 40 cm farther away, and the sum of all forces, if it is as large as half the
+    weight of the model, must point up.
 
     ## Why is this bad
     OpenSim applies the force wherever it is told to: joint moments are wrong by the force times that distance, without
-    a word. Feet that were taken for one another, points in millimetres, axes of the laboratory that are not those of
-    the model, and loads of another trial are found so.
+    a word. Feet that were taken for one another, points in millimetres, torques in newton millimetres, axes of the
+    laboratory that are not those of the model, forces on the ground for those on the foot, and loads of another trial
+    are found so.
 
     ## Example
     ```setup
@@ -165,11 +168,15 @@ def load_place(setup: Setup, found: Found) -> None:
     if motion is None or not weight:
         return
     up = tuple(-part / weight for part in model.gravity)
+    mass = sum(body.mass for body in setup.tree.members("/bodyset", "Body").values())
     for loads in setup.named("ExternalLoads"):
         table = setup.table(loads.datafile)
+        whole = [0.0, 0.0, 0.0]
         for force in members(loads, "ExternalForce") if table is not None else ():
             acting = _acting(setup, force, table, motion)
-            far = [distance for distance, *_ in acting if distance > _NEAR]
+            for push in acting:
+                whole = [total + push.size * part / _TIMES for total, part in zip(whole, push.direction, strict=True)]
+            far = [push.away for push in acting if push.away > _NEAR]
             if len(far) > max(2, len(acting) // 4):
                 found(
                     f"at {len(far)} of {len(acting)} times {called(force)} acts more than {_NEAR:g} m from "
@@ -177,31 +184,52 @@ def load_place(setup: Setup, found: Found) -> None:
                     "another frame or other units?",
                     force, tag="applied_to_body",
                 )  # fmt: skip
-            lifted = [dot(raw, up) - dot(turned, up) for _, raw, turned in acting if raw != turned]
+            elif sum(push.twist > _NEAR for push in acting) > max(2, len(acting) // 4):
+                found(
+                    f"the torque of {called(force)} is that of its force {max(push.twist for push in acting):.3g} m "
+                    "farther: is it in newton millimetres, or about another point?",
+                    force, tag="torque_identifier",
+                )  # fmt: skip
+            lifted = [
+                dot(push.written, up) - dot(push.direction, up) for push in acting if push.written != push.direction
+            ]
             if len(lifted) > 2 and max(lifted) > 0.03 and min(lifted) > -0.02:
                 found(
                     f"{called(force)} is expressed in {force.force_expressed_in_body}, and its numbers look like those "
                     "of ground: they point up as they are",
                     force, tag="force_expressed_in_body",
                 )  # fmt: skip
+        if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * dot(whole, up)):
+            found(
+                f"together these forces push with {math.hypot(*whole):.0f} N ({', '.join(f'{n:.0f}' for n in whole)}) "
+                "on the average, and that is not up: are their axes or signs other ones?",
+                loads, tag="datafile",
+            )  # fmt: skip
 
 
-def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> list[tuple[float, Vector, Vector]]:
-    """What a force does at some times at which it is large.
-
-    Returns:
-        How far from the origin of its body it acts, m, and its direction, as it is written and in ground.
+class _Push(NamedTuple):
+    """What a force does at a time: how far from the origin of its body, m, and what its torque adds to that, m; its
+    size, N, and its direction, as it is written and in ground.
     """
+
+    away: float
+    twist: float
+    size: float
+    written: Vector
+    direction: Vector
+
+
+def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> list[_Push]:
+    """What a force does at those of some times at which it is large."""
     if setup.tree is None or table is None or table.span is None or motion.span is None:
         return []
     bodies = setup.tree.members("/bodyset", "Body")
     places = [
-        [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)]
-        for prefix in (force.force_identifier, force.point_identifier)
-        if prefix
+        [place for place, label in enumerate(table.columns, 1) if prefix and label.startswith(prefix)]
+        for prefix in (force.force_identifier, force.point_identifier, force.torque_identifier)
     ]
     first, last = max(table.span[0], motion.span[0]), min(table.span[1], motion.span[1])
-    if list(map(len, places)) != [3, 3] or not first < last or not force.appliesForce:
+    if [len(part) for part in places[:2]] != [3, 3] or not first < last or not force.appliesForce:
         return []
     rows = [table.row_at(first + (last - first) * (k + 0.5) / _TIMES) for k in range(_TIMES)]
     rows = [row for row in rows if len(row) == len(table.labels) and not any(map(math.isnan, row))]
@@ -210,14 +238,13 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
     for row, size in zip(rows, sizes, strict=True):
         if size > max(20.0, 0.2 * max(sizes)):
             poses = poses_in(setup, motion, row[0])
-            (x, y, z), (px, py, pz) = ([row[place] for place in part] for part in places)
+            (x, y, z), (px, py, pz), torque = ([row[place] for place in part] for part in places)
             frames = (force.applied_to_body, force.force_expressed_in_body, force.point_expressed_in_body)
             names = [str(frame).rpartition("/")[2] for frame in frames]
             within = [Pose() if name == "ground" else poses.get(id(bodies.get(name))) for name in names]
             body, of_force, of_point = within
             if body is not None and of_force is not None and of_point is not None:
                 direction = (x / size, y / size, z / size)
-                found.append(
-                    (math.dist(body.position, of_point.of((px, py, pz))), direction, of_force.turned(direction))
-                )
+                away = math.dist(body.position, of_point.of((px, py, pz)))
+                found.append(_Push(away, math.hypot(*torque) / size, size, direction, of_force.turned(direction)))
     return found
