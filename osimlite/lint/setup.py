@@ -121,7 +121,7 @@ class Setup(Subject):
     def place(self, name: str) -> str:
         """Where OpenSim finds a file that is named here, if it was started in the folder of the setup."""
         folder = str(self.folder or Path())
-        path = os.path.normpath(os.path.join(folder, name))
+        path = os.path.join(folder, name)
         self._looked_at[path] = None
         if not os.path.isfile(path):
             self._looked_at[os.path.dirname(path)] = None
@@ -189,7 +189,7 @@ class Setup(Subject):
         name = _model_named_by(top) or ""
         if name.strip().lower() in NOTHING:
             return None
-        path = os.path.normpath(os.path.join(os.path.dirname(file), name.strip()))
+        path = os.path.join(os.path.dirname(file), name.strip())
         self._looked_at[path] = None
         return path
 
@@ -249,7 +249,7 @@ class Setup(Subject):
         """A table that the tool names."""
         if name.strip().lower() in NOTHING or not is_table(name):
             return None
-        path = os.path.normpath(os.path.join(self.tool_folder, name.strip()))
+        path = os.path.join(self.tool_folder, name.strip())
         self._looked_at[path] = None
         return table_at(path)
 

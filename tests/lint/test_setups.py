@@ -121,6 +121,8 @@ def test_loads_that_no_subject_bears_are_told(project, fixtures, sizes, line):
             {"OSIM855"},
         ),
         ("leg.trc", "Units", "units", {"OSIM801"}),
+        # A way through a folder that is not there leads nowhere, though the text of the path could be made shorter.
+        ("ik.xml", ">leg.osim<", ">data/../leg.osim<", {"OSIM821"}),
         ("markers.omoco", "<goals>", "<state_infos><Foo/></state_infos><goals>", {"OSIM102"}),
         ("markers.omoco", r"<ModelProcessor.*?</ModelProcessor>", '<ModelProcessor name="model"/>', {"OSIM821"}),
         ("markers.omoco", "<goals>", '<MocoFinalBounds name="time_final_bounds"/><goals>', {"OSIM861"}),
@@ -131,6 +133,27 @@ def test_what_mutants_have_shown(project, file, old, new, codes):
     assert re.search(old, text, re.DOTALL)
     (project / file).write_text(re.sub(old, new, text, flags=re.DOTALL))
     assert codes <= validate(project).codes.keys()
+
+
+def test_a_file_of_coordinates_in_radians_is_told_to_inverse_kinematics(project):
+    text = (project / "ik.xml").read_text()
+    task = '<IKCoordinateTask name="knee_angle"><value_type>from_file</value_type><weight>1</weight></IKCoordinateTask>'
+    text = text.replace("<objects>", f"<objects>{task}", 1)
+    (project / "ik.xml").write_text(text.replace("</InverseK", "<coordinate_file>leg.mot</coordinate_file></InverseK"))
+    motion = (project / "leg.mot").read_text()
+    (project / "leg.mot").write_text(motion.replace("inDegrees=yes", "inDegrees=no"))
+    assert "OSIM847" in validate(project / "ik.xml").codes
+    (project / "leg.mot").write_text(motion.replace("inDegrees=no", "inDegrees=yes"))
+    assert "OSIM847" not in validate(project / "ik.xml").codes
+
+
+@pytest.mark.parametrize("name", ["leg.osim", "ik.xml", "leg_grf.xml"])
+def test_what_is_at_the_top_is_read_from_where_it_stands(project, name):
+    """OpenSim 4.6 looks for the file of none at the top: tools end as without it."""
+    text = (project / name).read_text()
+    (project / name).write_text(re.sub(r"(Document Version=.*?<\w+)", r'\1 file="nowhere.xml"', text, flags=re.DOTALL))
+    (finding,) = validate(project / name).findings
+    assert (finding.code, finding.severity) == ("OSIM702", "info")
 
 
 KINDS = ("osimlite.schema.tools", "osimlite.schema.moco")

@@ -99,6 +99,15 @@ def included_file(subject: Subject, found: Found) -> None:
             continue
         included = note.owner.layout is not None and note.owner.layout.include is not None
         read = included or (subject.folder is None and not note.why)
+        if note.owner is subject.top:
+            found(
+                f"OpenSim does not look for {called(note.owner)} in '{note.value}': it reads what stands here",
+                note.owner,
+                number=note.number,
+                attribute="file",
+                severity=INFO,
+            )
+            continue
         ignored = _has_content(subject.source, note.number)
         state = "is read from" if read else "should be read from"
         why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"

@@ -199,7 +199,8 @@ def load_place(setup: Setup, found: Found) -> None:
                     "of ground: they point up as they are",
                     force, tag="force_expressed_in_body",
                 )  # fmt: skip
-        if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * dot(whole, up)):
+        lift = sum(part * share for part, share in zip(whole, up, strict=True))
+        if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * lift):
             found(
                 f"together these forces push with {math.hypot(*whole):.0f} N ({', '.join(f'{n:.0f}' for n in whole)}) "
                 "on the average, and that is not up: are their axes or signs other ones?",

@@ -10,7 +10,8 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
-from osimlite.lint.setup import NOTHING, Setup, is_of
+from osimlite.lint.setup import NOTHING, Setup, is_of, members
+from osimlite.lint.table import Table
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.specs import field_specs
@@ -288,15 +289,7 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
             continue
         angles = angles_of(setup)
         places = [place for place, column in enumerate(table.columns, 1) if coordinate_of(column) in angles]
-        largest, place = max(
-            (
-                (abs(sample[place]), place)
-                for place in places
-                for sample in table.rows.samples
-                if place < len(sample) and sample[place] == sample[place]
-            ),
-            default=(0.0, 0),
-        )
+        largest, place = _largest(table, places)
         label = table.labels[place].text
         if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _SEVERAL:
             found(
@@ -309,3 +302,27 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
                 "takes it for radians",
                 item, tag=tag, severity=ERROR,
             )  # fmt: skip
+    for user in setup.having("ik_task_set", "coordinate_file"):
+        values = setup.table(user.coordinate_file)
+        if values is None or isinstance(values.header, MarkerHeader) or values.header.in_degrees:
+            continue
+        tasks = members(user.ik_task_set, "IKCoordinateTask")
+        read = {task.name for task in tasks if task.apply and task.value_type == "from_file"} & angles_of(setup)
+        largest, place = _largest(values, [k for k, column in enumerate(values.columns, 1) if column in read])
+        if 0.0 < largest < math.pi:
+            found(
+                f"'{user.coordinate_file}' does not say inDegrees=yes, and '{values.labels[place].text}' is at most "
+                f"{largest:.3g} in it: inverse kinematics takes it for degrees, whatever the header says",
+                user, tag="coordinate_file",
+            )  # fmt: skip
+
+
+def _largest(table: Table, places: list[int]) -> tuple[float, int]:
+    """The largest number in some columns, and in which it is; zeros if there is none."""
+    numbers = (
+        (abs(sample[place]), place)
+        for place in places
+        for sample in table.rows.samples
+        if place < len(sample) and sample[place] == sample[place]
+    )
+    return max(numbers, default=(0.0, 0))
