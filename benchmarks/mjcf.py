@@ -87,7 +87,7 @@ def main(base: Path) -> None:
         with TemporaryDirectory() as folder:
             for fit in ("none", "wraps", "force"):
                 start = time.process_time()
-                made = osimlite.to_mjcf(model, mujoco=version, visuals=False, fit=fit, spline="series")
+                made = osimlite.to_mjcf(model, mujoco=version, visuals=False, fit=fit)
                 seconds = time.process_time() - start
                 print(row(f"  osimlite --fit {fit}", seconds, check_mjcf(model, made.write(folder)[0])), flush=True)
         for other in others:

@@ -90,7 +90,7 @@ def translate(
         str | None,
         typer.Option(
             help="What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
-            show_default="quartic",
+            show_default="series",
             rich_help_panel="MJCF",
         ),
     ] = None,

@@ -68,7 +68,8 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
     exact = function if own == (1.0, 0.0) else Composed(function, Linear(*own))
     fit = quartic(exact, (first, last), unit)
     follower, done = Follower(lead.joint, fit.coefficients), "a quartic, fitted"
-    if fit.error is not None and draft.options.spline == "series":
+    # The driver writes what is exact in the place of the quartic, and needs no helper.
+    if fit.error is not None and draft.options.spline == "series" and not draft.options.driver:
         drive, (outer,) = composition([function], (low, high))
         led = helper(draft, driver.coordinate, drive)
         assert led is not None

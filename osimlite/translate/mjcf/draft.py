@@ -59,7 +59,7 @@ class Options:
     visuals: bool = True
     contact: Contact = "native"
     fit: Fit = "none"
-    spline: Spline = "quartic"
+    spline: Spline = "series"
     driver: bool = False
 
 

@@ -102,7 +102,7 @@ def to_mjcf(
     visuals: bool = True,
     contact: Contact = "native",
     fit: Fit = "none",
-    spline: Spline = "quartic",
+    spline: Spline = "series",
     driver: bool = False,
     folder: str | Path | None = None,
     geometry: Sequence[str | Path] = (),

@@ -88,7 +88,7 @@ FITTED = {
 
 @pytest.mark.parametrize("function", FITTED.values(), ids=FITTED)
 def test_other_functions_are_off_by_what_is_said(function):
-    mjcf = to_mjcf(on_a_function(function))
+    mjcf = to_mjcf(on_a_function(function), spline="quartic")
     (record,) = mjcf.fidelity.records
     compiled = Compiled(mjcf)
     differences = [off(compiled, np.array((q,)))["q_tx"] for q in np.linspace(-1.0, 2.0, 301)]
@@ -102,7 +102,7 @@ def test_other_functions_are_off_by_what_is_said(function):
 
 def test_a_quartic_of_a_quartic_is_closer():
     model = on_a_function(FITTED["spline"])
-    (once,), twice = to_mjcf(model).fidelity.records, to_mjcf(model, spline="series")
+    (once,), twice = to_mjcf(model, spline="quartic").fidelity.records, to_mjcf(model)
     (record,) = twice.fidelity.records
     assert record.errors["value"].rms < 0.5 * once.errors["value"].rms
     compiled = Compiled(twice)
@@ -152,7 +152,7 @@ def test_a_coordinate_that_is_only_an_argument_gets_a_joint():
     spline = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
     model = on_a_function(spline)
     model["/jointset/j"].spatial_transform.rotation3.function = Constant(value=0.0)
-    mjcf = to_mjcf(model)
+    mjcf = to_mjcf(model, spline="quartic")
     compiled = Compiled(mjcf)
     assert equalities(compiled)["q_tx"][0] == "q"
     assert {record.kind for record in mjcf.fidelity} == {"argument", "function"}
