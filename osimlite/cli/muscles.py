@@ -105,16 +105,20 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
     from math import isfinite
 
     from osimlite.errors import SettingError
-    from osimlite.simulation.start import in_units_of
+    from osimlite.simulation.start import in_units_of, suspect_value
 
     found = {}
     for word in words:
         name, equals, given = (part.strip() for part in word.partition("="))
-        low, high = mechanism.coordinates[mechanism.coordinate_index(name)].range
+        info = mechanism.coordinates[mechanism.coordinate_index(name)]
+        low, high = info.range
         if equals:
             parts = given.split(":")
             if len(parts) != 2:
                 raise SettingError(f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{word}'")
+            for part in parts:
+                if odd := suspect_value(info, name, part):
+                    raise SettingError(f"--coordinate: {odd} (if not, write {part.strip()}rad)")
             low, high = (in_units_of(mechanism, name, part) for part in parts)
         if not (isfinite(low) and isfinite(high) and low < high):
             raise SettingError(f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1")

@@ -243,10 +243,17 @@ def _style(number: int) -> dict[str, Any]:
 
 def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any) -> None:
     """Draw lines over times, or whatever is across; with a style of their own they are not in the legend."""
+    drawn: list[Array] = []
     for number, (label, column) in enumerate(lines.items()):
+        looks = _style(number)
+        near = 1e-3 * np.nanmax(np.abs(column), initial=0.0)
+        if below := sum(np.allclose(column, other, rtol=0.0, atol=near, equal_nan=True) for other in drawn):
+            # What lies below shows through.
+            looks["ls"] = (0.0, (6.0 / (below + 1), 6.0 * below / (below + 1)))
+        drawn.append(column)
         # Matplotlib leaves a label that begins with an underscore out of the legend.
         shown = f" {label}" if label.startswith("_") else label
-        panel.plot(across, column, label=None if style else shown, **(_style(number) | style))
+        panel.plot(across, column, label=None if style else shown, **(looks | style))
     # Beside the panel, where it covers no data.
     panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9)
 

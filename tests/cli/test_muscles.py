@@ -9,6 +9,7 @@ import pytest
 
 import osimlite
 from osimlite import Model
+from osimlite.models.dynamic_walker import dynamic_walker
 from tests.cli.command import run
 from tests.simulation.elements.muscle_rows import hung, muscle
 
@@ -88,6 +89,12 @@ def test_what_makes_no_sense_is_told(file, words, said):
     told = run("muscles", "arm.osim", *words)
     assert told.code in (1, 2) and said in told.err
     assert {path.name for path in file.parent.iterdir()} == {"arm.osim", "strong.osim"}
+
+
+def test_degrees_that_are_taken_for_radians_are_refused(file):
+    osimlite.write(dynamic_walker(), file.parent / "walker.osim")
+    told = run("muscles", "walker.osim", "--coordinate", "RHip_rz=0:30")
+    assert told.code == 2 and "did you mean 30deg? (if not, write 30rad)" in told.err
 
 
 def test_a_muscle_without_equilibrium_hides_no_other(file):

@@ -11,7 +11,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
-from osimlite.view.plots import STORED, _figures, energies
+from osimlite.view.plots import STORED, _figures, energies, figure_of, lines_in
 from tests.view.motions import Recorded, stroll
 
 pytest.importorskip("matplotlib")
@@ -75,6 +75,13 @@ def test_many_coordinates_are_shared_out_to_panels():
     figure = drawn("coordinates.png", motion, None)
     assert [len(panel.get_lines()) for panel in figure.axes] == [6, 6, 4]
     assert "energy.png" not in dict(_figures(motion, None))
+
+
+def test_a_line_that_lies_on_another_lets_it_through():
+    panel, across = figure_of("", (4.0, 3.0)).subplots(), np.linspace(0.0, 1.0, 5)
+    gone = np.full(5, np.nan)
+    lines_in(panel, across, {"one": across, "same": across + 1e-5, "other": across**2, "gone": gone, "too": gone})
+    assert [line.is_dashed() for line in panel.get_lines()] == [False, True, False, False, True]
 
 
 def test_no_legend_covers_data_and_all_is_on_the_sheet():
