@@ -156,6 +156,17 @@ def test_what_is_at_the_top_is_read_from_where_it_stands(project, name):
     assert (finding.code, finding.severity) == ("OSIM702", "info")
 
 
+@pytest.mark.parametrize("tag", ["InverseKinematicsTool", "InverseDynamicsTool", "ForwardTool"])
+@pytest.mark.parametrize("version", [10500, 20201, 20202])
+def test_a_tool_newer_than_its_document_is_refused_as_by_opensim(tmp_path, tag, version):
+    tool = f'<{tag} name="x"><model_file></model_file></{tag}>'
+    (tmp_path / "document.xml").write_text(f'<OpenSimDocument Version="{version}">{tool}</OpenSimDocument>')
+    (tmp_path / "alone.xml").write_text(tool)
+    refused = tag != "ForwardTool" and version < 20202
+    assert ("OSIM112" in validate(tmp_path / "document.xml").codes) == refused
+    assert "OSIM112" not in validate(tmp_path / "alone.xml").codes
+
+
 KINDS = ("osimlite.schema.tools", "osimlite.schema.moco")
 TOOLS = sorted(tag for tag, module in MODULES.items() if module.startswith(KINDS))
 

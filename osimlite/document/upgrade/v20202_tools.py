@@ -32,7 +32,8 @@ def one_trial(draft: Draft) -> None:
         trials = tool.find("IKTrialSet")
         found = [] if trials is None else trials.findall("objects/IKTrial")
         if trials is None or not found:
-            if draft.version != 10500:
+            # A tool at the top, without a document around it, is taken as it is.
+            if draft.numbers[tool]:
                 draft.refuse(tool, tool, "an InverseKinematicsTool without an IKTrialSet, which old versions had")
             continue
         for child in list(found[0]):
@@ -54,6 +55,9 @@ def one_trial(draft: Draft) -> None:
 @step(below=20202)
 def inverse_dynamics(draft: Draft) -> None:
     """An AnalyzeTool with the analysis InverseDynamics is an InverseDynamicsTool."""
+    for tool in draft.tagged("InverseDynamicsTool"):
+        if draft.numbers[tool]:
+            draft.refuse(tool, tool, "an InverseDynamicsTool, which old versions called AnalyzeTool")
     for tool in draft.tagged("AnalyzeTool"):
         analyses = tool.find("AnalysisSet/objects")
         analysis = None if analyses is None else analyses.find("InverseDynamics")
