@@ -59,9 +59,10 @@ def muscles(
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
     from osimlite.document.reader import read
-    from osimlite.errors import SettingError
+    from osimlite.errors import ModelError, SettingError
     from osimlite.multibody import build_mechanism
     from osimlite.simulation.muscle_curves import muscle_curves
+    from osimlite.text import listed
 
     if output is not None and output.suffix not in (".csv", ".parquet"):
         raise SettingError(f"a table of muscles is written as .csv or .parquet, not '{output.name}'")
@@ -85,6 +86,10 @@ def muscles(
             )
         found[str(path)] = curves if muscle else curves.of(curves.crossing)
     first, *others = found.values()
+    if not first.muscles:
+        raise ModelError(
+            f"'{file.name}' has no muscle" + (f" that moves with {listed(list(values))}" if values else "s")
+        )
     if others:
         first, second = _common(first, others[0])
         found = dict(zip(found, (first, second), strict=True))

@@ -97,6 +97,13 @@ def test_degrees_that_are_taken_for_radians_are_refused(file):
     assert told.code == 2 and "did you mean 30deg? (if not, write 30rad)" in told.err
 
 
+def test_a_model_without_muscles_is_told(file):
+    osimlite.write(dynamic_walker(), file.parent / "walker.osim")
+    told = run("muscles", "walker.osim", "--coordinate", "RHip_rz")
+    assert told.code == 1 and not told.out and "'walker.osim' has no muscle that moves with RHip_rz" in told.err
+    assert "'walker.osim' has no muscles" in run("muscles", "walker.osim").err
+
+
 def test_a_muscle_without_equilibrium_hides_no_other(file):
     model = osimlite.read(file)
     other = model.find("/forceset/mu").copy_deep()
