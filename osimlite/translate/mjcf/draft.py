@@ -78,9 +78,10 @@ class Follower(NamedTuple):
 
 
 class Tied(NamedTuple):
-    """The tendon of a path, and lengths (P,) of the path (m) in random poses and in others (R,) that are held out."""
+    """The tendon of a path, and its length (m) in the default pose, in random poses (P,), in others held out (R,)."""
 
     name: str
+    default: float
     lengths: Array
     held_out: Array
 

@@ -32,6 +32,7 @@ from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import Contact, Draft, Fit, Follower, Lead, Options, Spline, Version, add
 from osimlite.translate.mjcf.driven import add_driven
 from osimlite.translate.mjcf.forces import add_forces
+from osimlite.translate.mjcf.haste import STEP, choose_step
 from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.paths import add_paths
 from osimlite.translate.mjcf.scenery import add_camera, add_markers, add_shapes
@@ -40,7 +41,7 @@ from osimlite.translate.survey import account_for_rest
 Pass = Callable[[Draft], None]
 
 MECHANISM: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
-LAWS: tuple[Pass, ...] = (add_contacts, add_paths, add_forces)
+LAWS: tuple[Pass, ...] = (add_contacts, add_paths, add_forces, choose_step)
 LOOKS: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_keyframe)
 """What makes a file of a model, in this order: bodies and joints come before what acts on them or is fixed to them."""
 
@@ -176,7 +177,7 @@ def _add_settings(draft: Draft) -> None:
     root.set("model", draft.mechanism.name)
     root.append(Comment(f" Written by osimlite {__version__} for MuJoCo {draft.options.version}. "))
     add(root, "compiler", angle="radian", autolimits=True, inertiafromgeom=False, balanceinertia=False)
-    add(root, "option", timestep=0.001, gravity=draft.mechanism.gravity, integrator="implicitfast")
+    add(root, "option", timestep=STEP, gravity=draft.mechanism.gravity, integrator="implicitfast")
     # Two steps is the quickest that MuJoCo lets a constraint be; the nearer to 1 the impedance, the less it gives way.
     add(add(root, "default"), "equality", solref="0.002 1", solimp="0.9999 0.9999 0.001 0.5 2")
     # The sections in the order in which they are best read.

@@ -46,6 +46,7 @@ def add_paths(draft: Draft) -> None:
     poses, truth = random_poses(exact, FITTED if fits else CHOSEN, 0)
     held, held_truth = random_poses(exact, HELD_OUT, 1)
     others, other_truth = random_poses(exact, TRIED, 2) if fits else (poses, truth)
+    default = exact.lengths(draft.default_state[0])
     writer = _Writer(draft)
     for path, given in owners.items():
         route = exact.routes[path]
@@ -61,7 +62,7 @@ def add_paths(draft: Draft) -> None:
             judge = Router(route, other_truth[path], others, draft.options.version)
             tendon = min(tendon, fitted(router, tendon), key=judge.error)
         name = writer.tendon(path, tendon)
-        draft.tendons[path] = Tied(name, truth[path].lengths, held_truth[path].lengths)
+        draft.tendons[path] = Tied(name, default[path], truth[path].lengths, held_truth[path].lengths)
         draft.account(own, f"tendon {name}")
         for wrap in given.path_wrap_set.objects:
             surface = draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""

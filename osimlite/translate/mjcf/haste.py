@@ -1,0 +1,105 @@
+"""What is too quick for the time step, which is fixed in MuJoCo and ends in NaN where OpenSim takes smaller steps.
+
+The springs of a model, linearized about its default pose, swing or decay at rates w (1/s); explicit steps longer than
+2 / w amplify that. MuJoCo takes the damping of joints and tendons implicitly, but that of a bushing acts through a
+weld. Muscles are not linearized: what is stiff in them is the tendon, which is rigid in MuJoCo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.multibody.dynamics import SAFE_MASS
+from osimlite.multibody.linear import solutions, stacked
+from osimlite.multibody.spatial import Array
+from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.schema.muscles import Muscle
+from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
+from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGeneralizedForce
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements.items import ForceElement
+from osimlite.simulation.system import System
+from osimlite.translate.mjcf.draft import Draft, text
+from osimlite.translate.mjcf.isometric import isometric_tension
+
+SPRINGS = (
+    Blankevoort1991Ligament,
+    BushingForce,
+    CoordinateLimitForce,
+    Ligament,
+    PathSpring,
+    PointToPointSpring,
+    SpringGeneralizedForce,
+)
+STEP = 1e-3
+"""The usual time step, s."""
+NUDGE = 1e-7
+"""By which a derivative changes coordinates (rad, m) or speeds (per s)."""
+
+
+def choose_step(draft: Draft) -> None:
+    """Take smaller steps where springs are stiff, and tell of muscles that are torn."""
+    rate = 0.0
+    with suppress(OsimliteError):
+        rate = _fastest(draft)
+    if rate * STEP > 2.0:
+        step = float(f"{1.0 / rate:.0e}")
+        next(draft.root.iter("option")).set("timestep", text(step))
+        cannot = f"springs too stiff for steps of {STEP:g} s, which would end in NaN"
+        detail = f"{step:g} s, for a rate of {rate:.3g} 1/s about the default pose"
+        draft.fidelity.add("stiff", "/", cannot, "the file takes smaller steps", detail)
+    for path, tied in draft.tendons.items():
+        muscle = draft.tree.by_path[path]
+        if isinstance(muscle, Muscle):
+            (tension,) = isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
+            if tension > muscle.max_isometric_force:
+                cannot = "fibers that are longer in the default pose than they can bear"
+                done = "as it is: the model may run away, as it does in OpenSim"
+                detail = f"they pull {tension / muscle.max_isometric_force:.2g} times max_isometric_force at rest"
+                draft.fidelity.add("overstretched", path, cannot, done, detail)
+
+
+def _fastest(draft: Draft) -> float:
+    """The greatest rate (1/s) of the model's springs about its default pose."""
+    mechanism, (q, u) = draft.mechanism, draft.default_state
+    state = mechanism.at(q, u)
+    rows, free = np.zeros((0, len(u))), np.eye(len(u))
+    if mechanism.constraints:
+        rows, _ = stacked([item.velocity_equations(state) for item in mechanism.constraints])
+        _, free = solutions(rows, np.zeros(len(rows)))
+    mass = free.T @ mechanism.mass_matrix(q) @ free
+    if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
+        return 0.0
+    elements = force_elements(draft.model, mechanism, skip_unsupported=True, folder=draft.folder).elements
+    owners = [draft.tree.by_path[item.path] for item in elements]
+    springs = [item for item, owner in zip(elements, owners, strict=True) if isinstance(owner, SPRINGS)]
+    bushings = [item for item, owner in zip(elements, owners, strict=True) if isinstance(owner, BushingForce)]
+    zero = np.zeros_like(free)
+    stiffness = _slopes(draft, springs, mechanism.rate_matrix(q) @ free, zero)
+    damping = _slopes(draft, bushings, zero, free)
+    rates = np.linalg.solve(mass, free.T @ np.hstack((stiffness, damping)))
+    count = len(mass)
+    return float(np.abs(np.linalg.eigvals(np.vstack((np.eye(count, 2 * count, count), rates)))).max())
+
+
+def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array) -> Array:
+    """Derivatives (n, f) of generalized forces by steps along coordinates and speeds, each (n, f)."""
+    q, u = draft.default_state
+    found = np.zeros_like(along)
+    if elements:
+        system = System(draft.mechanism, Forces(tuple(elements)))
+        places = list(system.order)
+
+        def forces(nudge: float, k: int) -> Array:
+            row = np.zeros(len(found))
+            y = system.state.pack((q + nudge * along[:, k]).tolist(), (u + nudge * at[:, k]).tolist())
+            row[places] = system.applied(0.0, y)[len(places) : 2 * len(places)]
+            return row
+
+        for k in range(found.shape[1]):
+            found[:, k] = (forces(NUDGE, k) - forces(-NUDGE, k)) / (2.0 * NUDGE)
+    return found
