@@ -26,8 +26,6 @@ from osimlite.schema.model import Model
 from osimlite.schema.specs import FieldSpec, member_specs, name_spec, naming_specs, reference_specs
 from osimlite.schema.tree import Tree, Use
 
-NOTHING = ("", "unassigned")
-"""What stands for no file, in small letters."""
 UNGIVEN = "OpenSim refuses it, unless a program or the GUI gives one"
 """What becomes of a tool that names no file where it needs one."""
 _NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
@@ -111,12 +109,8 @@ class Setup(Subject):
     def named_files(self, *rules: str) -> Iterator[Naming]:
         """Every file that an object of the document names, by the rules of its properties."""
         for item in self.own:
-            for spec in reference_specs(type(item)):
-                if isinstance(spec.kind, Reference) and spec.kind.rule in rules:
-                    value = getattr(item, spec.name)
-                    for name in value if isinstance(value, tuple) else (value,):
-                        if isinstance(name, str) and name.strip().lower() not in NOTHING:
-                            yield Naming(item, spec, name, self.place(name.strip()))
+            for spec, name in files_of(item, *rules):
+                yield Naming(item, spec, name, self.place(name.strip()))
 
     def place(self, name: str) -> str:
         """Where OpenSim finds a file that is named here, if it was started in the folder of the setup."""
@@ -131,15 +125,11 @@ class Setup(Subject):
 
     def table(self, name: str) -> Table | None:
         """The table in a file that is named here; None if there is none, or it cannot be read."""
-        if name.strip().lower() in NOTHING or not is_table(name):
-            return None
-        return table_at(self.place(name.strip()))
+        return table_at(self.place(name.strip())) if is_given(name) and is_table(name) else None
 
     def document(self, name: str) -> Object | None:
         """The top of a document that is named here; None if there is none, or it cannot be read."""
-        if name.strip().lower() in NOTHING:
-            return None
-        return top_at(self.place(name.strip()))
+        return top_at(self.place(name.strip())) if is_given(name) else None
 
     # ------------------------------------------------------------------------------------------------- context
 
@@ -183,15 +173,7 @@ class Setup(Subject):
     @cached_property
     def model_file(self) -> str | None:
         """Where the model is that the tool works on; None if there is no tool, or it names none."""
-        if self.tool is None:
-            return None
-        file, top = self.tool
-        name = _model_named_by(top) or ""
-        if name.strip().lower() in NOTHING:
-            return None
-        path = os.path.join(os.path.dirname(file), name.strip())
-        self._looked_at[path] = None
-        return path
+        return None if self.tool is None else self._place_by_tool(_model_named_by(self.tool[1]) or "")
 
     @cached_property
     def tree(self) -> Tree | None:  # type: ignore[override]
@@ -239,19 +221,21 @@ class Setup(Subject):
 
     def beside_tool(self, name: str) -> Object | None:
         """The top of a document that the tool names."""
-        if not name or name.strip().lower() in NOTHING:
-            return None
-        path = os.path.join(self.tool_folder, name.strip())
-        self._looked_at[path] = None
-        return top_at(path)
+        path = self._place_by_tool(name)
+        return None if path is None else top_at(path)
 
     def table_of_tool(self, name: str) -> Table | None:
         """A table that the tool names."""
-        if name.strip().lower() in NOTHING or not is_table(name):
+        path = self._place_by_tool(name) if is_table(name) else None
+        return None if path is None else table_at(path)
+
+    def _place_by_tool(self, name: str) -> str | None:
+        """Where a file is that the tool names, if it names one."""
+        if not is_given(name):
             return None
         path = os.path.join(self.tool_folder, name.strip())
         self._looked_at[path] = None
-        return table_at(path)
+        return path
 
     def names_of(self, target: str) -> set[str]:
         """The names of all components of a class that the tool works with: those of the model and of added sets."""
@@ -293,15 +277,25 @@ class Setup(Subject):
             if os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(f"{top.name}_"):
                 return True
             for item in top.walk():
-                for spec in reference_specs(type(item)):
-                    if isinstance(spec.kind, Reference) and spec.kind.rule == "output-file":
-                        name = getattr(item, spec.name)
-                        if name and wanted in (
-                            os.path.realpath(os.path.join(folder, name)),
-                            os.path.realpath(os.path.join(within, name)),
-                        ):
-                            return True
+                for _, name in files_of(item, "output-file"):
+                    if wanted in (os.path.realpath(os.path.join(place, name)) for place in (folder, within)):
+                        return True
         return False
+
+
+def is_given(name: str) -> bool:
+    """Whether a text names a file: one word stands for none."""
+    return name.strip().lower() not in ("", "unassigned")
+
+
+def files_of(item: Object, *rules: str) -> Iterator[tuple[FieldSpec, str]]:
+    """Every file that an object names, by the rules of its properties."""
+    for spec in reference_specs(type(item)):
+        if isinstance(spec.kind, Reference) and spec.kind.rule in rules:
+            value = getattr(item, spec.name)
+            for name in value if isinstance(value, tuple) else (value,):
+                if isinstance(name, str) and is_given(name):
+                    yield spec, name
 
 
 def is_of(item: Object, target: str) -> bool:
@@ -319,10 +313,7 @@ def _files_read_by(top: Object) -> Iterator[str]:
     for item in top.walk():
         if item.layout is not None and item.layout.include is not None:
             yield item.layout.include.path
-        for spec in reference_specs(type(item)):
-            if isinstance(spec.kind, Reference) and spec.kind.rule == "file":
-                value = getattr(item, spec.name)
-                yield from filter(None, value if isinstance(value, tuple) else (value,))
+        yield from (name for _, name in files_of(item, "file"))
 
 
 def _model_named_by(top: Object) -> str | None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from osimlite.document.lexical import shortest
 from osimlite.schema.base import Object, Unknown
-from osimlite.text import nearest
+from osimlite.text import listed, nearest
 
 
 def called(item: Object) -> str:
@@ -54,6 +56,13 @@ def nearest_name(text: str, right: list[str]) -> str | None:
     if whole is not None and whole.rpartition("/")[2] == near:
         return whole
     return by_last[near]
+
+
+def meant(wrong: Iterable[str], right: Iterable[str]) -> str:
+    """What some texts may stand for, asked at the end of a sentence; nothing if no right one is like them."""
+    known = sorted(right)
+    near = [f"'{name}' for '{text}'" for text in wrong if (name := nearest_name(text, known))]
+    return f"; is it {listed(near)}?" if near else ""
 
 
 def closest(text: str, right: list[str]) -> str:

@@ -13,8 +13,8 @@ from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Unknown
-from osimlite.schema.fields import Value
-from osimlite.schema.specs import FieldSpec, field_specs, member_specs
+from osimlite.schema.fields import Reference, Value
+from osimlite.schema.specs import field_specs, member_specs
 from osimlite.schema.states import variables
 from osimlite.schema.tree import Tree
 from osimlite.text import listed
@@ -112,8 +112,6 @@ def _repeated(items: list[Any]) -> Iterator[Any]:
 
 _COUNTED = ("states", "controls", "multipliers", "derivatives", "slacks", "parameters", "input_controls")
 """What the columns of a trajectory are, of which its header must say how many; the last need not be counted."""
-_MOTIONS = {"MocoStateTrackingGoal": ("reference",), "MocoInverse": ("kinematics",)}
-"""Properties that name the motion of a class, if not states_reference."""
 
 
 @rule("OSIM862", "study-data", severity=ERROR, about="document")
@@ -177,14 +175,14 @@ def study_data(setup: Setup, found: Found) -> None:
             name = getattr(held, tag, "").strip()
             if not name and spec.tag in _NEEDED and tag:
                 found(f"{called(item)} names no table to follow: OpenSim refuses it", item)
-            table = setup.table(name) if spec.tag in _MOTIONS.get(type(item).__name__, ("states_reference",)) else None
-            if table is not None:
+            assert spec.names is not None
+            table = setup.table(name)
+            if table is not None and spec.names.reference.target == "state variable":
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
                     found(f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study", held, tag=tag)
-            followed = setup.table(name) if is_of(item, "MocoTool") else None
-            if followed is not None and followed.span is not None:
-                first, last = followed.span
+            if table is not None and table.span is not None and is_of(item, "MocoTool"):
+                first, last = table.span
                 for time in ("initial_time", "final_time"):
                     wanted = getattr(item, time)
                     if wanted is not None and not first <= wanted <= last:
@@ -193,34 +191,31 @@ def study_data(setup: Setup, found: Found) -> None:
                             item, tag=time,
                         )  # fmt: skip
             allowed = any(getattr(item, flag, False) for flag in _ALLOW)
-            for column in [] if allowed else _strangers(setup, spec, held, name):
+            for column in [] if allowed or table is None else _strangers(setup, spec.names.reference, held, table):
                 found(
                     f"'{name}' has a column '{column}', which is nothing of the model: OpenSim refuses the study",
                     held, tag=tag,
                 )  # fmt: skip
     if setup.tree is None or any(setup.named("ModelOperator")):
         return
-    for item in setup.items:
-        guess = setup.table(getattr(item, "guess_file", ""))
-        if guess is not None and guess.labels:
-            wanted = set(variables(setup.tree, "state or control variable"))
-            wanted |= {parameter.name for parameter in setup.named("MocoParameter")}
-            columns = {
-                column
-                for column in guess.columns
-                if column in wanted or (column.startswith("/") and "/implicitderiv_" not in column)
-            }
-            missing, more = sorted(wanted - columns), sorted(columns - wanted)
-            wrong = _miscounted(setup.tree, guess)
-            if missing or more:
-                what = f"lacks {listed(missing)}" if missing else f"has {listed(more)}, which the model has not"
-                found(f"the guess '{item.guess_file}' {what}: OpenSim refuses it", item, tag="guess_file")
-            elif wrong:
-                found(f"the guess '{item.guess_file}' {wrong}: OpenSim refuses it", item, tag="guess_file")
+    for item in setup.having("guess_file"):
+        guess = setup.table(item.guess_file)
+        fault = _fault_of_guess(setup, setup.tree, guess) if guess is not None and guess.labels else ""
+        if fault:
+            found(f"the guess '{item.guess_file}' {fault}: OpenSim refuses it", item, tag="guess_file")
 
 
-def _miscounted(tree: Tree, guess: Table) -> str:
-    """What is wrong with how a trajectory of Moco counts and orders its columns, nothing if all is right."""
+def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
+    """What is wrong with the columns of a trajectory, their counts and their order; nothing if all is right."""
+    wanted = set(variables(tree, "state or control variable")) | {item.name for item in setup.named("MocoParameter")}
+    columns = {
+        column
+        for column in guess.columns
+        if column in wanted or (column.startswith("/") and "/implicitderiv_" not in column)
+    }
+    missing, more = sorted(wanted - columns), sorted(columns - wanted)
+    if missing or more:
+        return f"lacks {listed(missing)}" if missing else f"has {listed(more)}, which the model has not"
     said = {what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else "" for what in _COUNTED}
     odd = next((what for what in _COUNTED[:-1] if not said[what].isdecimal()), None)
     if odd is not None:
@@ -233,15 +228,13 @@ def _miscounted(tree: Tree, guess: Table) -> str:
     return "" if odd is None else f"has '{odd}' among its first columns, which are those of states"
 
 
-def _strangers(setup: Setup, spec: FieldSpec, held: Any, name: str) -> list[str]:
+def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> list[str]:
     """The columns of a table that are not what they must be names of."""
-    tree, table = setup.tree, setup.table(name)
-    if tree is None or table is None or Unknown in tree.by_class or any(setup.named("ModelOperator")):
+    tree = setup.tree
+    if tree is None or Unknown in tree.by_class or any(setup.named("ModelOperator")):
         return []
     if any(is_of(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())):
         return []
-    assert spec.names is not None
-    reference = spec.names.reference
     return [column for column in table.columns if tree.lookup(reference, column, tree.model).target is None]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of, members
 from osimlite.lint.table import Table
-from osimlite.lint.words import nearest_name
+from osimlite.lint.words import meant, nearest_name
 from osimlite.schema.states import variables
 from osimlite.text import listed
 
@@ -63,13 +63,9 @@ def missing_column(setup: Setup, found: Found) -> None:
                 f"'{getattr(item, tag)}' has no column of a coordinate of the model{why}", item, tag=tag, severity=ERROR
             )
         elif lacking:
-            near = [
-                f"'{near}' for '{name}'" for name in lacking if (near := nearest_name(name, sorted(columns - names)))
-            ]
-            hint = f"; is it {listed(near)}?" if near else ""
             found(
-                f"'{getattr(item, tag)}' has no column {listed([repr(name) for name in lacking])}: OpenSim takes the "
-                f"default value{hint}",
+                f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes the default value"
+                f"{meant(lacking, columns - names)}",
                 item, tag=tag,
             )  # fmt: skip
     for item in setup.named("AbstractTool"):
@@ -77,7 +73,7 @@ def missing_column(setup: Setup, found: Found) -> None:
         unknown = [column for column in states.columns if not _is_state(setup, column)] if states is not None else []
         if unknown and setup.tree is not None:
             found(
-                f"the model has no state {listed([repr(column) for column in unknown])} of '{item.states_file}': "
+                f"the model has no state {listed(map(repr, unknown))} of '{item.states_file}': "
                 "OpenSim leaves the column out",
                 item, tag="states_file",
             )  # fmt: skip

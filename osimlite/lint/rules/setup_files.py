@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import NOTHING, UNGIVEN, Naming, Setup, is_of
+from osimlite.lint.setup import UNGIVEN, Naming, Setup, is_given, is_of
 from osimlite.lint.suffixes import is_table
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
@@ -83,7 +83,7 @@ def missing_input(setup: Setup, found: Found) -> None:
         )  # fmt: skip
     for item in setup.items:
         for tag in _NEEDED.get(type(item).__name__, ()):
-            if str(getattr(item, tag)).strip().lower() in NOTHING:
+            if not is_given(getattr(item, tag)):
                 found(f"{called(item)} names no {tag}: {UNGIVEN}", item, tag=tag, severity=WARNING)
         if (
             is_of(item, "MocoPhase")
@@ -92,7 +92,7 @@ def missing_input(setup: Setup, found: Found) -> None:
         ):
             found(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
         if is_of(item, "AnalyzeTool"):
-            given = [tag for tag in ("states_file", "coordinates_file") if getattr(item, tag).lower() not in NOTHING]
+            given = [tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))]
             if len(given) != 1:
                 what = "both a states_file and a coordinates_file" if given else "neither states nor coordinates"
                 severity = ERROR if given else WARNING
@@ -298,9 +298,9 @@ def tools_differ(setup: Setup, found: Found) -> None:
 def motion_of(file: str, tool: Object) -> str:
     """Where the coordinates are that a tool is given."""
     name = getattr(tool, "coordinates_file", getattr(tool, "desired_kinematics_file", "")).strip()
-    return "" if name.lower() in NOTHING else os.path.realpath(os.path.join(os.path.dirname(file), name))
+    return os.path.realpath(os.path.join(os.path.dirname(file), name)) if is_given(name) else ""
 
 
 def _says(value: str | float) -> bool:
     """Whether a setting is not left at nothing."""
-    return value.strip().lower() not in NOTHING if isinstance(value, str) else value > 0.0
+    return is_given(value) if isinstance(value, str) else value > 0.0

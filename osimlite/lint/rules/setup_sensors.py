@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.table import Table
-from osimlite.lint.words import called, nearest_name
+from osimlite.lint.words import called, meant, nearest_name
 from osimlite.text import listed
 
 
@@ -94,10 +94,8 @@ def sensor_without_frame(setup: Setup, found: Found) -> None:
                 severity=ERROR,
             )
         elif lost:
-            near = [f"'{name}' for '{column}'" for column in lost if (name := nearest_name(column, sorted(frames)))]
-            hint = f"; is it {listed(near)}?" if near else ""
             found(
-                f"the model has no frame for {listed([repr(column) for column in lost])} of '{file}': OpenSim leaves "
-                f"them out{hint}",
+                f"the model has no frame for {listed(map(repr, lost))} of '{file}': OpenSim leaves them out"
+                f"{meant(lost, frames)}",
                 item, tag=tag,
             )  # fmt: skip

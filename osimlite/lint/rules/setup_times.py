@@ -10,7 +10,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
-from osimlite.lint.setup import NOTHING, Setup, is_of, members
+from osimlite.lint.setup import Setup, is_given, is_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
@@ -194,7 +194,7 @@ def loads_end_early(setup: Setup, found: Found) -> None:
             motion = setup.table(name)
             if motion is not None and motion.span is not None:
                 first, last = max(first, motion.span[0]), min(last, motion.span[1])
-            elif name.strip().lower() not in NOTHING:
+            elif is_given(name):
                 # It may be written yet, and is not known to last longer than the loads.
                 first, last = -math.inf, math.inf
         slack = max(table.step, 1e-9) * 1.01

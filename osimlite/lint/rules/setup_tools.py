@@ -7,7 +7,7 @@ from collections import Counter
 from typing import Any
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import NOTHING, UNGIVEN, Setup, is_of, members
+from osimlite.lint.setup import UNGIVEN, Setup, is_given, is_of, members
 from osimlite.lint.words import called, nearest_name
 from osimlite.text import listed
 
@@ -136,10 +136,7 @@ def tool_setting(setup: Setup, found: Found) -> None:
             found("results of a point without a name get no proper file", analysis, tag="point_name", severity=WARNING)
         if is_of(analysis, "MuscleAnalysis") and analysis.on:
             for tool in setup.named("AnalyzeTool"):
-                if (
-                    tool.coordinates_file.strip().lower() not in NOTHING
-                    and not tool.solve_for_equilibrium_for_auxiliary_states
-                ):
+                if is_given(tool.coordinates_file) and not tool.solve_for_equilibrium_for_auxiliary_states:
                     found(
                         "coordinates tell nothing of fibers, which stay at their default lengths: "
                         "solve_for_equilibrium_for_auxiliary_states is false",
@@ -255,7 +252,7 @@ def scale_setting(setup: Setup, found: Found) -> None:
                 "measurements come last and overwrite what is scaled by hand", scaler, tag="scaling_order",
                 severity=WARNING,
             )  # fmt: skip
-        if measures and scaler.measurement_set.objects and scaler.marker_file.strip().lower() in NOTHING:
+        if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
             found(
                 f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}", scaler, tag="marker_file",
                 severity=WARNING,
@@ -284,7 +281,7 @@ def scale_setting(setup: Setup, found: Found) -> None:
     for placer in setup.named("MarkerPlacer"):
         if not placer.apply:
             found("the markers are not placed, and the tool says that it failed", placer, tag="apply", severity=WARNING)
-        elif placer.output_model_file.strip().lower() in NOTHING:
+        elif not is_given(placer.output_model_file):
             found("the model with its markers placed is not written", placer, tag="output_model_file", severity=WARNING)
         if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
             found(
