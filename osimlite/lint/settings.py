@@ -79,8 +79,9 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
     largest_file_in(file, table)
     for key in table:
         if key not in _KNOWN:
+            every = listed(_KNOWN, most=len(_KNOWN))
             raise OsimliteError(
-                f"there is no setting '{key}'{did_you_mean(key, _KNOWN)} Settings are {listed(_KNOWN)}", file=str(file)
+                f"there is no setting '{key}'{did_you_mean(key, _KNOWN)} Settings are {every}", file=str(file)
             )
     try:
         return Settings(
