@@ -156,6 +156,20 @@ def test_what_is_at_the_top_is_read_from_where_it_stands(project, name):
     assert (finding.code, finding.severity) == ("OSIM702", "info")
 
 
+@pytest.mark.parametrize(
+    ("analysis", "refused"),
+    [
+        ("<MuscleAnalysis><moment_arm_coordinate_list/></MuscleAnalysis>", True),
+        ("<MuscleAnalysis/>", False),
+        ("<JointReaction><apply_on_bodies/></JointReaction>", False),
+    ],
+)
+def test_lists_of_analyses_may_be_empty_where_opensim_takes_them(project, analysis, refused):
+    text = (project / "analyze.xml").read_text()
+    (project / "analyze.xml").write_text(re.sub("<objects>", f"<objects>{analysis}", text, count=1))
+    assert any("OpenSim fails" in f.message or "words for" in f.message for f in validate("analyze.xml")) == refused
+
+
 @pytest.mark.parametrize("tag", ["InverseKinematicsTool", "InverseDynamicsTool", "ForwardTool"])
 @pytest.mark.parametrize("version", [10500, 20201, 20202])
 def test_a_tool_newer_than_its_document_is_refused_as_by_opensim(tmp_path, tag, version):

@@ -142,6 +142,8 @@ def tool_setting(setup: Setup, found: Found) -> None:
                         "solve_for_equilibrium_for_auxiliary_states is false",
                         tool, tag="solve_for_equilibrium_for_auxiliary_states", severity=WARNING,
                     )  # fmt: skip
+        if is_of(analysis, "MuscleAnalysis") and not analysis.moment_arm_coordinate_list:
+            found("no coordinate for moment arms: OpenSim fails", analysis, tag="moment_arm_coordinate_list")
         if is_of(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
                 if word not in ("child", "parent"):
@@ -149,7 +151,7 @@ def tool_setting(setup: Setup, found: Found) -> None:
                         f"'{word}' is neither child nor parent: OpenSim refuses it", analysis, tag="apply_on_bodies",
                         word=word, suggestion=nearest_name(word, ["child", "parent"]),
                     )  # fmt: skip
-            if len(analysis.apply_on_bodies) not in (1, len(analysis.joint_names)):
+            if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
                 found(
                     f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
                     analysis, tag="apply_on_bodies",
