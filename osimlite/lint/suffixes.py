@@ -37,7 +37,7 @@ def is_document(file: str | None) -> bool:
 def project_files(
     paths: Iterable[str | Path], suffixes: tuple[str, ...] = PROJECT, *, only_ours: bool = False
 ) -> list[str]:
-    """The files that are named, and OpenSim's files with some suffixes below the folders that are named.
+    """The files that are named, and OpenSim's files with some suffixes below the folders that are named, each once.
 
     With `only_ours`, XML of other programs is passed over even where it is named.
 
@@ -60,7 +60,7 @@ def project_files(
             raise MissingFileError("cannot read the file: no such file", file=str(path))
         elif not only_ours or begins_as_ours(str(path)):
             found.append(str(path))
-    return found
+    return list({os.path.abspath(file): file for file in reversed(found)}.values())[::-1]
 
 
 def begins_as_ours(file: str) -> bool:

@@ -12,6 +12,7 @@ from osimlite.cli._validating import run as validate_paths
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import run, subject_of
 from osimlite.lint.many import check_files
+from osimlite.lint.suffixes import project_files
 from osimlite.schema.registry import MODULES
 
 
@@ -42,6 +43,7 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     assert validate_paths(["."], cached=False) == 0
     assert capsys.readouterr().out.startswith("Nothing found in 12")
     assert validate(".").checked == 12
+    assert len(project_files([".", project / "ik.xml", "./../project"])) == 12
     # The name of a marker is changed in the model alone.
     model = project / "leg.osim"
     model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
