@@ -39,7 +39,7 @@ def without_baseline(path: str | Path, report: Report) -> Report:
             counts[_key(finding)] -= 1
         else:
             kept.append(finding)
-    return Report(kept, report.texts, report.checked)
+    return Report(kept, report.texts, report.checked, len(report.findings) - len(kept))
 
 
 def _key(finding: Finding) -> tuple[str, str, str, str]:

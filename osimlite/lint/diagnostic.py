@@ -105,12 +105,14 @@ class Finding:
 class Report:
     """Everything found in one or several models, sorted by file and place.
 
-    `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the models.
+    `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the files,
+    `known` what a baseline has left out.
     """
 
     findings: list[Finding] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
     checked: int = 1
+    known: int = 0
 
     @property
     def errors(self) -> list[Finding]:

@@ -90,6 +90,7 @@ def test_lines_and_comments_ignore(project):
 def test_a_baseline_knows_them_again(project):
     assert command("validate", ".", "--write-baseline", "known.json").out == "known.json: 5 findings\n"
     assert found("--baseline", "known.json") == (set(), 0)
+    assert command("validate", ".", "--baseline", "known.json").out.endswith(" files, besides 5 of the baseline.\n")
     change(project / "leg.mot", "nColumns=6", "nColumns=7")
     assert found("--baseline", "known.json") == ({("leg.mot", "OSIM802")}, 1)
 

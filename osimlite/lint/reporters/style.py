@@ -31,9 +31,10 @@ def summary(report: Report, colour: bool = False) -> str:
         painted(f"{count} {_plural(severity.value, count)}", severity, colour) for severity, count in counts if count
     ]
     files = f"{report.checked} {_plural('file', report.checked)}"
+    known = f", besides {report.known} of the baseline" if report.known else ""
     if not parts:
-        return painted(f"Nothing found in {files}.", "good", colour)
-    return f"Found {', '.join(parts)} in {files}."
+        return painted(f"Nothing found in {files}{known}.", "good", colour)
+    return f"Found {', '.join(parts)} in {files}{known}."
 
 
 def _plural(noun: str, count: int) -> str:
