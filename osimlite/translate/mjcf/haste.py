@@ -53,9 +53,10 @@ def choose_step(draft: Draft) -> None:
         detail = f"{step:g} s, for a rate of {rate:.3g} 1/s about the default pose"
         draft.fidelity.add("stiff", "/", cannot, "the file takes smaller steps", detail)
     for path, tied in draft.tendons.items():
-        muscle = draft.tree.by_path[path]
+        muscle, tension = draft.tree.by_path[path], 0.0
         if isinstance(muscle, Muscle):
-            (tension,) = isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
+            with suppress(OsimliteError):
+                (tension,) = isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
             if tension > muscle.max_isometric_force:
                 cannot = "fibers that are longer in the default pose than they can bear"
                 done = "as it is: the model may run away, as it does in OpenSim"

@@ -43,7 +43,9 @@ def add_camera(draft: Draft) -> None:
     right = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     right = right - (right @ up) * up
     right /= np.linalg.norm(right)
-    place = 0.5 * (low + high) + (1.0 + 2.0 * float(np.linalg.norm(high - low))) * cross(right, up)
+    place = 0.5 * (low + high) + (1.0 + float(np.linalg.norm(high - low))) * cross(right, up)
+    # MuJoCo's own light, which goes with the camera, leaves bones dark.
+    add(add(draft.root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
     add(draft.section("worldbody"), "camera", name="side", pos=place, xyaxes=(*right, *up))
 
 

@@ -85,3 +85,9 @@ def test_torn_muscles_are_told(fiber, told):
     records = [record for record in to_mjcf(sled(muscle(fiber))).fidelity if record.kind == "overstretched"]
     assert len(records) == told
     assert all(record.component == "/forceset/f" for record in records)
+
+
+def test_a_muscle_that_has_no_tension_hinders_nobody():
+    impossible = muscle(0.08)
+    impossible.minimum_activation = -1.0
+    assert "overstretched" not in {record.kind for record in to_mjcf(sled(impossible)).fidelity}
