@@ -21,7 +21,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_table
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
-from osimlite.schema.fields import NamesOf, Reference
+from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
 from osimlite.schema.specs import FieldSpec, member_specs, name_spec, naming_specs, reference_specs
 from osimlite.schema.tree import Tree, Use
@@ -192,7 +192,7 @@ class Setup(Subject):
     def uses(self) -> list[Use]:
         """Every name that stands in the document, of a component or of something else."""
         found: list[Use] = []
-        named: dict[int, NamesOf | None] = {}
+        named: dict[int, Reference | None] = {}
         for item in self.own:
             cls = type(item)
             # What is named in a setup is looked up in the model: nothing in the document owns it.
@@ -205,8 +205,8 @@ class Setup(Subject):
                 members = held if isinstance(held, list) else getattr(held, "objects", ())
                 named |= dict.fromkeys(map(id, members), spec.names)
             for spec in naming_specs(cls):
-                if names is not None and spec.kind.rule == names.reference.rule:  # type: ignore[attr-defined]
-                    spec = spec._replace(kind=names.reference)
+                if names is not None and spec.kind.rule == names.rule:  # type: ignore[attr-defined]
+                    spec = spec._replace(kind=names)
                 value = getattr(item, spec.name)
                 if isinstance(value, tuple):
                     found += [Use(item, owner, spec, word, position) for position, word in enumerate(value)]

@@ -52,7 +52,7 @@ def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list
         return [*_tags(analysis, cursor, around, bracket="<")]
     if around.spec is None:
         return []
-    kind = around.spec.kind if around.spec.names is None else around.spec.names.reference
+    kind = around.spec.names or around.spec.kind
     if isinstance(kind, Value):
         words = ("true", "false") if kind.scalar == "bool" else kind.choices
         return [_item(analysis, cursor, str(word), str(word), types.CompletionItemKind.Value) for word in words]

@@ -44,7 +44,7 @@ def reference_of(cursor: Cursor) -> Reference | None:
         return None
     # Of some classes only the property says so that holds them, or the set that they are in.
     held = (element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None)
-    said = next((names.reference for names in held if names is not None), None)
+    said = next(filter(None, held), None)
     after = (_NAMED_AFTER[name] for name in lineage(cls) if name in _NAMED_AFTER)
     return said or cls.name_reference or next(after, None)
 

@@ -28,7 +28,7 @@ class FieldSpec(NamedTuple):
     default: Any
     factory: Any
     declared_in: type[Object]
-    names: NamesOf | None = None
+    names: Reference | None = None
 
     @property
     def legacy(self) -> bool:
@@ -52,7 +52,7 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
         tag = next((item.text for item in info.metadata if isinstance(item, Tag)), tag)
         declared = next(base for base in reversed(cls.__mro__) if name in getattr(base, "__annotations__", {}))
         default = info.default if info.default_factory is None else None
-        names = next((item for item in info.metadata if isinstance(item, NamesOf)), None)
+        names = next((item.reference for item in info.metadata if isinstance(item, NamesOf)), None)
         specs.append(FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared, names))
     specs.sort(key=lambda spec: spec.legacy)
     return {spec.tag: spec for spec in specs}
@@ -107,7 +107,7 @@ def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 def naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` whose words are names of something, each with the reference as its kind."""
     return tuple(
-        spec if spec.names is None else spec._replace(kind=spec.names.reference)
+        spec if spec.names is None else spec._replace(kind=spec.names)
         for spec in field_specs(cls).values()
         if isinstance(spec.kind, Reference) or (spec.names is not None and isinstance(spec.kind, Value))
     )
@@ -120,12 +120,12 @@ def member_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @cache
-def name_spec(cls: type[Object], names: NamesOf | None = None) -> FieldSpec:
+def name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpec:
     """The name of an object that is the name of something else, as a property with tag ``@name``.
 
     What it names is said by its class, or by the property that holds it.
     """
-    reference = cls.name_reference if names is None else names.reference
+    reference = names or cls.name_reference
     assert reference is not None
     return FieldSpec("name", "@name", reference, None, "", None, cls, names)
 

@@ -177,7 +177,7 @@ def study_data(setup: Setup, found: Found) -> None:
                 found(f"{called(item)} names no table to follow: OpenSim refuses it", item)
             assert spec.names is not None
             table = setup.table(name)
-            if table is not None and spec.names.reference.target == "state variable":
+            if table is not None and spec.names.target == "state variable":
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
                     found(f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study", held, tag=tag)
@@ -191,7 +191,7 @@ def study_data(setup: Setup, found: Found) -> None:
                             item, tag=time,
                         )  # fmt: skip
             allowed = any(getattr(item, flag, False) for flag in _ALLOW)
-            for column in [] if allowed or table is None else _strangers(setup, spec.names.reference, held, table):
+            for column in [] if allowed or table is None else _strangers(setup, spec.names, held, table):
                 found(
                     f"'{name}' has a column '{column}', which is nothing of the model: OpenSim refuses the study",
                     held, tag=tag,

@@ -4,12 +4,34 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
+from osimlite.lint.diagnostic import Severity
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.setup import UNGIVEN, Setup, is_given, is_of, members
 from osimlite.lint.words import called, nearest_name
 from osimlite.text import listed
+
+_SETTINGS: tuple[tuple[str, str, Callable[[Any], bool], str, Severity], ...] = (
+    ("InverseKinematicsToolBase", "accuracy", lambda value: 0.01 < value < math.inf,
+     "the accuracy is {:g}: poses are hardly fitted at all", WARNING),
+    ("InverseKinematicsToolBase", "accuracy", lambda value: value == 0.0, "an accuracy of 0 is never reached", WARNING),
+    ("AbstractTool", "maximum_number_of_integrator_steps", lambda value: value < 10,
+     "the run ends after {} steps", WARNING),
+    ("Analysis", "step_interval", lambda value: value < 1, "a step interval of {}", WARNING),
+    ("PointKinematics", "point_name", lambda value: not value.strip(),
+     "results of a point without a name get no proper file", WARNING),
+    ("StaticOptimization", "use_model_force_set", lambda value: not value,
+     "without the forces of the model OpenSim crashes", ERROR),
+    ("StaticOptimization", "activation_exponent", lambda value: not value > 1.0,
+     "an exponent of {:g} leaves nothing to be made small", WARNING),
+    ("StaticOptimization", "optimizer_max_iterations", lambda value: value < 10,
+     "the optimizer stops after {} iterations", WARNING),
+    ("StaticOptimization", "optimizer_convergence_criterion", lambda value: value > 0.05,
+     "the optimizer stops at {:g}, far from its goal", WARNING),
+)  # fmt: skip
+"""Of the objects of a class, a property, whether its value is none to work with, and what is said of it then."""
 
 
 @rule("OSIM852", "tool-setting", severity=ERROR, mends="unsafe", about="document")
@@ -50,16 +72,11 @@ def tool_setting(setup: Setup, found: Found) -> None:
     </OpenSimDocument>
     ```
     """
-    for tool in setup.named("InverseKinematicsToolBase"):
-        if 0.0 < tool.accuracy < math.inf and tool.accuracy > 0.01:
-            found(
-                f"the accuracy is {tool.accuracy:g}: poses are hardly fitted at all",
-                tool,
-                tag="accuracy",
-                severity=WARNING,
-            )
-        elif tool.accuracy == 0.0:
-            found("an accuracy of 0 is never reached", tool, tag="accuracy", severity=WARNING)
+    for of_class, tag, is_wrong, told, severity in _SETTINGS:
+        for item in setup.named(of_class):
+            value = getattr(item, tag)
+            if is_wrong(value):
+                found(told.format(value), item, tag=tag, severity=severity)
     for tool in setup.named("AbstractTool"):
         if not (tool.integrator_error_tolerance > 0.0 or is_of(tool, "AnalyzeTool")):
             found(
@@ -70,11 +87,6 @@ def tool_setting(setup: Setup, found: Found) -> None:
             found(
                 f"{called(tool)} is given no forces that it could control: OpenSim fails", tool, tag="force_set_files"
             )
-        if tool.maximum_number_of_integrator_steps < 10:
-            found(
-                f"the run ends after {tool.maximum_number_of_integrator_steps} steps",
-                tool, tag="maximum_number_of_integrator_steps", severity=WARNING,
-            )  # fmt: skip
         if tool.replace_force_set and not is_of(tool, "RRATool"):
             found(
                 "the forces of force_set_files replace those of the model: its muscles are gone",
@@ -97,8 +109,6 @@ def tool_setting(setup: Setup, found: Found) -> None:
     for analysis in setup.named("Analysis"):
         if not analysis.on:
             found(f"{called(analysis)} is off", analysis, tag="on", severity=INFO)
-        if analysis.step_interval < 1:
-            found(f"a step interval of {analysis.step_interval}", analysis, tag="step_interval", severity=WARNING)
         if names[analysis.name] > 1:
             names[analysis.name] = 0
             found(
@@ -112,28 +122,9 @@ def tool_setting(setup: Setup, found: Found) -> None:
                     f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails", analysis,
                     severity=WARNING,
                 )  # fmt: skip
-            if not analysis.use_model_force_set:
-                found("without the forces of the model OpenSim crashes", analysis, tag="use_model_force_set")
-            if not analysis.activation_exponent > 1.0:
-                found(
-                    f"an exponent of {analysis.activation_exponent:g} leaves nothing to be made small", analysis,
-                    tag="activation_exponent", severity=WARNING,
-                )  # fmt: skip
-            if analysis.optimizer_max_iterations < 10:
-                found(
-                    f"the optimizer stops after {analysis.optimizer_max_iterations} iterations", analysis,
-                    tag="optimizer_max_iterations", severity=WARNING,
-                )  # fmt: skip
-            if analysis.optimizer_convergence_criterion > 0.05:
-                found(
-                    f"the optimizer stops at {analysis.optimizer_convergence_criterion:g}, far from its goal", analysis,
-                    tag="optimizer_convergence_criterion", severity=WARNING,
-                )  # fmt: skip
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
                 found(f"{called(analysis)} names no {what}: nothing is written", analysis, tag=tag, severity=WARNING)
-        if is_of(analysis, "PointKinematics") and not analysis.point_name.strip():
-            found("results of a point without a name get no proper file", analysis, tag="point_name", severity=WARNING)
         if is_of(analysis, "MuscleAnalysis") and analysis.on:
             for tool in setup.named("AnalyzeTool"):
                 if is_given(tool.coordinates_file) and not tool.solve_for_equilibrium_for_auxiliary_states:
