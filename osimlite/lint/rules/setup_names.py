@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup, is_of
 from osimlite.lint.words import called, nearest_name
-from osimlite.schema.base import Component, Unknown
+from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Reference
 from osimlite.schema.specs import reference_specs
 from osimlite.schema.states import variables
@@ -102,7 +102,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
             severity=severity, suggestion="all" if more else nearest_name(text, sorted(names)),
         )  # fmt: skip
     if setup.tool is not None and is_of(setup.tool[1], "AbstractTool"):
-        _look_up_controls(setup, setup.names_of("Actuator") | unknown, found)
+        _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, found)
 
 
 def _what(kind: Reference) -> str | None:
@@ -126,12 +126,12 @@ def _looked_up(tree: Tree, use: Use, text: str) -> tuple[str | None, str, Compon
     return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
 
 
-def _look_up_controls(setup: Setup, plain: set[str], found: Found) -> None:
+def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Found) -> None:
     """Tell controls, and columns of controls, that are those of no actuator."""
     if not plain:
         return
     # Of tools that follow a motion these are bounds, and go by the whole name.
-    follows = hasattr(setup.tool[1], "desired_kinematics_file") if setup.tool is not None else False
+    follows = hasattr(tool, "desired_kinematics_file")
     fate, severity = _FATES["left out" if follows else "refused"]
     actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
     for control in setup.named("Control"):
