@@ -134,6 +134,14 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     return _words(word, kind.least, kind.most)
 
 
+def reads_as(raw: str, kind: Kind, value: Any) -> bool:
+    """Whether the text of a property of this kind is plainly a value."""
+    try:
+        return bool(converter(kind)(raw) == value)
+    except Unclean:
+        return False
+
+
 def _one(read: Callable[[str], Any], optional: bool, legacy: bool) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         # Almost every text is one clean number or switch; what follows this is for the rest.

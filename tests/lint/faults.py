@@ -200,7 +200,7 @@ STRUCTURE = [
     Fault("misspelled_location_tag", tag("location", "loction", FOOT), "OSIM101"),
     Fault("misspelled_default_value", tag("default_value", "defalt_value", KNEE), "OSIM101"),
     Fault("misspelled_locked", tag("locked", "lockd", PLATFORM), "OSIM101"),
-    Fault("misspelled_gravity", tag("gravity", "gravty", "<Model"), "OSIM101"),
+    Fault("misspelled_gravity", tag("gravity", "gravty", "<Model"), "OSIM101", severity="warning"),
     Fault("misspelled_joint_frames", tag("frames", "frmes", HIP), "OSIM101"),
     Fault("unknown_geometry_class", tag("Brick", "Brik", '<Body name="Platform">'), "OSIM102"),
     Fault("unknown_attribute", put("<Model", SHANK, '<Body name="RightShank" mass="7">'), "OSIM105"),

@@ -226,6 +226,7 @@ def test_no_damage_makes_the_check_fail(project, name):
         ("<corrective_spring_linear_damping>0 0 1500</corrective_spring_linear_damping>", "warning"),
         ("<finl_time></finl_time>", "error"),
         ("<finl_time>2</finl_time>", "error"),
+        ("<finl_time>1.0</finl_time>", "warning"),
     ],
 )
 def test_a_tag_of_older_versions_is_as_bad_as_what_is_lost_with_it(tmp_path, element, severity):
@@ -235,6 +236,26 @@ def test_a_tag_of_older_versions_is_as_bad_as_what_is_lost_with_it(tmp_path, ele
     )
     (finding,) = validate(setup, select="OSIM101").findings
     assert str(finding.severity) == severity
+
+
+@pytest.mark.parametrize(
+    ("elements", "severities"),
+    [
+        ("<final_time>2</final_time><final_time> 2 </final_time>", ["warning"]),
+        ("<final_time>2</final_time><final_time>3</final_time><final_time>2</final_time>", ["error", "warning"]),
+        ("<solve_for_equilibrium_for_auxiliary_states>no</solve_for_equilibrium_for_auxiliary_states>", ["warning"]),
+        ("<solve_for_equilibrium_for_auxiliary_states>flase</solve_for_equilibrium_for_auxiliary_states>", ["warning"]),
+        ("<solve_for_equilibrium_for_auxiliary_states>yes</solve_for_equilibrium_for_auxiliary_states>", ["error"]),
+        ("<solve_for_equilibrium_for_auxiliary_states>ture</solve_for_equilibrium_for_auxiliary_states>", ["error"]),
+    ],
+)
+def test_what_opensim_ignores_is_no_error_where_it_does_what_is_meant(tmp_path, elements, severities):
+    setup = tmp_path / "forward.xml"
+    setup.write_text(
+        f'<OpenSimDocument Version="40600"><ForwardTool name="run">{elements}</ForwardTool></OpenSimDocument>'
+    )
+    findings = validate(setup, select=["OSIM104", "OSIM201"]).findings
+    assert [str(finding.severity) for finding in findings] == severities
 
 
 @pytest.mark.parametrize(

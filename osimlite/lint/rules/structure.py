@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from osimlite.document.lexical import reads_as
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import renamed, replaced, without_element
@@ -30,7 +31,8 @@ def unknown_tag(subject: Subject, found: Found) -> None:
     ## Why is this bad
     OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of a contact is 0, and
     the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A setup may hold what older versions
-    understood: that is a warning, or an information if the element is empty or switches off what is off anyway.
+    understood: that is a warning, or an information if the element is empty or switches off what is off anyway. A
+    misspelt element that says what the default is anyway is a warning too.
 
     ## Example
     ```xml
@@ -68,14 +70,37 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         severity = ERROR
         if not free and subject.model is None:
             severity = INFO if _asks_for_nothing(subject, note.number) else WARNING
+        elif free and suggestion is not None and _is_default(subject, note.number, specs[suggestion]):
+            severity = WARNING
         found(message, owner, number=note.number, suggestion=suggestion, fix=fix, severity=severity)
+
+
+def _inside(subject: Subject, number: int) -> str:
+    assert subject.source is not None
+    span = subject.source.spans[number]
+    return subject.source.text[span.tag_end : span.inner_end]
 
 
 def _asks_for_nothing(subject: Subject, number: int) -> bool:
     """Whether an element is empty, or says no more than that something is off."""
-    assert subject.source is not None
-    span = subject.source.spans[number]
-    return _OFF.fullmatch(subject.source.text[span.tag_end : span.inner_end]) is not None
+    return _OFF.fullmatch(_inside(subject, number)) is not None
+
+
+def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
+    """Whether an element says what its property is anyway, so that it does not matter that OpenSim ignores it."""
+    return not isinstance(spec.kind, Held) and reads_as(_inside(subject, number), spec.kind, spec.default)
+
+
+def _is_said_again(subject: Subject, owner: Object, number: int) -> bool:
+    """Whether an element holds the same as the first of its tag in the same object."""
+    assert subject.source is not None and owner._index is not None
+    spans, end = subject.source.spans, 0
+    for first in range(owner._index + 1, number):
+        if spans[first].start >= end:
+            if spans[first].tag == spans[number].tag:
+                return _inside(subject, first).split() == _inside(subject, number).split()
+            end = spans[first].end
+    return False
 
 
 def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: Successor) -> None:
@@ -176,7 +201,8 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
     Reports every element after the first of the same property in one object.
 
     ## Why is this bad
-    OpenSim takes the first and ignores the rest, while a reader expects the last one to hold.
+    OpenSim takes the first and ignores the rest, while a reader expects the last one to hold. One that says the same
+    as the first is a warning.
 
     ## Example
     ```xml
@@ -206,6 +232,7 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
             owner,
             number=note.number,
             fix=without_element(subject.source, note.number),
+            severity=WARNING if _is_said_again(subject, owner, note.number) else None,
         )
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from osimlite.document.lexical import Unclean, flag, real, split, whole
+from osimlite.document.lexical import Unclean, flag, reads_as, real, split, whole
 from osimlite.document.notes import Note
-from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, shown
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.text import listed
+from osimlite.text import listed, nearest
 
 
 @rule("OSIM201", "unreadable-value", severity=ERROR, mends="safe")
@@ -27,7 +27,8 @@ def unreadable_value(subject: Subject, found: Found) -> None:
 
     ## Why is this bad
     OpenSim writes a line to its log, drops the value and keeps the default. A locked coordinate comes loose, a
-    contact sphere sits at the origin.
+    contact sphere sits at the origin. Where OpenSim takes what was plainly meant all the same, as false for `no`, it
+    is a warning.
 
     ## Example
     ```xml
@@ -45,14 +46,17 @@ def unreadable_value(subject: Subject, found: Found) -> None:
         if note.kind.startswith("too-") and _all_read(note.word, kind):
             continue
         text = _text(owner, spec)
+        better = _readable(text, kind)
+        taken = spec.default if note.value is None and not kind.legacy else note.value
         found(
             f"{subject.titled(owner, spec)} is '{text}', not {kind.words()}{_foreign(text)}: "
             f"{_kept(note, owner, spec, kind)}",
             owner,
             number=note.number,
             word=note.word,
-            suggestion=(better := _readable(text, kind)),
+            suggestion=better,
             fix=replaced(subject.source, subject.position(owner, tag=spec.tag), better) if "\n" not in text else None,
+            severity=WARNING if better is not None and reads_as(better, kind, taken) else None,
         )
 
 
@@ -220,7 +224,8 @@ def _foreign(text: str) -> str:
 def _readable(text: str, kind: Value) -> str | None:
     """The same value as OpenSim would read it, if that is plain."""
     if kind.scalar == "bool":
-        return {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}.get(text.lower())
+        known = {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}
+        return known.get(text.lower()) or nearest(text.lower(), ("true", "false"))
     if kind.scalar == "double":
         words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _plain_digits(text)).split()
         try:
