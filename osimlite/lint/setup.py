@@ -284,8 +284,8 @@ class Setup(Subject):
 
 
 def is_given(name: str) -> bool:
-    """Whether a text names a file: one word stands for none."""
-    return name.strip().lower() not in ("", "unassigned")
+    """Whether a text names a file: one word stands for none, in these letters."""
+    return name.strip() not in ("", "Unassigned")
 
 
 def files_of(item: Object, *rules: str) -> Iterator[tuple[FieldSpec, str]]:

@@ -53,6 +53,22 @@ KINDS: tuple[Callable[[Project, random.Random], Change | None], ...] = (
 )  # fmt: skip
 """Kinds of faults."""
 
+UNKNOWABLE = {
+    "number_out_of_range": "the number may be one that is meant",
+    "count_of_numbers": "a list may be longer or shorter",
+    "wrong_bool": "one that OpenSim reads may be meant: those that it does not read are sure",
+    "other_bool": "either may be meant",
+    "element_twice": "of a set, a second member",
+    "element_moved": "an object may belong to another set",
+    "element_gone": "what is not there has a default",
+    "value_gone": "an empty list is a list",
+    "column_gone": "a study may follow fewer columns",
+    "columns_swapped": "values that either might have",
+    "other_units": "values that are possible in them too",
+    "version": "a document may be of any version",
+}
+"""Why faults of these kinds, unless they are sure, may leave a project in which nothing shows that it was another."""
+
 
 def faults(project: Project, draw: random.Random) -> Iterator[Fault]:
     """Faults without end."""

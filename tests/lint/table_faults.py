@@ -50,7 +50,9 @@ def header_value(project: Project, draw: random.Random) -> Change | None:
     at = draw.choice([k for k in range(table.label_line) if re.match(r"\w+=", table.lines[k])])
     key, _, value = table.lines[at].partition("=")
     numbers = ("", "abc", "0", "-1", str(int(value) - 1), str(int(value) + 1)) if value.isdecimal() else ()
-    new = draw.choice((*numbers, "", "true", "no", "yes", "YES", "double", "Vec3", "1 2"))
+    # The other of yes and no is another project: see other_units.
+    units = ("no", "yes", "YES") if key != "inDegrees" else ()
+    new = draw.choice((*numbers, *units, "", "true", "double", "Vec3", "1 2"))
     text = table.with_lines(at, f"{key}={new}")
     return Change(table.name, f"{key}: {value!r} -> {new!r}", text, _head_lines(table), sure=key in _counts(table))
 
@@ -179,13 +181,21 @@ def cut_off(project: Project, draw: random.Random) -> Change | None:
         f"{len(kept)} of {len(text)} letters",
         kept,
         tuple(range(1, kept.count("\n") + 2)),
+        words=("time_range", "initial_time", "final_time") if name in project.tables else (),
         sure=name in project.documents,
     )
 
 
 def other_units(project: Project, draw: random.Random) -> Change | None:
-    """All numbers of a table but the times in other units."""
+    """All numbers of a table but the times in other units, or other units of the same numbers."""
     table = _table(project, draw)
+    lines, labels = tuple(range(1, len(table.lines) + 1)), table.labels[1:]
+    words = tuple(filter(None, (*labels, *(label[:-1] for label in labels))))
+    units = {"inDegrees=yes": "inDegrees=no", "inDegrees=no": "inDegrees=yes"}
+    given = next((k for k, line in enumerate(table.lines) if line in units), None)
+    if given is not None and draw.random() < 0.3:
+        new = units[table.lines[given]]
+        return Change(table.name, new, table.with_lines(given, new), lines, words)
     factor = draw.choice((1000.0, 0.001, 0.0174532925, 57.2957795))
     kept = table.time + 1
 
@@ -195,6 +205,4 @@ def other_units(project: Project, draw: random.Random) -> Change | None:
             f"{float(c) * factor:.9g}" if numeric and NUMBER.fullmatch(c) else c for c in cells[kept:]
         ]
 
-    return Change(
-        table.name, f"numbers times {factor:g}", _columns(table, scaled), tuple(range(1, len(table.lines) + 1))
-    )
+    return Change(table.name, f"numbers times {factor:g}", _columns(table, scaled), lines, words)

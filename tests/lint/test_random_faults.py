@@ -26,6 +26,13 @@ NODES = (FIXTURES / "setups" / "controls.xml").read_text().partition("<x_nodes>"
 """The control curve of a setup."""
 
 
+PROCESSOR = """
+				<ModelProcessor name="model">
+					<filepath>model.osim</filepath>
+				</ModelProcessor>"""
+"""The model of a study."""
+
+
 class Folder:
     """A project in files, in which one may be changed at a time."""
 
@@ -103,6 +110,9 @@ def test_a_fault_is_found_where_it_is(folder):
         (walking, "reserves.xml", "<isDisabled>false", "<isDisabled>true"),
         (walking, "controls.xml", f"<x_nodes>{NODES}</x_nodes>", "<x_nodes />"),
         (walking, "controls.xml", "hamstrings_r.excitation", "/forceset/hamstrings_r.excitation"),
+        (walking, "scale.xml", ">markers.xml<", "><"),
+        (walking, "so.xml", "<forces_file>Unassigned<", "<forces_file>unassigned<"),
+        (pendulum, "study.omoco", PROCESSOR, ""),
         (walking, "forward.xml", ">controls.xml<", ">coords.mot<"),
         (walking, "ik.xml", "> model.osim <", ">walk.trc<"),
         (walking, "loads.xml", ">grf.mot<", ">tasks.xml<"),

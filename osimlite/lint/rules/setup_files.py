@@ -81,6 +81,13 @@ def missing_input(setup: Setup, found: Found) -> None:
             naming.item, tag=naming.spec.tag, word=naming.name if naming.spec.tag == "force_set_files" else None,
             suggestion=twin, certain=True,
         )  # fmt: skip
+    for maker in setup.having("marker_set_file"):
+        if "marker_set_file" in maker.model_fields_set and not maker.marker_set_file.strip():
+            found(
+                f"marker_set_file of {called(maker)} is empty, and OpenSim refuses the setup; leave it out, or write "
+                "Unassigned",
+                maker, tag="marker_set_file", suggestion="Unassigned",
+            )  # fmt: skip
     for item in setup.items:
         for tag in _NEEDED.get(type(item).__name__, ()):
             if not is_given(getattr(item, tag)):

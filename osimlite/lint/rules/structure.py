@@ -88,7 +88,10 @@ def _asks_for_nothing(subject: Subject, number: int) -> bool:
 
 def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
     """Whether an element says what its property is anyway, so that it does not matter that OpenSim ignores it."""
-    return not isinstance(spec.kind, Held) and reads_as(_inside(subject, number), spec.kind, spec.default)
+    text = _inside(subject, number)
+    if isinstance(spec.kind, Held):
+        return spec.kind.form == "list" and not text.strip()
+    return reads_as(text, spec.kind, spec.default)
 
 
 def _is_said_again(subject: Subject, owner: Object, number: int) -> bool:
