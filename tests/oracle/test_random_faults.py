@@ -42,8 +42,10 @@ LOST = {
     "OSIM104": "the second says other than the first; of one that says the same the rule tells a warning",
     "OSIM201": "OpenSim takes another value than is written; the results of this project do not show it",
     "OSIM203": "OpenSim takes another number than is written; the results of this project do not show it",
+    "OSIM205": "nothing is smaller than NaN: a range of times that begins with it may be all there are",
     "OSIM803": "the table does not say whether it is read for angles: forces have none",
     "OSIM806": "rows are lost; whether the times of the tool need them is not said in the table",
+    "OSIM807": "a row is lost, as above, with its time",
 }
 """Errors that tell that OpenSim loses what is written, and why they may stand where the results are equal."""
 
