@@ -59,7 +59,7 @@ def choose_step(draft: Draft) -> None:
                 (tension,) = isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
             if tension > muscle.max_isometric_force:
                 cannot = "fibers that are longer in the default pose than they can bear"
-                done = "as it is: the model may run away, as it does in OpenSim"
+                done = "as it is: the model may run away, in smaller steps too"
                 detail = f"they pull {tension / muscle.max_isometric_force:.2g} times max_isometric_force at rest"
                 draft.fidelity.add("overstretched", path, cannot, done, detail)
 
