@@ -107,6 +107,7 @@ def test_a_fault_is_found_where_it_is(folder):
         (walking, "constraints.xml", "hamstrings_r.excitation", "hamstrings_r"),
         (walking, "constraints.xml", "<is_model_control> true", "<is_model_control> false"),
         (walking, "reserves.xml", "<coordinate>hip_flexion_r<", "<coordinate><"),
+        (walking, "tasks.xml", "<coordinate>pelvis_ty<", "<coordinate><"),
         (walking, "reserves.xml", "<isDisabled>false", "<isDisabled>true"),
         (walking, "controls.xml", f"<x_nodes>{NODES}</x_nodes>", "<x_nodes />"),
         (walking, "controls.xml", "hamstrings_r.excitation", "/forceset/hamstrings_r.excitation"),

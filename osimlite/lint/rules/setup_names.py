@@ -66,15 +66,20 @@ def unknown_name(setup: Setup, found: Found) -> None:
     tree = setup.tree
     if tree is None:
         return
+    off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
+
+    def counts(item: Any) -> bool:
+        return id(item) not in off and vars(item).get("on", True) and vars(item).get("apply", True)
+
     for cls, items in setup.by_class.items():
-        for spec in reference_specs(cls) if is_of(items[0], "Force") else ():
+        for spec in reference_specs(cls):
             assert isinstance(spec.kind, Reference)
             what = _what(spec.kind) if spec.kind.required else None
-            for item in items if what else ():
-                if getattr(item, spec.name) in ("", None):
-                    found(f"{called(item)} names no {what}: OpenSim refuses it", item, tag=spec.tag)
+            for item in items if what and spec.kind.shape != "list" else ():
+                if getattr(item, spec.name) in ("", None) and counts(item):
+                    fate, severity = _FATES[spec.kind.fate]
+                    found(f"{called(item)} names no {what}: {fate}", item, tag=spec.tag, severity=severity)
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
-    off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
 
     @cache
     def known(what: str, rule: str) -> set[str]:
@@ -86,7 +91,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
         item, kind, text = use.holder, use.reference, str(use.value).strip()
         if not text or text.lower() == "unassigned" or text in kind.words or kind.fate == "ignored":
             continue
-        if id(item) in off or not vars(item).get("on", True) or not vars(item).get("apply", True):
+        if not counts(item):
             continue
         what, text, target = _looked_up(tree, use, text)
         if what is None or target is not None:
