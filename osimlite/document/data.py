@@ -120,7 +120,7 @@ class _Writer:
             if (
                 spec.name in item.model_fields_set
                 or spec.name in inherited
-                or (isinstance(spec.kind, Held) and has_content(value, spec.kind.form))
+                or (isinstance(spec.kind, Held) and has_content(value, spec))
             ):
                 data[spec.name] = self._value(item, spec, value)
         if item.layout is not None and item.layout.unknown:

@@ -100,7 +100,7 @@ class _Printer:
                     spec.name in present
                     or (default is not None and value != getattr(default, spec.name))
                     or (default is None and layout is not None and spec.name in layout.inherited)
-                    or (default is None and isinstance(spec.kind, Held) and has_content(value, spec.kind.form))
+                    or (default is None and isinstance(spec.kind, Held) and has_content(value, spec))
                     # A part may start with a value that its class does not have elsewhere, as the axes of a transform.
                     or (default is None and not isinstance(spec.kind, Held) and value != spec.default == spec.default)
                 ):
@@ -194,17 +194,16 @@ class _Printer:
             self.lines.extend(f"{indent}<!--{text}-->" for text in texts)
 
 
-def has_content(value: Any, form: str = "") -> bool:
-    """Whether an object or list that no one assigned holds something all the same, by the form of its property."""
+def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
+    """Whether an object or list that no one assigned holds something all the same; the object by its property."""
     if isinstance(value, list):
         return bool(value)
     if not isinstance(value, Object):
         return False
-    if form in ("list", "optional"):
-        # The member of a list is content even if nothing in it was set: a set of one marker at the origin has a marker.
+    form = spec.kind.form if spec is not None and isinstance(spec.kind, Held) else ""
+    if form == "list" or (form == "optional" and spec is not None and spec.factory is None):
+        # What nothing puts there is content even if nothing in it was set: a marker at the origin in a set of one.
         return True
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True
-    return any(
-        has_content(held, spec.kind.form if isinstance(spec.kind, Held) else "") for spec, held in value.objects_held()
-    )
+    return any(has_content(held, inner) for inner, held in value.objects_held())

@@ -117,7 +117,7 @@ def test_format_says_when_there_is_nothing_to_do(tmp_path):
         done = run("format", path, *option)
         assert (done.code, done.out, done.err) == (0, "", "1 file is formatted already\n")
     done = run("format", path, path)
-    assert done.err == "2 files are formatted already\n"
+    assert done.err == "1 file is formatted already\n"
 
 
 @pytest.mark.parametrize(

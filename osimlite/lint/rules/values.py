@@ -167,14 +167,9 @@ def _value_notes(subject: Subject, *kinds: str) -> Iterator[tuple[Note, Object, 
     # What is left of a value with elements inside means nothing, and what OpenSim refuses has no default.
     broken = {note.number for note in subject.notes if note.kind == "child-in-value"}
     broken.update(refusal.number for refusal in subject.refusals)
-    # A bare ampersand OpenSim leaves out before it reads anything; that it stands there is told by itself.
-    ampersands = {note.line for note in subject.notes if note.kind == "bare-ampersand"}
     for note in subject.notes:
         spec = note.spec
         if note.kind not in kinds or note.number in broken or note.owner is None or spec is None:
-            continue
-        place = subject.position(note.owner, number=note.number) if "&" in note.word else None
-        if place is not None and place.line in ampersands:
             continue
         if isinstance(spec.kind, Value):
             yield note, note.owner, spec, spec.kind
