@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,21 @@ def angles_xyz(rotation: Array) -> Array:
         # Only the sum (or difference) of the other two shows; let the third be zero.
         return np.array((math.atan2(r21, r22) * math.copysign(1.0, r13), second, 0.0))
     return np.array((math.atan2(-r23, r33), second, math.atan2(-r12, r11)))
+
+
+def quaternion(rotation: ArrayLike) -> Array:
+    """Unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3), each by the largest of its parts."""
+    m = np.asarray(rotation)
+    trace = np.trace(m, axis1=-2, axis2=-1)[..., None, None]
+    # Every row is the quaternion times one of its parts; the longest has the most digits.
+    products = np.empty((*m.shape[:-2], 4, 4))
+    products[..., 1:, 1:] = m + np.swapaxes(m, -1, -2) + (1.0 - trace) * np.eye(3)
+    for k in range(3):
+        products[..., k + 1, 0] = products[..., 0, k + 1] = m[..., k - 1, k - 2] - m[..., k - 2, k - 1]
+    products[..., :1, :1] = 1.0 + trace
+    largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    rows: Array = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    return rows / np.linalg.norm(rows, axis=-1, keepdims=True)
 
 
 def transform(rotation: Any = None, translation: Any = None) -> Array:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
 
 from osimlite._require import require
-from osimlite.files import write_atomically
 from osimlite.gait.basin import Basin
 from osimlite.view.lettering import plain_lettering
+from osimlite.view.plots import save
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
@@ -56,7 +55,4 @@ def _draw(basin: Basin, path: Path, title: str) -> Path:
     bar = figure.colorbar(image, ax=axes)
     bar.set_label(f"steps, {basin.wanted} or more count as walking")
     bar.set_ticks(np.linspace(0, basin.wanted, 5).round().astype(int))
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
-    write_atomically(path, out.getvalue())
-    return path
+    return save(figure, path, dpi=110)

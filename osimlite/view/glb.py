@@ -16,7 +16,7 @@ import numpy as np
 
 from osimlite import __version__
 from osimlite.files import write_atomically
-from osimlite.multibody.spatial import Array
+from osimlite.multibody.spatial import Array, quaternion
 from osimlite.view.motion import Motion, at_times, in_mechanism_order
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
@@ -53,7 +53,11 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
     names = [*(body.name for body in scene.mechanism.bodies), "ground"]
     bodies = [
         written.node(
-            name, _Track([p.origins[k] for p in poses], _quaternions(np.array([p.rotations[k] for p in poses])))
+            name,
+            _Track(
+                [p.origins[k] for p in poses],
+                _continuous(np.roll(quaternion([p.rotations[k] for p in poses]), -1, axis=1)),
+            ),
         )
         for k, name in enumerate(names)
     ]
@@ -115,21 +119,6 @@ def _turning(axis: Array, cosine: float) -> Array:
     found = np.array((*axis, 1.0 + cosine))
     size = float(np.linalg.norm(found))
     return found / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
-
-
-def _quaternions(rotations: Array) -> Array:
-    """Quaternions x y z w (n, 4) of rotation matrices (n, 3, 3)."""
-    r = rotations
-    trace = np.trace(r, axis1=1, axis2=2)
-    products = np.empty((len(r), 4, 4))
-    products[:, :3, :3] = r + r.transpose(0, 2, 1) + (1.0 - trace)[:, None, None] * np.eye(3)
-    for k in range(3):
-        products[:, k, 3] = products[:, 3, k] = r[:, k - 1, k - 2] - r[:, k - 2, k - 1]
-    products[:, 3, 3] = 1.0 + trace
-    # Every row is the quaternion times one of its parts; the longest has the most digits.
-    best = np.argmax(np.diagonal(products, axis1=1, axis2=2), axis=1)
-    rows = products[np.arange(len(r)), best]
-    return _continuous(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
 def _continuous(quaternions: Array) -> Array:

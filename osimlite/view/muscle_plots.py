@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from math import ceil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from osimlite.files import make_folder, write_atomically
+from osimlite.files import make_folder
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.plots import figure_of, finish, lines_in, shared_out, sheet
+from osimlite.view.plots import figure_of, finish, lines_in, save, shared_out, sheet
 
 _TITLES = {
     "length": "Muscle-tendon length",
@@ -54,10 +53,7 @@ def plot_muscles(
                 figure = _maps(curves, mechanism, rows, title)
             else:
                 figure = _lines(curves, mechanism, rows, title, None if other is None else other.columns[quantity])
-            out = io.BytesIO()
-            figure.savefig(out, format="png", dpi=150)
-            write_atomically(base / f"{quantity}.png", out.getvalue())
-            written.append(base / f"{quantity}.png")
+            written.append(save(figure, base / f"{quantity}.png"))
     return written
 
 

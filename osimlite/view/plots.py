@@ -64,11 +64,16 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
     written = []
     with plain_lettering():
         for name, figure in _figures(trajectory, known):
-            out = io.BytesIO()
-            figure.savefig(out, format="png", dpi=150)
-            write_atomically(base / name, out.getvalue())
-            written.append(base / name)
+            written.append(save(figure, base / name))
     return written
+
+
+def save(figure: Any, path: Path, dpi: float = 150) -> Path:
+    """Write a figure of matplotlib as PNG, whole or not at all."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=dpi)
+    write_atomically(path, out.getvalue())
+    return path
 
 
 def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:

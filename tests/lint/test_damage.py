@@ -175,7 +175,7 @@ def _unknown(top: Object) -> list[str]:
     return sorted(texts)
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="the time of a check cannot be limited here")
+@pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="the time of a check cannot be limited here")
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_a_damaged_file_has_findings_in_places_that_exist(project, group):
     folder, victims = project

@@ -11,6 +11,7 @@ from osimlite.multibody.spatial import (
     cross,
     inverse,
     offset,
+    quaternion,
     rotation_about,
     rotation_xyz,
     skew,
@@ -32,6 +33,18 @@ def test_cross_and_skew_are_the_cross_product(a, b):
 def test_body_fixed_angles_are_three_turns_in_a_row(angles):
     turns = [rotation_about(axis, angle) for axis, angle in zip(AXES, angles, strict=True)]
     assert rotation_xyz(angles) == pytest.approx(turns[0] @ turns[1] @ turns[2], abs=1e-15)
+
+
+@given(vectors, st.sampled_from([None, np.pi]))
+def test_quaternions_turn_as_their_rotations(angles, third):
+    if third is not None:
+        # Half a turn: the scalar is zero.
+        angles = np.array((0.0, 0.0, third))
+    rotation = rotation_xyz(angles)
+    w, *v = quaternion(rotation)
+    about = skew(np.array(v))
+    assert np.eye(3) + 2.0 * about @ (w * np.eye(3) + about) == pytest.approx(rotation, abs=1e-15)
+    assert quaternion(np.array([np.eye(3), rotation]))[1] == pytest.approx((w, *v), abs=0.0)
 
 
 @given(vectors, st.sampled_from([None, -np.pi / 2, np.pi / 2]))

@@ -34,7 +34,9 @@ NEAR = 1e-9
 
 SINGULAR = {"m0109"}
 """A motion moves no mass."""
-STUCK = {"m0115", "m0123", "m0129", "m0239"} | SINGULAR
+SLOWLY = {"m0129", "m0239"}
+"""OpenSim comes to no end, and takes minutes for it."""
+STUCK = {"m0115", "m0123"} | SLOWLY | SINGULAR
 """OpenSim comes to NaN, or to no end."""
 SENSITIVE = {"m0014", "m0037", "m0116", "m0161", "m0163", "m0172", "m0225"}
 """OpenSim's own motion is about as far off if it starts 1e-14 or 1e-11 away."""
@@ -138,6 +140,8 @@ def test_motions(both: Both, corpus_model: Any) -> None:
     if not paths:
         pytest.skip("nothing moves")
     if corpus_model.id in STUCK:
+        if corpus_model.id in SLOWLY and "OSIMLITE_ALL_MODELS" not in os.environ:
+            pytest.skip("OpenSim takes minutes to fail; OSIMLITE_ALL_MODELS=1 asks it")
         with suppress(RuntimeError):
             assert np.isnan(_moved(both, paths)[0]).any()
         return

@@ -14,7 +14,7 @@ from lxml.etree import Element, SubElement, _Element
 from osimlite.errors import ModelError, SimulationError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, StationPlacement
-from osimlite.multibody.spatial import Array
+from osimlite.multibody.spatial import Array, quaternion
 from osimlite.robot.lines import Line
 from osimlite.robot.mesh_files import MeshFiles
 from osimlite.robot.robot import Link, Robot
@@ -278,26 +278,6 @@ def pose(matrix: Array) -> dict[str, Value]:
     """The attributes that place a frame (4, 4) in that of its parent; None where it is not moved, or not turned."""
     place, turned = tidy(matrix[:3, 3]), tidy(quaternion(matrix[:3, :3]))
     return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
-
-
-def quaternion(rotation: Array) -> Array:
-    """Unit quaternion (4,), scalar first, of a rotation matrix, by the largest of its components."""
-    m = rotation
-    squares = 1.0 + np.array(
-        (
-            m[0, 0] + m[1, 1] + m[2, 2],
-            m[0, 0] - m[1, 1] - m[2, 2],
-            m[1, 1] - m[0, 0] - m[2, 2],
-            m[2, 2] - m[0, 0] - m[1, 1],
-        )
-    )
-    a, b, c = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-    d, e, f = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
-    products = np.array(((0.0, a, b, c), (a, 0.0, d, e), (b, d, 0.0, f), (c, e, f, 0.0)))
-    largest = int(np.argmax(squares))
-    found: Array = products[largest]
-    found[largest] = squares[largest]
-    return found / np.linalg.norm(found)
 
 
 def tidy(values: Array) -> Array:
