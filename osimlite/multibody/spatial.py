@@ -77,7 +77,8 @@ def quaternion(rotation: ArrayLike) -> Array:
     products[..., :1, :1] = 1.0 + trace
     largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
     rows: Array = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    return rows / np.linalg.norm(rows, axis=-1, keepdims=True)
+    rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
+    return rows
 
 
 def transform(rotation: Any = None, translation: Any = None) -> Array:
