@@ -129,8 +129,8 @@ class Driver:
     # ------------------------------------------------------------------------------------------------- states
     def reset(self) -> None:
         """Go back to the default pose, and to where the states of the forces start."""
-        if self.model.nkey:
-            self._mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+        # Of a file without one, the state is that of no keyframe.
+        self._mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         q, u, _ = self.state()
         y = self.system.state.pack(q.tolist(), u.tolist())
         if self._equilibrate:
@@ -307,8 +307,8 @@ class Driver:
         self._mujoco.mj_setConst(self.model, self.data)
 
     def _followed_by(self, name: str) -> _Followed:
-        follower, functions, own = self.mjcf.followers[name], self.mjcf.functions, self.model.joint(name)
-        names = self.mjcf.arguments.get(name, () if follower.leader is None else (follower.leader,))
+        follower, own = self.mjcf.followers[name], self.model.joint(name)
+        names = follower.arguments or (() if follower.leader is None else (follower.leader,))
         leaders = [self.model.joint(each) for each in names]
         return _Followed(
             self.model.equality(name).id,
@@ -316,8 +316,8 @@ class Driver:
             own.dofadr[0],
             [leader.qposadr[0] for leader in leaders],
             [leader.dofadr[0] for leader in leaders],
-            functions.get(name) or Polynomial(follower.polynomial[::-1]),
-            name in functions,
+            follower.function or Polynomial(follower.polynomial[::-1]),
+            follower.function is not None,
         )
 
     def _open_controls(self) -> None:

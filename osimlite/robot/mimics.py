@@ -27,7 +27,7 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
     That is so where several motions of a joint are driven by one coordinate, and where a coupler makes a coordinate a
     straight line of another. A leader never follows another joint itself: most readers do not look further.
     """
-    leaders = _leaders(robot)
+    leads = leaders(robot)
     follows: dict[int, tuple[int, Line]] = {}
     for coupler in couplers(robot):
         line = as_line(coupler.function)
@@ -45,7 +45,7 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
                 return min(seen), Line(1.0, 0.0)
             seen.add(place)
             line = line.after(step)
-            if place in leaders:
+            if place in leads:
                 found = place, line
         return found
 
@@ -55,14 +55,14 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
         if len(joint.coordinates) != 1 or line is None:
             continue
         place, way = origin(joint.coordinates[0])
-        if place not in leaders or leaders[place][0] is joint:
+        if place not in leads or leads[place][0] is joint:
             continue
-        leader, own = leaders[place]
+        leader, own = leads[place]
         result[joint.name] = Mimic(leader.name, line.after(way).after(own.inverse()))
     return result
 
 
-def _leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
+def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
     """For coordinates the joint that others follow: the one that is the coordinate, else one that is a line of it."""
     found: dict[int, tuple[RobotJoint, Line]] = {}
     for joint in robot.moving:

@@ -17,6 +17,11 @@ def legal(name: str) -> str:
     return word if word[0].isalpha() or word[0] == "_" else f"_{word}"
 
 
+def dotted(path: str) -> str:
+    """A component path as a name."""
+    return path.strip("/").replace("/", ".")
+
+
 class UniqueNames:
     """Gives out legal names, none of them twice."""
 
@@ -36,7 +41,7 @@ class UniqueNames:
 def coordinate_names(robot: Robot) -> Robot:
     """The same robot with joints named by their coordinates: by its path with dots where coordinates share a name."""
     names = robot.mechanism.coordinate_names
-    own = {joint.name: names[place].strip("/").replace("/", ".") for place, joint in robot.joint_of.items()}
+    own = {joint.name: dotted(names[place]) for place, joint in robot.joint_of.items()}
     taken = set(own.values())
     for joint in robot.joints:
         if joint.name not in own:

@@ -31,7 +31,8 @@ COMPUTE = "compute its value by the file of coordinates"
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
 """Components that say nothing of their own: sets, and the axes that a viewer may draw at a frame."""
 
-_ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
+ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
+"""Joints whose speeds are an angular velocity, not the rates of their coordinates."""
 
 _LOST: tuple[tuple[type[Component], str, str], ...] = (
     (Force, "force", "a force"),
@@ -160,7 +161,7 @@ class _Survey:
                     f"links {' '.join(between)}",
                 )
             moving = {index for part in chain for index in part.coordinates}
-            if isinstance(joint, _ANGULAR_SPEEDS) and moving:
+            if isinstance(joint, ANGULAR_SPEEDS) and moving:
                 self.note(
                     "ball-joint",
                     path,

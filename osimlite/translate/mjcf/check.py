@@ -18,16 +18,15 @@ from numpy.polynomial.polynomial import polyder, polyval
 from osimlite._require import require
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.multibody.spatial import Array
+from osimlite.robot.names import dotted
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.isometric import isometric_tension
 from osimlite.translate.mjcf.muscles import Curves
-from osimlite.translate.mjcf.poses import free_coordinates, random_poses
+from osimlite.translate.mjcf.poses import arm_errors, free_coordinates, random_poses
 
-NOTHING = 1e-9
-"""A moment arm (m) that is none."""
 FOLLOWED = 4
 """So many joints may follow each other in a row."""
 
@@ -109,25 +108,19 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
         )
     known, truth = random_poses(paths, poses, seed)
     lengths, arms, places = zip(*(theirs.measured(q) for q in known.q), strict=True)
-    infos = [paths.mechanism.coordinates[place] for place in known.moving]
-    units = {info.name: "m" if info.motion_type == "rotational" else "1" for info in infos}
     found = []
     for name, tendon in tendons.items():
         own = truth[owners[name]]
         off = np.array(lengths)[:, tendon] - own.lengths
-        turned = np.array(arms)[:, tendon] - own.arms
-        by_coordinate = {
-            unique: Error.of(column, units[info.name])
-            for unique, info, column, wanted in zip(theirs.free, infos, turned.T, own.arms.T, strict=True)
-            if np.abs(wanted).max() > NOTHING or np.abs(column).max() > NOTHING
-        }
+        turned = arm_errors(paths.mechanism, np.array(arms)[:, tendon], own)
+        by_coordinate = {theirs.names[place]: error for place, error in turned.items()}
         muscle = model.tree().by_path[owners[name]]
         more = theirs.strength(name, muscle, own.lengths) if isinstance(muscle, Muscle) else {}
         found.append(MuscleCheck(name, Error.of(off, "m"), by_coordinate, **more))
     return Check(
         tuple(found),
         tuple(name for name in owners if name not in tendons),
-        tuple(name for name in theirs.free if name not in theirs.joints),
+        tuple(theirs.names[place] for place in theirs.free if place not in theirs.joints),
         _apart(theirs, known.origins, places),
     )
 
@@ -148,15 +141,11 @@ class _Compiled:
     """A compiled model of MuJoCo's, posed by the coordinates of a model."""
 
     def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
-        self.mujoco, self.model, self.data, self.paths = mujoco, compiled, mujoco.MjData(compiled), paths
-        names = paths.mechanism.coordinate_names
-        self.free = [names[place].strip("/").replace("/", ".") for place in free_coordinates(paths.mechanism)]
+        self.mujoco, self.model, self.data = mujoco, compiled, mujoco.MjData(compiled)
+        self.names, self.free = list(map(dotted, paths.mechanism.coordinate_names)), free_coordinates(paths.mechanism)
         kinds = mujoco.mjtObj
-        self.joints = {
-            name: joint
-            for name in (label.strip("/").replace("/", ".") for label in names)
-            if (joint := mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name)) >= 0
-        }
+        joints = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name)) for k, name in enumerate(self.names))
+        self.joints = {k: joint for k, joint in joints if joint >= 0}
         bodies = ((k, body.name) for k, body in enumerate(paths.mechanism.bodies))
         matched = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_BODY, name)) for k, name in bodies)
         self.bodies = {k: body for k, body in matched if body >= 0}
@@ -177,16 +166,13 @@ class _Compiled:
 
     def measured(self, q: Array) -> tuple[Array, Array, Array]:
         """Lengths (T,) of all tendons, moment arms (T, m) about the free coordinates, places (b, 3) of bodies."""
-        model, data, mechanism = self.model, self.data, self.paths.mechanism
+        model, data = self.model, self.data
         data.qpos[:] = model.qpos0
-        values = dict(zip(mechanism.coordinate_names, q.tolist(), strict=True))
-        for label, value in values.items():
-            if (joint := self.joints.get(label.strip("/").replace("/", "."))) is not None:
-                data.qpos[model.jnt_qposadr[joint]] = value
         rates = np.zeros((len(self.free), model.nv))
-        for row, name in zip(rates, self.free, strict=True):
-            if name in self.joints:
-                row[model.jnt_dofadr[self.joints[name]]] = 1.0
+        for place, joint in self.joints.items():
+            data.qpos[model.jnt_qposadr[joint]] = q[place]
+            if place in self.free:
+                rates[self.free.index(place), model.jnt_dofadr[joint]] = 1.0
         # A joint that follows one that follows another is right after as many rounds.
         for _ in range(FOLLOWED):
             for joint, leader, polynomial in self.followers:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from osimlite.multibody import body_constraints as b
-from osimlite.multibody.mechanism import FramePlacement, StationPlacement
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf.draft import SPECK, Draft, add
+from osimlite.translate.mjcf.frame_forces import straight
 
 
 def add_constraints(draft: Draft) -> None:
@@ -25,20 +26,17 @@ def add_constraints(draft: Draft) -> None:
                 draft.fidelity.translated[constraint.name] = make(draft, constraint)
 
 
-def _weld(draft: Draft, item: b.WeldConstraint) -> str:
-    return _equality(draft, "weld", item.name, item.first, item.second)
-
-
-def _connect(draft: Draft, item: b.PointConstraint) -> str:
-    return _equality(draft, "connect", item.name, item.first, item.second)
+def _sites(kind: str, draft: Draft, item: b.WeldConstraint | b.PointConstraint) -> str:
+    """Two sites that an equality of a kind keeps together."""
+    name = draft.name("equality", item.name)
+    sites = [draft.site(item.name, *end) for end in (item.first, item.second)]
+    add(draft.section("equality"), kind, name=name, site1=sites[0], site2=sites[1])
+    return f"equality {name}"
 
 
 def _distance(draft: Draft, item: b.DistanceConstraint) -> str:
     """A tendon of constant length; MuJoCo counts from its length where all joints stand at zero."""
-    name = draft.name("tendon", item.name)
-    tendon = add(draft.section("tendon"), "spatial", name=name)
-    for end in (item.first, item.second):
-        add(tendon, "site", site=draft.site(item.name, *end))
+    name = straight(draft, item.name, [draft.site(item.name, *end) for end in (item.first, item.second)])
     length = float(np.linalg.norm(draft.at_zero(item.first) - draft.at_zero(item.second)))
     add(draft.section("equality"), "tendon", name=name, tendon1=name, polycoef=[item.distance - length, 0, 0, 0, 0])
     return f"equality {name}"
@@ -68,22 +66,9 @@ def _on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     return f"equality {equality}"
 
 
-def _equality(
-    draft: Draft,
-    kind: str,
-    path: str,
-    first: FramePlacement | StationPlacement,
-    second: FramePlacement | StationPlacement,
-) -> str:
-    name = draft.name("equality", path)
-    sites = [draft.site(path, *end) for end in (first, second)]
-    add(draft.section("equality"), kind, name=name, site1=sites[0], site2=sites[1])
-    return f"equality {name}"
-
-
 _MAKERS: Mapping[type, Callable[[Draft, Any], str]] = {
-    b.WeldConstraint: _weld,
-    b.PointConstraint: _connect,
+    b.WeldConstraint: partial(_sites, "weld"),
+    b.PointConstraint: partial(_sites, "connect"),
     b.DistanceConstraint: _distance,
     b.PointOnLineConstraint: _on_line,
 }

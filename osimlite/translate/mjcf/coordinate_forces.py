@@ -9,10 +9,12 @@ import math
 
 import numpy as np
 
-from osimlite.forces.coordinate_limit import limit_constants, limit_force
+from osimlite.forces.coordinate_limit import limit_force
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.springs import SpringGeneralizedForce
+from osimlite.simulation.elements.kinds.coordinate_limit_force import constants
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Lead, Unsayable, Value, add
 
@@ -23,20 +25,16 @@ FAR = 1e6
 def actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics: Value) -> str:
     """A force on the joint in proportion to the control."""
     lead, _ = _lead(draft, force)
-    name = draft.name("actuator", path)
-    ends = force.min_control, force.max_control
+    return scaled(draft, force, path, joint=lead.joint, gear=force.optimal_force / lead.line.slope, **dynamics)
+
+
+def scaled(draft: Draft, force: CoordinateActuator | PathActuator, path: str, **on: Value) -> str:
+    """An actuator whose force is its control times its gear."""
+    name, ends = draft.name("actuator", path), (force.min_control, force.max_control)
     finite = all(map(math.isfinite, ends)) and ends[0] < ends[1]
-    add(
-        draft.section("actuator"),
-        "general",
-        name=name,
-        joint=lead.joint,
-        gear=force.optimal_force / lead.line.slope,
-        # Only tools keep to these limits in OpenSim.
-        ctrllimited=False if finite else None,
-        ctrlrange=ends if finite else None,
-        **dynamics,
-    )
+    # Only tools keep to these limits in OpenSim.
+    limits: dict[str, Value] = {"ctrllimited": False, "ctrlrange": ends} if finite else {}
+    add(draft.section("actuator"), "general", name=name, **on, **limits)
     return f"actuator {name}"
 
 
@@ -58,15 +56,7 @@ def limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
     """A spring beyond each limit: a tendon that is slack up to it."""
     lead, place = _lead(draft, force)
     info = draft.mechanism.coordinates[place]
-    Ku, qu, Kl, ql, D, t = limit_constants(
-        force.upper_stiffness,
-        force.upper_limit,
-        force.lower_stiffness,
-        force.lower_limit,
-        force.damping,
-        force.transition,
-        info.motion_type == "rotational",
-    )
+    Ku, qu, Kl, ql, D, t = constants(force, info)
     if ql > qu:
         raise Unsayable("its lower limit lies above its upper one")
     if Ku == Kl:

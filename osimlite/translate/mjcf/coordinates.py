@@ -8,10 +8,8 @@ import numpy as np
 
 from osimlite.multibody.functions import Linear
 from osimlite.robot.drivers import Composed
-from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, ScapulothoracicJoint
 from osimlite.translate.mjcf.draft import Draft, Follower
-
-_ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
+from osimlite.translate.survey import ANGULAR_SPEEDS
 
 
 def add_coordinates(draft: Draft) -> None:
@@ -33,19 +31,18 @@ def add_coordinates(draft: Draft) -> None:
             note("clamped", info.path, "that a user interface must not leave the range", "left out")
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
-            draft.follow(lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,)))
-            if draft.options.driver:
-                draft.functions[lead.joint] = Composed(Linear(*lead.line), info.prescribed)
-                continue
-            note(
-                "prescribed",
-                info.path,
-                "a coordinate that follows a function of time",
-                "held at its value at time 0; write the function into eq_data at every step",
-                f"equality {lead.joint}",
-            )
+            exact = Composed(Linear(*lead.line), info.prescribed) if draft.options.driver else None
+            draft.follow(lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact))
+            if exact is None:
+                note(
+                    "prescribed",
+                    info.path,
+                    "a coordinate that follows a function of time",
+                    "held at its value at time 0; write the function into eq_data at every step",
+                    f"equality {lead.joint}",
+                )
     for joint in draft.tree.components:
-        if isinstance(joint, _ANGULAR_SPEEDS):
+        if isinstance(joint, ANGULAR_SPEEDS):
             note(
                 "speeds",
                 draft.tree.path_of(joint) or "",

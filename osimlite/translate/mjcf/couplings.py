@@ -11,8 +11,9 @@ from osimlite.multibody.functions import IDENTITY, Linear
 from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.robot.drivers import Composed, Driver, coordinate_drivers, joint_driver
-from osimlite.robot.lines import Line, as_line
-from osimlite.robot.mimics import couplers
+from osimlite.robot.lines import Line
+from osimlite.robot.mimics import couplers, leaders
+from osimlite.robot.names import dotted
 from osimlite.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS
@@ -23,16 +24,17 @@ from osimlite.translate.mjcf.polynomials import Fit, quartic, sampled, span
 
 PULLED = 0.1
 """Inertia (kg, kg·m²) of helpers: muscles may pull at them, and the equalities that hold them are soft."""
+SHARE = 0.01
+"""Inertia of a joint that is nothing but an argument, as a part of that of all it moves.
+
+The less, the nearer is the motion to the model's, but the softer are the equalities that follow the joint.
+"""
 
 
 def add_couplings(draft: Draft) -> None:
     """Add an equality for every joint whose value a function of a coordinate or a coupler decides."""
     robot = draft.robot
-    for joint in robot.moving:
-        line = as_line(joint.function)
-        if len(joint.coordinates) == 1 and line is not None and line.slope:
-            draft.leads.setdefault(joint.coordinates[0], Lead(joint.name, line))
-    draft.leads |= {place: Lead(joint.name, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
+    draft.leads |= {place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()}
     if not draft.options.driver:
         add_ellipsoids(draft)
     drivers = coordinate_drivers(robot)
@@ -76,9 +78,8 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
         follower, done = Follower(led.joint, along(led.line, outer)), "a quartic of a quartic, fitted"
         x = np.linspace(low, high, 400)
         fit = Fit((), Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sampled(function, x), unit))
-    draft.follow(joint.name, follower)
     if fit.error is not None and draft.options.driver:
-        draft.functions[joint.name] = exact
+        follower = follower._replace(function=exact)
     elif fit.error is not None:
         draft.fidelity.add(
             "function",
@@ -88,22 +89,38 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
             f"joint {joint.name} over {info.name} from {low:g} to {high:g}",
             {"value": fit.error},
         )
+    draft.follow(joint.name, follower)
 
 
 def _argument(draft: Draft, place: int) -> Lead:
     """A joint for a coordinate that is nothing but the argument of functions: it turns a speck about its own middle."""
     info = draft.mechanism.coordinates[place]
-    name = draft.mechanism.coordinate_names[place].strip("/").replace("/", ".")
-    add(draft.speck(name, draft.bodies[GROUND], np.eye(4)), "joint", name=name, type="hinge", axis="0 0 1")
+    name = dotted(draft.mechanism.coordinate_names[place])
+    # The driver moves joints exactly, whatever equalities make of them.
+    inertia = SPECK * SPECK if draft.options.driver else max(SHARE * _inertia(draft, place), SPECK * SPECK)
+    speck = draft.speck(name, draft.bodies[GROUND], np.eye(4), inertia)
+    add(speck, "joint", name=name, type="hinge", axis="0 0 1")
     draft.fidelity.add(
         "argument",
         info.path,
         "a coordinate that no axis moves by, but only functions of it",
-        f"a joint of its own, which turns a mass of {SPECK:g} kg",
-        f"joint {name}",
+        "a joint of its own, which turns a small body",
+        f"joint {name}, {inertia:.3g} kg m^2",
     )
     draft.leads[place] = Lead(name, Line(1.0, 0.0))
     return draft.leads[place]
+
+
+def _inertia(draft: Draft, place: int) -> float:
+    """Of all that a coordinate moves in the default pose, by itself and by couplers (kg·m²)."""
+    q = draft.default_state[0]
+    rates = np.zeros(len(q))
+    rates[place] = 1.0
+    for other, driver in coordinate_drivers(draft.robot).items():
+        if driver.coordinate == place:
+            rates[other] = driver.function.evaluate(q[[place]])[1][0]
+    speeds = draft.mechanism.speeds_from_rates(q, rates)
+    return float(speeds @ draft.mechanism.mass_matrix(q) @ speeds)
 
 
 def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
@@ -127,7 +144,6 @@ def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
         name = draft.name("joint", f"{info.name}_helper")
         draft.helpers.add(name)
         speck = add(draft.bodies[GROUND], "body", name=draft.name("body", name))
-        # Of such a body MuJoCo weighs equalities by its own inertia, whatever the armature.
         add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, PULLED))
         add(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
         draft.follow(name, follower)
@@ -143,12 +159,12 @@ def along(line: Line, polynomial: Array) -> tuple[float, ...]:
 def _hold(draft: Draft, joint: RobotJoint) -> None:
     """Hold a joint that is a function of several coordinates where the default pose has it, but for the driver."""
     value = joint.value(draft.default_state[0])
-    draft.follow(joint.name, Follower(None, (value,)))
-    leads = [draft.leads.get(place) for place in joint.coordinates]
-    if draft.options.driver and all(lead is not None and lead.line == (1.0, 0.0) for lead in leads):
-        draft.functions[joint.name] = joint.function
-        draft.arguments[joint.name] = tuple(lead.joint for lead in leads if lead is not None)
+    leads = [lead for place in joint.coordinates if (lead := draft.leads.get(place)) and lead.line == (1.0, 0.0)]
+    if draft.options.driver and len(leads) == len(joint.coordinates):
+        names = tuple(lead.joint for lead in leads)
+        draft.follow(joint.name, Follower(None, (value,), joint.function, names))
         return
+    draft.follow(joint.name, Follower(None, (value,)))
     places, random = list(joint.coordinates), np.random.default_rng(0)
     low, high = np.array([draft.mechanism.coordinates[place].range for place in places]).T
     off = [joint.function.evaluate(random.uniform(low, high))[0] - value for _ in range(500)]

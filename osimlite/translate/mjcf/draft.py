@@ -17,6 +17,7 @@ from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, Stat
 from osimlite.multibody.spatial import Array, quaternion
 from osimlite.robot.lines import Line
 from osimlite.robot.mesh_files import MeshFiles
+from osimlite.robot.names import dotted
 from osimlite.robot.robot import Link, Robot
 from osimlite.robot.urdf import number, numbers
 from osimlite.schema.base import Component
@@ -71,10 +72,16 @@ class Lead(NamedTuple):
 
 
 class Follower(NamedTuple):
-    """How a joint follows another: its value is the polynomial, constant first, of the leader's, or constant."""
+    """How a joint follows another: its value is the polynomial, constant first, of the leader's, or constant.
+
+    Where that is fitted, or held, the driver has the `function` that it exactly is: of the leader, of several joints
+    (`arguments`), or of time.
+    """
 
     leader: str | None
     polynomial: tuple[float, ...]
+    function: Function | None = None
+    arguments: tuple[str, ...] = ()
 
 
 class Tied(NamedTuple):
@@ -109,8 +116,6 @@ class Draft:
         leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
         followers: what equality constraints make of joints, by name.
         helpers: those of them that move nothing, but are what others follow.
-        functions: that a joint exactly is of the joint that it follows, by name, where the polynomial is fitted.
-        arguments: the joints that a function of several is of, by the name of the joint that it puts somewhere.
         starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
         tendons: of paths, by the absolute path of their owners.
         activations: at the start, of the actuators that have one, by name.
@@ -131,8 +136,6 @@ class Draft:
     tendons: dict[str, Tied] = field(default_factory=dict)
     activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)
-    functions: dict[str, Function] = field(default_factory=dict)
-    arguments: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _names: dict[str, set[str]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 
@@ -184,12 +187,12 @@ class Draft:
             path: absolute path of the component, or any name.
         """
         taken = self._names.setdefault(kind, set())
-        dotted = path.strip("/").replace("/", ".")
-        candidates = [path.rsplit("/", 1)[-1] or dotted, dotted]
+        whole = dotted(path)
+        candidates = [path.rsplit("/", 1)[-1] or whole, whole]
         count = 1
         while (name := candidates.pop(0)) in taken:
             count += 1
-            candidates.append(f"{dotted}_{count}")
+            candidates.append(f"{whole}_{count}")
         taken.add(name)
         return name
 
@@ -224,6 +227,16 @@ class Draft:
         add(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
 
+    def tied(self, path: str) -> Tied:
+        """The tendon of the path of a force.
+
+        Raises:
+            Unsayable: it became none.
+        """
+        if path not in self.tendons:
+            raise Unsayable("its path is no tendon")
+        return self.tendons[path]
+
     def follow(self, joint: str, follower: Follower) -> None:
         """Let a joint follow another, or keep it at a value."""
         self.followers[joint] = follower
@@ -232,10 +245,10 @@ class Draft:
         name = self.name("equality", joint)
         add(self.section("equality"), "joint", name=name, joint1=joint, joint2=follower.leader, polycoef=coefficients)
 
-    def speck(self, name: str, element: _Element, frame: Array) -> _Element:
-        """Add a small body, which nothing weighs down, at a frame (4, 4) in an element."""
+    def speck(self, name: str, element: _Element, frame: Array, inertia: float = SPECK * SPECK) -> _Element:
+        """Add a small body, which nothing weighs down, at a frame (4, 4) in an element; `inertia` is in kg·m²."""
         speck = add(element, "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame))
-        add(speck, "inertial", pos=np.zeros(3), mass=SPECK, diaginertia=np.full(3, SPECK * SPECK))
+        add(speck, "inertial", pos=np.zeros(3), mass=SPECK, diaginertia=np.full(3, inertia))
         return speck
 
     def at_zero(self, station: StationPlacement) -> Array:

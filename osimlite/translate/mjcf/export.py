@@ -14,7 +14,6 @@ from osimlite.document.printer import to_text
 from osimlite.errors import SettingError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
-from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Values
 from osimlite.robot.build import build_robot
 from osimlite.robot.mesh_files import MeshFiles
@@ -57,8 +56,6 @@ class Mjcf:
         robot: the neutral robot that was written; its joints and links have MuJoCo's names.
         files: mesh files that the text names, and what the driver needs, by name relative to it.
         followers: what equality constraints make of joints, by name.
-        functions: what the driver makes of them, by name: functions of the joint that is followed, or of time.
-        arguments: the joints that such a function is of, where they are several.
         leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
     """
 
@@ -69,8 +66,6 @@ class Mjcf:
     files: dict[str, bytes] = field(default_factory=dict)
     leads: Mapping[int, Lead] = field(default_factory=dict)
     followers: Mapping[str, Follower] = field(default_factory=dict)
-    functions: Mapping[str, Function] = field(default_factory=dict)
-    arguments: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
@@ -167,8 +162,6 @@ def to_mjcf(
         mesh_files.files | ({f"{name}.osim": to_text(model).encode()} if driver else {}),
         draft.leads,
         draft.followers,
-        draft.functions,
-        draft.arguments,
     )
 
 

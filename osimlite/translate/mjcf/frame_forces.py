@@ -22,7 +22,7 @@ def point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
         _point(draft, force, path, "socket_body1", force.point1),
         _point(draft, force, path, "socket_body2", force.point2),
     ]
-    return straight(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)
+    return f"tendon {straight(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)}"
 
 
 def point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str) -> str:
@@ -30,9 +30,8 @@ def point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str
     if force.points_are_global:
         raise Unsayable("its points are given in ground, so that they wander through the bodies")
     ends = [_point(draft, force, path, "bodyA", force.pointA), _point(draft, force, path, "bodyB", force.pointB)]
-    tendon = straight(draft, path, ends).removeprefix("tendon ")
     name = draft.name("actuator", path)
-    add(draft.section("actuator"), "motor", name=name, tendon=tendon, gear=force.optimal_force)
+    add(draft.section("actuator"), "motor", name=name, tendon=straight(draft, path, ends), gear=force.optimal_force)
     return f"actuator {name}"
 
 
@@ -59,12 +58,12 @@ def point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
 
 
 def straight(draft: Draft, path: str, sites: list[str], **law: float) -> str:
-    """A tendon through sites."""
+    """A tendon through sites; its name."""
     name = draft.name("tendon", path)
     tendon = add(draft.section("tendon"), "spatial", name=name, **law)
     for site in sites:
         add(tendon, "site", site=site)
-    return f"tendon {name}"
+    return name
 
 
 def _push(draft: Draft, path: str, gear: Array, site: str, axes: str | None = None) -> str:

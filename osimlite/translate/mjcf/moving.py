@@ -17,6 +17,8 @@ from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array
 from osimlite.translate.mjcf.polynomials import DEGREE, as_polynomial, sampled
 
+REACH = 0.02
+"""How far (rad) a helper turns: little, so that its inertia hardly weighs on the coordinate that drives it."""
 SAMPLES = 80
 STARTS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3, 0.0))
 """Bends of the first quartic, as powers 2, 3 and 4 beside a slope of 1, from which the best is sought."""
@@ -25,7 +27,8 @@ STARTS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3, 0.0))
 def composition(functions: Sequence[Function], span: tuple[float, float]) -> tuple[Array, Array]:
     """The quartic (5,) of a coordinate, and the quartics (k, 5) of its value that are nearest to k functions on a span.
 
-    All are written from the constant on. Polynomials of up to degree 4 are written as they are.
+    All are written from the constant on, the first one within -REACH and REACH. Polynomials of up to degree 4 are
+    written as they are.
     """
     return _composition(tuple(functions), span)
 
@@ -56,8 +59,8 @@ def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> 
     best = min((search(lambda bends: 1e3 * second(bends)[1], start) for start in STARTS), key=lambda each: each.cost)
     rows, _ = second(best.x)
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
-    drive = first(best.x)(normal)
-    return _padded(drive), np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in rows.T])
+    slides = np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in rows.T])
+    return REACH * _padded(first(best.x)(normal)), slides / REACH ** np.arange(DEGREE + 1)
 
 
 def _padded(polynomial: Polynomial) -> Array:

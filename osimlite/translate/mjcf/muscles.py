@@ -124,9 +124,7 @@ class Curves(NamedTuple):
 
 def muscle(draft: Draft, force: Muscle, path: str) -> str:
     """A muscle on the tendon of its path."""
-    tied = draft.tendons.get(path)
-    if tied is None:
-        raise Unsayable("its path is no tendon")
+    tied = draft.tied(path)
     cos = math.cos(force.pennation_angle_at_optimal)
     own = Curves(force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos)
     if not (own.fiber > 0.0 and own.force > 0.0 and own.tendon >= 0.0):

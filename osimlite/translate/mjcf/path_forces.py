@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from lxml.etree import _Element
 
@@ -12,27 +10,16 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, Tied, Unsayable, add, text
+from osimlite.translate.mjcf.coordinate_forces import scaled
+from osimlite.translate.mjcf.draft import Draft, Tied, Unsayable, text
 from osimlite.translate.mjcf.isometric import isometric_tension
 
 
 def actuator(draft: Draft, force: PathActuator, path: str) -> str:
     """A tension in proportion to the control."""
-    tied, _ = _tendon(draft, path)
-    name, ends = draft.name("actuator", path), (force.min_control, force.max_control)
-    finite = all(map(math.isfinite, ends)) and ends[0] < ends[1]
-    add(
-        draft.section("actuator"),
-        "general",
-        name=name,
-        tendon=tied.name,
-        gear=-force.optimal_force,
-        # Only tools keep to these limits in OpenSim.
-        ctrllimited=False if finite else None,
-        ctrlrange=ends if finite else None,
-    )
-    draft.account(path, f"actuator {name}")
-    return f"actuator {name}"
+    made = scaled(draft, force, path, tendon=draft.tied(path).name, gear=-force.optimal_force)
+    draft.account(path, made)
+    return made
 
 
 def spring(draft: Draft, force: PathSpring, path: str) -> str:
@@ -78,7 +65,5 @@ def _line(lengths: Array, tension: Array) -> tuple[float, float]:
 
 def _tendon(draft: Draft, path: str) -> tuple[Tied, _Element]:
     """The tendon of the path of a force, and its element."""
-    tied = draft.tendons.get(path)
-    if tied is None:
-        raise Unsayable("its path is no tendon")
+    tied = draft.tied(path)
     return tied, next(item for item in draft.section("tendon") if item.get("name") == tied.name)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.schema.forces import Force
 from osimlite.schema.paths import AbstractGeometryPath
@@ -20,14 +21,12 @@ from osimlite.translate.mjcf.bodies import LEAST_MASS
 from osimlite.translate.mjcf.couplings import PULLED, along, helper
 from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
 from osimlite.translate.mjcf.fits import fitted
-from osimlite.translate.mjcf.poses import Poses, Truth, random_poses
+from osimlite.translate.mjcf.poses import EXACT, Poses, Truth, arm_errors, random_poses
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
 
 CHOSEN, FITTED, TRIED, HELD_OUT = 100, 250, 500, 100
 """How many random poses a tendon is chosen by, or fitted to and tried in once more, and measured in."""
-EXACT = 1e-9
-"""Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
 WRAPS = 4
 """Group of the geoms that tendons go around, and of their sites."""
 
@@ -77,13 +76,10 @@ def add_paths(draft: Draft) -> None:
 def _errors(draft: Draft, tendon: Tendon, poses: Poses, truth: Truth) -> dict[str, Error]:
     """How far lengths and moment arms are off in poses that the tendon was not chosen by."""
     lengths, arms = measured(tendon, poses, draft.options.version)
-    errors = {"length": Error.of(lengths - truth.lengths, "m")}
-    for place, off, wanted in zip(poses.moving, (arms - truth.arms).T, truth.arms.T, strict=True):
-        info = draft.mechanism.coordinates[place]
-        if np.abs(off).max() > EXACT or np.abs(wanted).max() > EXACT:
-            unit = "m" if info.motion_type == "rotational" else "1"
-            errors[f"moment arm about {draft.mechanism.coordinate_names[place]}"] = Error.of(off, unit)
-    return errors
+    about = arm_errors(draft.mechanism, arms, truth)
+    names = draft.mechanism.coordinate_names
+    named = {f"moment arm about {names[place]}": error for place, error in about.items()}
+    return {"length": Error.of(lengths - truth.lengths, "m"), **named}
 
 
 def _what(route: ThroughPoints, router: Router) -> str:
@@ -142,8 +138,11 @@ class _Writer:
             return self.draft.site(path, spot.body, spot.place + np.array(moved), group=WRAPS)
         joint, line = led
         name = self.draft.name("body", path)
-        carrier = add(self.draft.bodies[spot.body], "body", name=name, pos=tidy(spot.place + spot.slides[:, 0]))
-        add(carrier, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
+        where = tidy(spot.place + spot.slides[:, 0])
+        carrier = add(self.draft.bodies[spot.body], "body", name=name, pos=where, gravcomp=1)
+        # Equalities of what slides along the axes of ground MuJoCo weighs by its mass, without the armature.
+        mass = PULLED if spot.body == GROUND else LEAST_MASS
+        add(carrier, "inertial", pos=np.zeros(3), mass=mass, diaginertia=np.full(3, mass))
         for axis, polynomial in _straight(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
             slide = self.draft.name("joint", f"{name}_{len(carrier)}")
             add(carrier, "joint", name=slide, type="slide", axis=axis, armature=PULLED)

@@ -12,8 +12,12 @@ from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
+from osimlite.translate.fidelity import Error
 
 Places = NDArray[np.int64]
+
+EXACT = 1e-9
+"""Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +79,16 @@ class Truth:
     lengths: Array
     arms: Array
     nodes: Sequence[Sequence[tuple[int, Array]]]
+
+
+def arm_errors(mechanism: Mechanism, arms: Array, truth: Truth) -> dict[int, Error]:
+    """How far moment arms (P, m) are off, by the place of the coordinate, where a path or its stand-in has one."""
+    found = {}
+    for place, off, wanted in zip(free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True):
+        if np.abs(off).max() > EXACT or np.abs(wanted).max() > EXACT:
+            rotational = mechanism.coordinates[place].motion_type == "rotational"
+            found[place] = Error.of(off, "m" if rotational else "1")
+    return found
 
 
 def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:

@@ -20,6 +20,7 @@ from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth
 from osimlite.translate.mjcf.surfaces import stand_ins, z_to
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
+from osimlite.translate.mjcf.wrapping import unit
 
 DIRECTIONS = 12
 """So many directions around a surface are tried as sides."""
@@ -177,7 +178,7 @@ class Router:
         if sign:
             yield around.sided(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
-        yield around.sided(_unit(middles).mean(0))
+        yield around.sided(unit(middles).mean(0))
         for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
             yield around.sided(np.array((np.cos(turn), np.sin(turn), 0.0)))
         if directions and around.kind == "sphere":
@@ -239,10 +240,10 @@ class Router:
         if not ways or any(point.body != body for point in points):
             return
         poses, before, after = (np.array(column) for column in zip(*ways, strict=True))
-        turning = np.cross(_unit(before), _unit(after))
+        turning = np.cross(unit(before), unit(after))
         normal, into = (
             np.einsum("pji,pj->pi", self.poses.rotations[body][poses], way).mean(0)
-            for way in (turning, _unit(after) - _unit(before))
+            for way in (turning, unit(after) - unit(before))
         )
         if not normal.any() or not into.any():
             return
@@ -273,11 +274,6 @@ def spot(point: Node) -> Spot:
 
 def _choose_of(options: Sequence[Tendon], choose: Choose) -> Tendon:
     return choose(options)
-
-
-def _unit(vectors: Array) -> Array:
-    found: Array = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
-    return found
 
 
 def _is_tendon(tendon: Tendon) -> bool:

@@ -13,7 +13,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.multibody.spatial import Array
 from osimlite.translate.mjcf.poses import Poses
-from osimlite.translate.mjcf.wrapping import bend
+from osimlite.translate.mjcf.wrapping import bend, norm, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +99,12 @@ def measured(tendon: Tendon, poses: Poses, version: int) -> tuple[Array, Array]:
             found = bend(around.kind, around.radius, first_end, second_end, side[0] if side else None, version)
             leaves, returns = (middle + np.einsum("pij,pj->pi", rotation, at) for at in (found.first, found.second))
             way, back = leaves - one, returns - two
-            lengths += np.where(found.touches, found.length + _norm(back), 0.0)
+            lengths += np.where(found.touches, found.length + norm(back), 0.0)
             touched = found.touches[:, None]
-            arms -= _worked(around.body, leaves, np.where(touched, _unit(way), 0.0), poses)
-            arms -= _worked(around.body, returns, np.where(touched, _unit(back), 0.0), poses)
-        lengths += _norm(way)
-        for spot, place, pull in ((first, one, _unit(way)), (second, two, _unit(back))):
+            arms -= _worked(around.body, leaves, np.where(touched, unit(way), 0.0), poses)
+            arms -= _worked(around.body, returns, np.where(touched, unit(back), 0.0), poses)
+        lengths += norm(way)
+        for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
             arms += _worked(spot.body, place, pull, poses)
             if spot.slides is not None:
                 arms += _slid(spot, pull, poses)
@@ -148,14 +148,4 @@ def _slid(spot: Spot, force: Array, poses: Poses) -> Array:
     rates = polyval(helper, polyder(spot.slides.T)) * rate
     along = np.einsum("pi,pij,jp->p", force, poses.rotations[spot.body], rates)
     found: Array = along[:, None] * poses.rates[:, spot.coordinate]
-    return found
-
-
-def _norm(a: Array) -> Array:
-    found: Array = np.sqrt(np.einsum("pi,pi->p", a, a))
-    return found
-
-
-def _unit(a: Array) -> Array:
-    found: Array = a / np.maximum(_norm(a), 1e-300)[:, None]
     return found

@@ -66,7 +66,7 @@ def bend(kind: str, radius: float, first: Array, second: Array, side: Array | No
     winding = _winding(p, q, toward, radius, version)
     reach_p, reach_q = _reach(p, radius), _reach(q, radius)
     arc = radius * (np.abs(winding) - reach_p - reach_q)
-    outside = (_norm(p) >= radius) & (_norm(q) >= radius)
+    outside = (norm(p) >= radius) & (norm(q) >= radius)
     touches = outside & (arc > 0.0)
     sign = np.where(winding < 0.0, -1.0, 1.0)
     at_p, at_q = _turned(p, sign * reach_p, radius), _turned(q, -sign * reach_q, radius)
@@ -77,7 +77,7 @@ def bend(kind: str, radius: float, first: Array, second: Array, side: Array | No
         at_p, at_q = (np.where(inside[:, None], at, point) for point in (at_p, at_q))
     one, two = (np.einsum("pij,pi->pj", across, flat_point) for flat_point in (at_p, at_q))
     if flat is not None:
-        lines = np.stack((_norm(at_p - p), arc, _norm(at_q - q)))
+        lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
         rise = second[:, 2] - first[:, 2]
         share = rise / np.maximum(lines.sum(0), TINY)
         one[:, 2] = first[:, 2] + share * lines[0]
@@ -97,13 +97,13 @@ def _winding(p: Array, q: Array, side: Array | None, radius: float, version: int
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
     nearest = p + part[:, None] * way
-    straight = (_norm(nearest) > radius) & (_dot(side, nearest) >= 0.0)
+    straight = (norm(nearest) > radius) & (_dot(side, nearest) >= 0.0)
     reach_p, reach_q = _reach(p, radius), _reach(q, radius)
     best, winding = np.full(len(p), -np.inf), np.zeros(len(p))
     for sign in (1.0, -1.0):
         one, two = _turned(p, sign * reach_p, radius), _turned(q, -sign * reach_q, radius)
         middle = one + two
-        good = _dot(middle, side) / np.maximum(_norm(middle) * _norm(side), TINY)
+        good = _dot(middle, side) / np.maximum(norm(middle) * norm(side), TINY)
         good = np.where(_cut(p, one, q, two), -np.inf, good)
         # Of ends one behind the other, one line passes the other by, and MuJoCo 3 goes all the way around.
         turn = np.mod(sign * between - reach_p - reach_q, 2.0 * np.pi) + reach_p + reach_q
@@ -118,14 +118,14 @@ def _through(p: Array, q: Array, radius: float) -> tuple[Mask, Array]:
     """
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
-    passes = _norm(p + part[:, None] * way) > radius
+    passes = norm(p + part[:, None] * way) > radius
     between = _angle(p, q)
     # At the share t of the angle from p to q the slope of the length changes its sign once.
     low, high = np.zeros(len(p)), np.ones(len(p))
     for _ in range(50):
         middle = 0.5 * (low + high)
         at = _turned(p, middle * between, radius)
-        slope = sum(_cross(at, at - end) / np.maximum(_norm(at - end), TINY) for end in (p, q)) * np.sign(between)
+        slope = sum(_cross(at, at - end) / np.maximum(norm(at - end), TINY) for end in (p, q)) * np.sign(between)
         low, high = np.where(slope < 0.0, middle, low), np.where(slope < 0.0, high, middle)
     return passes, _turned(p, 0.5 * (low + high) * between, radius)
 
@@ -142,13 +142,13 @@ def _cut(p: Array, one: Array, q: Array, two: Array) -> Mask:
 
 def _plane(first: Array, second: Array) -> Array:
     """Two unit vectors (P, 2, 3) in the plane of both ends and the middle of a sphere, one toward the first end."""
-    along = first / np.maximum(_norm(first), TINY)[:, None]
+    along = first / np.maximum(norm(first), TINY)[:, None]
     normal = np.cross(first, second)
-    size = _norm(normal)
+    size = norm(normal)
     # Ends in line with the middle share no plane of their own.
     other = np.where(np.abs(along) < np.abs(along).max(1, keepdims=True), 1.0, 0.0)
     normal = np.where((size > TINY)[:, None], normal, np.cross(along, other))
-    normal /= np.maximum(_norm(normal), TINY)[:, None]
+    normal /= np.maximum(norm(normal), TINY)[:, None]
     return np.stack((along, np.cross(normal, along)), axis=1)
 
 
@@ -162,8 +162,15 @@ def _dot(a: Array, b: Array) -> Array:
     return found
 
 
-def _norm(a: Array) -> Array:
+def norm(a: Array) -> Array:
+    """Lengths (P,) of vectors (P, 3)."""
     found: Array = np.sqrt(_dot(a, a))
+    return found
+
+
+def unit(a: Array) -> Array:
+    """Vectors (P, 3) of length 1; zero where they are."""
+    found: Array = a / np.maximum(norm(a), np.finfo(float).tiny)[:, None]
     return found
 
 
@@ -178,7 +185,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _reach(p: Array, radius: float) -> Array:
     """The angle between a point and where a line from it touches the circle, as seen from the middle (P,)."""
-    return np.arccos(np.clip(radius / np.maximum(_norm(p), TINY), 0.0, 1.0))
+    return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
 
 
 def _turned(p: Array, angle: Array, radius: float) -> Array:

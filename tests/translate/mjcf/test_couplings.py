@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+import osimlite
 from osimlite import (
     Body,
     Constant,
@@ -19,6 +20,7 @@ from osimlite import (
     PolynomialFunction,
     SimmSpline,
     Sine,
+    SpringGeneralizedForce,
     TransformAxis,
 )
 from osimlite.translate import to_mjcf
@@ -108,6 +110,23 @@ def test_a_quartic_of_a_quartic_is_closer():
     compiled = Compiled(twice)
     differences = [off(compiled, np.array((q,)))["q_tx"] for q in np.linspace(-1.0, 2.0, 301)]
     assert np.abs(differences).max() == pytest.approx(record.errors["value"].max, rel=0.02)
+
+
+@pytest.mark.parametrize("turns", [True, False], ids=["besides a hinge", "alone"])
+def test_motions_are_nearly_those_of_the_model(turns):
+    model = on_a_function(FITTED["sine"])
+    axes = model["/jointset/j"].spatial_transform
+    axes.translation3 = TransformAxis(coordinates=("q",), axis=(0, 0, 1), function=Sine(amplitude=0.2, omega=1.0))
+    if not turns:
+        axes.rotation3.function = Constant(value=0.0)
+    model.add(SpringGeneralizedForce(name="s", coordinate="q", stiffness=20.0, rest_length=0.8))
+    compiled = Compiled(to_mjcf(model))
+    mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
+    for _ in range(100):
+        mujoco.mj_step(compiled.model, compiled.data)
+    ((wanted,),) = osimlite.simulate(model, to=0.1, accuracy=1e-9).values[-1:]
+    assert compiled.data.joint("q").qpos[0] - 0.3 == pytest.approx(wanted - 0.3, rel=0.025)
+    assert np.abs(compiled.data.efc_pos).max() < 2e-4
 
 
 def test_a_range_that_nobody_meant_is_that_of_the_knots():

@@ -6,13 +6,17 @@ import math
 
 import mujoco
 import numpy as np
+import pytest
 
 import osimlite
+from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body
-from osimlite.schema.joints import SliderJoint
+from osimlite.schema.functions import Sine
+from osimlite.schema.joints import PinJoint, SliderJoint
 from osimlite.schema.model import Model
 from osimlite.schema.path_actuators import PathActuator
-from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint, PathWrap
+from osimlite.schema.path_forces import PathSpring
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.poses import random_values
@@ -67,6 +71,32 @@ def test_a_locked_coordinate_moves_no_point(corpus):
     _, found = errors(model)
     assert np.abs(found["vasti_r"]).max() < 3e-4
     assert np.abs(found["soleus_r"]).max() < 1e-9
+
+
+@pytest.mark.parametrize("carrier", ["/ground", "/bodyset/arm"])
+def test_a_point_that_moves_stays_where_it_must_under_load(carrier):
+    model = Model(name="sliding")
+    body = model.add(Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(PinJoint(name="pin", coordinates=[Coordinate(name="q", range=(-1.0, 1.0))]).between(model.ground, body))
+    path = GeometryPath(name="path")
+    guided = MovingPathPoint(name="a", socket_parent_frame=carrier)
+    for axis, size in zip("xyz", (0.1, 0.2, 0.05), strict=True):
+        setattr(guided, f"socket_{axis}_coordinate", "/jointset/pin/q")
+        setattr(guided, f"{axis}_location", Sine(amplitude=size, omega=1.5, phase=10.0 * size))
+    other = PathPoint(name="b", socket_parent_frame="/bodyset/arm", location=(0.3, 0.4, 0.0))
+    if carrier != "/ground":
+        other.socket_parent_frame = "/ground"
+    path.path_point_set.objects += [guided, other]
+    model.add(PathSpring(name="cord", geometry_path=path, resting_length=0.1, stiffness=500.0, dissipation=0.0))
+    compiled = Compiled(to_mjcf(model, visuals=False))
+    mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
+    for _ in range(100):
+        mujoco.mj_step(compiled.model, compiled.data)
+    mujoco.mj_forward(compiled.model, compiled.data)
+    q = compiled.data.joint("q").qpos[0]
+    assert q == pytest.approx(osimlite.simulate(model, to=0.1, accuracy=1e-9).values[-1, 0], rel=0.01)
+    length = osimlite.paths(model).lengths({"q": q})["/forceset/cord"]
+    assert compiled.data.tendon("cord").length[0] == pytest.approx(length, abs=1e-4)
 
 
 def test_odd_paths_come_to_an_end():

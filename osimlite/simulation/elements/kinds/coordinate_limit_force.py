@@ -1,6 +1,7 @@
 """Springs and dampers that act once a coordinate has left its limits."""
 
 from osimlite.forces.coordinate_limit import limit_constants, limit_dissipation, limit_energy, limit_force
+from osimlite.multibody.mechanism import CoordinateInfo
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE
@@ -18,8 +19,8 @@ def limit(
     return force, limit_dissipation(q, u, qu, ql, D, t), limit_energy(q, Ku, qu, Kl, ql, t)
 
 
-def _constants(builder: ElementBuilder, force: CoordinateLimitForce) -> tuple[float, ...]:
-    coordinate = builder.mechanism.coordinates[builder.coordinate(force)]
+def constants(force: CoordinateLimitForce, info: CoordinateInfo) -> tuple[float, float, float, float, float, float]:
+    """What the law is given besides the state, from the properties of the force and what its coordinate is."""
     return limit_constants(
         force.upper_stiffness,
         force.upper_limit,
@@ -27,8 +28,12 @@ def _constants(builder: ElementBuilder, force: CoordinateLimitForce) -> tuple[fl
         force.lower_limit,
         force.damping,
         force.transition,
-        coordinate.motion_type == "rotational",
+        info.motion_type == "rotational",
     )
+
+
+def _constants(builder: ElementBuilder, force: CoordinateLimitForce) -> tuple[float, ...]:
+    return constants(force, builder.mechanism.coordinates[builder.coordinate(force)])
 
 
 KIND = Kind(
