@@ -19,10 +19,21 @@ Vary = Annotated[
         "--vary",
         metavar="NAME=RANGE",
         help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
-        "coordinate, COORDINATE/speed, MUSCLE/control, path of a property, or parameter of the model function.",
+        "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor of it), or parameter of "
+        "the model function. MUSCLE/control@0:0.5:6 are six nodes of a control over time, @switch1 is a time at which "
+        "it is switched. Names may have * and ?, and be several with commas: they vary as one.",
         show_default=False,
     ),
 ]
+ReportInterval = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SECONDS",
+        help="Time between the states that a function or an expression looks at.",
+        show_default="0.01 for expressions",
+    ),
+]
+Interpolation = Annotated[str, typer.Option(help="Between nodes of a control: 'linear', 'steps' or 'cubic'.")]
 Below = Annotated[
     list[str] | None,
     typer.Option(
@@ -60,6 +71,7 @@ def make_plan(
     parameter: Sequence[str] | None,
     below: Sequence[str] | None,
     above: Sequence[str] | None,
+    controls: Sequence[str] | None = None,
     **choices: Any,
 ) -> Plan:
     """The plan that the options describe.
@@ -70,6 +82,7 @@ def make_plan(
     import warnings
 
     from osimlite.errors import SettingError, UnitWarning
+    from osimlite.simulation.given_controls import words_to_controls
     from osimlite.sweep.variables import parse
 
     ranges = parse(vary or [])
@@ -79,7 +92,7 @@ def make_plan(
     with warnings.catch_warnings():
         warnings.simplefilter("error", UnitWarning)
         try:
-            return _plan(source, ranges, parameter, **levels, **choices)
+            return _plan(source, ranges, parameter, controls=words_to_controls(controls or []), **levels, **choices)
         except UnitWarning as odd:
             raise SettingError(f"{odd} (if not, write rad after the number)") from None
 

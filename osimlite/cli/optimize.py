@@ -22,7 +22,7 @@ def optimize(
         typer.Option(
             metavar="NAME",
             help="What is wanted: distance, steps, progress, time_to_fall (the more, the better), largest_force, "
-            "scuffs, energy or module:function (the less, the better).",
+            "scuffs, energy, an expression such as 'max(center_of_mass_Y)', or module:function (the less, the better).",
             show_default=False,
         ),
     ],
@@ -59,6 +59,7 @@ def optimize(
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
     foot: options.Foot = None,
+    report_interval: sweeping.ReportInterval = None,
     parameter: options.Parameters = None,
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
@@ -67,6 +68,8 @@ def optimize(
     ] = Path("optimum"),
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted or finished search.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace what another search found.")] = False,
+    controls: options.Controls = None,
+    interpolation: sweeping.Interpolation = "linear",
     equilibrate: options.Equilibrate = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
@@ -79,9 +82,9 @@ def optimize(
     from osimlite.sweep.optimize import optimize as search
 
     plan = sweeping.make_plan(
-        source, vary, parameter, stop_below, stop_above, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, is_planted=planted, feet=tuple(foot) if foot else None, equilibrate=equilibrate,
-        skip_unsupported=skip_unsupported,
+        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to, engine=engine,
+        accuracy=accuracy, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
+        feet=tuple(foot) if foot else None, equilibrate=equilibrate, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
         found = search(

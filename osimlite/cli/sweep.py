@@ -36,7 +36,7 @@ def sweep(
             "--measure",
             metavar="NAME",
             help="What to keep of a run: distance, energy, largest_force, steps, scuffs, progress, time_to_fall, "
-            "COORDINATE/value, COORDINATE/speed, or module:function.",
+            "COORDINATE/value, COORDINATE/speed, an expression such as 'max(center_of_mass_Y)', or module:function.",
             show_default="distance and largest_force",
         ),
     ] = None,
@@ -47,12 +47,7 @@ def sweep(
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
     foot: options.Foot = None,
-    report_interval: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SECONDS", help="Time between the states that a function can look at.", show_default=False
-        ),
-    ] = None,
+    report_interval: sweeping.ReportInterval = None,
     parameter: options.Parameters = None,
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
@@ -61,6 +56,8 @@ def sweep(
     ] = Path("results.parquet"),
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted sweep.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace results that were made with other settings.")] = False,
+    controls: options.Controls = None,
+    interpolation: sweeping.Interpolation = "linear",
     equilibrate: options.Equilibrate = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
@@ -75,9 +72,9 @@ def sweep(
     from osimlite.sweep.sampling import samples as choose
 
     plan = sweeping.make_plan(
-        source, vary, parameter, stop_below, stop_above, measures=tuple(measure) if measure else None, to=to,
-        engine=engine, accuracy=accuracy, report_interval=report_interval, is_planted=planted,
-        feet=tuple(foot) if foot else None, equilibrate=equilibrate,
+        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None, to=to,
+        engine=engine, accuracy=accuracy, report_interval=report_interval, interpolation=interpolation,
+        is_planted=planted, feet=tuple(foot) if foot else None, equilibrate=equilibrate,
         skip_unsupported=skip_unsupported,
     )  # fmt: skip
     chosen = choose(plan.variables, sampler, samples, seed)

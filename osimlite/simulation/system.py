@@ -253,25 +253,66 @@ class System:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
         self.applied(t, y)
         kinetic, gravity = self._mechanical()
-        for (link, frame), body in zip(self.placements, self.mechanism.bodies, strict=True):
-            if link == GROUND:
-                center = frame[:3, :3] @ body.mass_properties.center + frame[:3, 3]
-                gravity -= body.mass_properties.mass * float(self.mechanism.gravity @ center)
-        return kinetic, float(gravity), float(sum(element.energy(records) for element, records in self._records()))
+        gravity -= sum(float(mass * self.mechanism.gravity @ center) for mass, center in self._masses_in_ground)
+        return kinetic, gravity, float(sum(element.energy(records) for element, records in self._records()))
 
     def _mechanical(self) -> tuple[float, float]:
         """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
-        w, links = self._links, len(self._links)
-        inertia = self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + 10 * links].reshape(links, 10)
-        rotations, velocity = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 6]
-        position, origin = (w[:, place : place + 3] for place in (layout.POSITION, layout.ORIGIN))
-        turning, arms = velocity[:, :3], position - origin + (rotations @ inertia[:, 1:4, None])[:, :, 0]
-        v = velocity[:, 3:] + np.cross(turning, arms)
+        w, inertia = self._links, self._inertia
+        centers, v = self._moving(w, inertia[:, 1:4])
+        rotations, turning = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 3]
         own = (turning[:, None, :] @ rotations)[:, 0]
         moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
         spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
         kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
-        return kinetic, -float(inertia[:, 0] @ (arms + origin) @ self.mechanism.gravity)
+        return kinetic, -float(inertia[:, 0] @ centers @ self.mechanism.gravity)
+
+    @property
+    def _inertia(self) -> Floats:
+        """Mass, mass centre and inertia of all links (l, 10)."""
+        links = len(self._links)
+        return self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + 10 * links].reshape(links, 10)
+
+    @cached_property
+    def _masses_in_ground(self) -> list[tuple[float, Floats]]:
+        """Masses and mass centres of the bodies that are fixed to ground."""
+        pairs = zip(self.placements, self.mechanism.bodies, strict=True)
+        fixed = [(frame, body.mass_properties) for (link, frame), body in pairs if link == GROUND]
+        return [(own.mass, frame[:3, :3] @ own.center + frame[:3, 3]) for frame, own in fixed]
+
+    @staticmethod
+    def _moving(links: Floats, points: Floats) -> tuple[Floats, Floats]:
+        """Places and velocities in ground (k, 3) of points (k, 3) of links, after an evaluation."""
+        velocity, origin = links[:, layout.VELOCITY :], links[:, layout.ORIGIN : layout.ORIGIN + 3]
+        arms = links[:, layout.POSITION : layout.POSITION + 3] - origin
+        arms = arms + (links[:, :9].reshape(-1, 3, 3) @ points[:, :, None])[:, :, 0]
+        return arms + origin, velocity[:, 3:6] + np.cross(velocity[:, :3], arms)
+
+    def _moved(self, t: float, y: Sequence[float]) -> None:
+        """Evaluate positions and velocities."""
+        status = self.realize(t, y, layout.VELOCITY_STAGE)
+        if status != layout.OK:
+            raise self.refusal(status, t, y)
+
+    def center_of_mass(self, t: float, y: Sequence[float]) -> Floats:
+        """Place (m) and velocity (m/s) in ground (6,) of the mass centre of all bodies at a state."""
+        self._moved(t, y)
+        masses, fixed = self._inertia[:, 0], self._masses_in_ground
+        total = masses @ np.hstack(self._moving(self._links, self._inertia[:, 1:4]))
+        total[:3] += sum((mass * center for mass, center in fixed), np.zeros(3))
+        found: Floats = total / (masses.sum() + sum(mass for mass, _ in fixed) or 1.0)
+        return found
+
+    def station(self, t: float, y: Sequence[float], body: int, location: Floats) -> Floats:
+        """Place (m) and velocity (m/s) in ground (6,) of a point of a body, -1 for ground, at a state."""
+        self._moved(t, y)
+        link, frame = self.placements[body] if body != GROUND else (GROUND, np.eye(4))
+        point = frame[:3, :3] @ location + frame[:3, 3]
+        return (
+            np.append(point, np.zeros(3))
+            if link == GROUND
+            else np.hstack(self._moving(self._links[[link]], point[None]))[0]
+        )
 
     def _records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
         """Each element with the records of its items, after an evaluation."""

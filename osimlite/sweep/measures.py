@@ -5,6 +5,8 @@ A measure of your own is a function of a :class:`Run` that returns a number, nam
 
     def drop(run):
         return run.start["Pelvis_ty"] - run.end["Pelvis_ty"]
+
+or an expression, as :mod:`osimlite.sweep.expressions` has them: ``start(Pelvis_ty) - end(Pelvis_ty)``.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 from osimlite._load import module_named, module_of_file
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.runs import Runs, Watch
+from osimlite.sweep.expressions import Expression
 from osimlite.sweep.variables import Floats
 from osimlite.text import did_you_mean, or_known
 
@@ -146,7 +149,7 @@ class Run:
 
 
 def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """The measure that is meant by a name, by ``NAME/value`` or ``NAME/speed`` at the end, or by a function.
+    """The measure that is meant by a name, ``NAME/value`` or ``NAME/speed`` at the end, an expression or a function.
 
     Args:
         spec: what is meant.
@@ -165,6 +168,8 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
         return maker(engine, feet)
     if ":" in name:
         return Measure(name, partial(_each, _function(name)), room=_room)
+    if is_expression(name):
+        return Measure(name, partial(_expressed, Expression(name, engine)))
     if "/" in name:
         try:
             place, locked = _state_place(engine, name)
@@ -172,6 +177,11 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
         return Measure(name, partial(_ends, place, locked))
     raise SettingError(f"there is no measure '{name}'{or_known(name, BUILT_IN, 'module:function')}")
+
+
+def is_expression(spec: Any) -> bool:
+    """Whether it is an expression, which looks at the states of a run."""
+    return isinstance(spec, str) and "(" in spec and ":" not in spec
 
 
 EVENTS_PER_SECOND = 100
@@ -220,6 +230,16 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 
 def _ends(place: int | None, locked: float, batch: Batch) -> Floats:
     return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
+
+
+def _expressed(expression: Expression, batch: Batch) -> list[float]:
+    found = []
+    runs, times = batch.runs, batch.report_times
+    for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):
+        kept = int(np.searchsorted(times, end))
+        moments = [*zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True), (end, state)]
+        found.append(expression.of(batch.engine_of(k), moments))
+    return found
 
 
 def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:

@@ -6,6 +6,7 @@ import pickle
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite
 from types import MappingProxyType
 from typing import Any
@@ -20,7 +21,8 @@ from osimlite.schema.model import Model
 from osimlite.simulation.engines import engine_name
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.start import in_units_of, suspect_value
-from osimlite.sweep.measures import measure_name
+from osimlite.sweep.controls import Control, check_nodes, controller_of
+from osimlite.sweep.measures import is_expression, measure_name
 from osimlite.sweep.variables import Parameter, Range, Variable, variables
 from osimlite.text import did_you_mean
 
@@ -29,6 +31,9 @@ Maker = Callable[[Mapping[str, float]], Model]
 
 MOST_TRIES = 1_000_000
 """Steps that a run may try: one that hardly moves on must not keep the others waiting."""
+
+REPORT_INTERVAL = 0.01
+"""Time between the states that an expression looks at, unless another is asked for, s."""
 
 DEFAULT_MEASURES = ("distance", "largest_force")
 
@@ -63,6 +68,7 @@ class Plan:
         feet: contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out.
         report_interval: time between the moments that a measure of one's own can look at (s), None for none.
         equilibrate: start muscles where fiber and tendon are in equilibrium.
+        interpolation: what is between the nodes of a control: "linear", "steps" or "cubic".
         skip_unsupported: leave out forces that cannot be computed.
         make: makes the model from parameters, where some of them are varied.
         folder: of the model's file, where the files are that it names.
@@ -79,6 +85,7 @@ class Plan:
     feet: tuple[str, ...] | None = None
     report_interval: float | None = None
     equilibrate: bool = False
+    interpolation: str = "linear"
     skip_unsupported: bool = False
     make: Maker | None = None
     folder: str | None = None
@@ -86,6 +93,11 @@ class Plan:
     def model(self) -> Model:
         """The model, with none of the variables set."""
         return read_text(self.text.encode())
+
+    @property
+    def interval(self) -> float | None:
+        """Time between the states that are kept, s: what was asked for, or else what an expression needs."""
+        return self.report_interval or (REPORT_INTERVAL if any(map(is_expression, self.measures)) else None)
 
     def packed(self) -> bytes:
         """The plan for other processes.
@@ -144,6 +156,7 @@ class Plan:
             "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
             **({"equilibrate": True} if self.equilibrate else {}),
+            **({"interpolation": self.interpolation} if self.interpolation != "linear" else {}),
             "skip_unsupported": self.skip_unsupported,
         }
 
@@ -155,6 +168,7 @@ def plan(
     parameters: Mapping[str, Any] = MappingProxyType({}),
     below: Mapping[str, float | str] = MappingProxyType({}),
     above: Mapping[str, float | str] = MappingProxyType({}),
+    controls: Mapping[str, Any] = MappingProxyType({}),
     **choices: Any,
 ) -> Plan:
     """Make a plan.
@@ -165,12 +179,16 @@ def plan(
         parameters: that `source` takes, with their defaults.
         below: levels that end a run when a coordinate falls below them: rad, m, or a text such as "30deg".
         above: levels that end a run when a coordinate rises above them, likewise.
+        controls: that every run has: by the name or path of an actuator a number, or ``(times, values)``.
         choices: further attributes of :class:`Plan`.
 
     Raises:
         SettingError: a name means nothing, or a number has no meaning.
         ModelError: the model is no mechanism.
     """
+    if controls:
+        maker = partial(_copy, to_text(source)) if isinstance(source, Model) else source
+        source = partial(_driven, maker, controls)
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
     found = variables(vary, model, mechanism, parameters)
@@ -188,9 +206,22 @@ def plan(
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
     if made.accuracy >= 1.0:
         raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
+    targets = {place: item.target for place, item in enumerate(found)}
+    nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
+    check_nodes(nodes, made.interpolation, made.to)
     named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))
     given = (_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops)
     return replace(made, engine=engine_name(made.engine), stops=(*given, *named))
+
+
+def _copy(text: str, parameters: Mapping[str, float]) -> Model:
+    return read_text(text.encode())
+
+
+def _driven(source: Maker, controls: Mapping[str, Any], parameters: Mapping[str, float]) -> Model:
+    model = source(parameters)
+    model.add(controller_of(model, controls))
+    return model
 
 
 def _stops(mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bool) -> list[Stop]:

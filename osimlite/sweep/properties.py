@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from osimlite.errors import SettingError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean
 
 Step = str | int
 """Name of a property, or place in the list that the step before led to."""
@@ -52,11 +51,16 @@ class Place:
 
 @dataclass(frozen=True)
 class Setter:
-    """Puts numbers into one property, or one entry of it."""
+    """Puts numbers into one property, or one entry of it; of one with a `factor` those times it."""
 
     holder: Object
     name: str
     entry: int | None
+    factor: float = 1.0
+
+    def scaling(self) -> Setter:
+        """The same with what is there now as the factor."""
+        return replace(self, factor=self.get())
 
     def put(self, value: float) -> None:
         """Set the number.
@@ -64,6 +68,7 @@ class Setter:
         Raises:
             ModelError: the property does not take it.
         """
+        value *= self.factor
         if self.entry is None:
             setattr(self.holder, self.name, value)
         else:
@@ -77,48 +82,49 @@ class Setter:
         return float(found if self.entry is None else found[self.entry])
 
 
-def places(model: Model, path: str, others: Iterable[str] = ()) -> tuple[Place, ...]:
-    """The numbers that a path means; a ``*`` in it stands for any part of a name.
+def named(pattern: str, components: Iterable[Component]) -> list[Component]:
+    """Components by name or path, or by several with commas; ``*``, ``?`` and ``[lr]`` stand for parts of a name.
 
-    A path is that of a component and then the names of properties, with ``/``; entries of lists are counted from 0
-    (``/bodyset/Pelvis/mass_center/1``). What stands alone in a list needs no number.
+    None if one of several means nothing.
+    """
+    known = list(components)
+    found: dict[int, Component] = {}
+    for part in pattern.split(","):
+        own = [item for item in known if _is_meant(part, item.path if part.startswith("/") else item.name)]
+        if not own:
+            return []
+        found |= {id(item): item for item in own}
+    return [item for item in known if id(item) in found]
+
+
+def _is_meant(pattern: str, name: str) -> bool:
+    return name.count("/") == pattern.count("/") and fnmatchcase(name, pattern)
+
+
+def places(model: Model, path: str) -> tuple[Place, ...]:
+    """The numbers that a path means, as of `named` components; none if there are no such.
+
+    A path is that of a component, or its name, and then the names of properties, with ``/``; entries of lists are
+    counted from 0 (``/bodyset/Pelvis/mass_center/1``). What stands alone in a list needs no number.
 
     Args:
         model: whose.
         path: as above.
-        others: what else might have been meant.
-
-    Raises:
-        SettingError: there is no such number; with the nearest spelling.
     """
-    words = path.strip("/").split("/")
-    tree = model.tree()
-    for count in range(len(words) - 1, -1, -1):
-        pattern, route = "/" + "/".join(words[:count]), "/".join(words[count:])
-        matching = [
-            (name, component)
-            for name, component in tree.by_path.items()
-            if name.count("/") == pattern.count("/") and fnmatchcase(name, pattern)
-        ]
-        if not matching:
-            continue
-        found = [
-            Place(name, *numbers[route])
-            for name, component in matching
-            if route in (numbers := dict(_numbers(component)))
-        ]
-        if found:
-            return tuple(found)
-        break
-    raise SettingError(f"the model has no number '{path}'{did_you_mean(path, [*others, *_spellings(model)])}")
+    words = path.split("/")
+    for count in range(len(words) - 1, 0, -1):
+        pattern, route = "/".join(words[:count]) or "/", "/".join(words[count:])
+        matching = named(pattern, model.components())
+        if matching:
+            every = [(item, dict(_numbers(item)).get(route)) for item in matching]
+            return tuple(Place(item.path, *numbers) for item, numbers in every if numbers)
+    return ()
 
 
-def _spellings(model: Model) -> list[str]:
-    return [
-        f"{name.rstrip('/')}/{route}"
-        for name, component in model.tree().by_path.items()
-        for route, _ in _numbers(component)
-    ]
+def spellings(model: Model) -> list[str]:
+    """Paths of all numbers, and what they are called by the names of their components."""
+    routes = [(item, route) for item in model.components() for route, _ in _numbers(item)]
+    return [f"{front.rstrip('/')}/{route}" for item, route in routes for front in (item.path, item.name)]
 
 
 def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]]]:

@@ -91,7 +91,7 @@ class Runner:
         self.variants = Variants(plan)
         given = self.variants.given
         self._looks: dict[bytes, _Look] = {given.structure: _Look(plan, given.engine)}
-        moments = [] if plan.report_interval is None else report_times(plan.to, plan.report_interval)
+        moments = [] if plan.interval is None else report_times(plan.to, plan.interval)
         self._report_times = np.array(moments)
 
     def run(self, values: Floats) -> Block:
@@ -243,7 +243,7 @@ class Runner:
                 trajectory = simulation.run(
                     plan.to,
                     accuracy=plan.accuracy,
-                    report_interval=plan.report_interval or plan.to,
+                    report_interval=plan.interval or plan.to,
                     initial={infos[k].path: row[k] for k in may} | auxiliary,
                     initial_speeds={infos[k].path: row[count + k] for k in may},
                 )

@@ -3,9 +3,11 @@
 ======================================  ==========================================================
 ``RHip_rz``                             value at the start, by the name or the path of a coordinate
 ``RHip_rz/speed``                       generalized speed at the start
-``/bodyset/Pelvis/mass``                any number of the model, by its path
+``/bodyset/Pelvis/mass``                any number of the model, by the path of a component or its name
 ``/forceset/*Foot*/.../stiffness``      several numbers that are the same in each run
+``*/max_isometric_force@scale``         factor of numbers of the model
 ``BRA/control``                         control of an actuator at all times, added to what the model does
+``soleus_?/control@0.1``                and what else can be varied of :mod:`controls <osimlite.sweep.controls>`
 ``thigh_length``                        parameter of the function that makes the model
 ``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
 ======================================  ==========================================================
@@ -30,7 +32,8 @@ from osimlite.quantity import Quantity, quantity
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.model import Model
 from osimlite.simulation.start import suspect_value
-from osimlite.sweep.properties import Place, places
+from osimlite.sweep.controls import SCALE, Control, control, nodes_of
+from osimlite.sweep.properties import Place, named, places, spellings
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
@@ -51,9 +54,15 @@ class Start:
 
 @dataclass(frozen=True)
 class Property:
-    """Numbers of the model that are the same."""
+    """Numbers of the model that are the same, or are changed by the same factor."""
 
     places: tuple[Place, ...]
+    is_scaled: bool = False
+
+    @property
+    def parts(self) -> tuple[Place, ...]:
+        """What no other variable may be."""
+        return self.places
 
 
 @dataclass(frozen=True)
@@ -62,13 +71,6 @@ class Parameter:
 
     name: str
     default: float | None = None
-
-
-@dataclass(frozen=True)
-class Control:
-    """What is added to the control of an actuator, by its path."""
-
-    actuator: str
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ def variables(
         SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
     """
     found = []
-    for name, given in ranges.items():
+    for name, given in [(name, given) for names, given in ranges.items() for name in nodes_of(names)]:
         target, unit = _target(name, model, mechanism, parameters)
         made = _variable(name, target, unit, given)
         if isinstance(target, Start) and not target.is_speed:
@@ -175,7 +177,7 @@ def variables(
         found.append(made)
     taken: dict[object, str] = {}
     for item in found:
-        for part in item.target.places if isinstance(item.target, Property) else (item.target,):
+        for part in getattr(item.target, "parts", (item.target,)):
             if part in taken:
                 raise SettingError(f"'{taken[part]}' and '{item.name}' are the same number; vary one of them")
             taken[part] = item.name
@@ -206,24 +208,28 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
     if name in parameters:
         default = parameters[name]
         return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
-    actuators = {key: item.path for item in model.components(Actuator) for key in (item.name, item.path)}
-    if last == "control" and front in actuators:
-        return Control(actuators[front]), ""
-    if name.startswith("/"):
-        found = places(model, name, list(infos))
+    route, _, word = name.partition("@")
+    front, _, last = route.rpartition("/")
+    if last == "control" and (driven := named(front, model.components(Actuator))):
+        made = control(name, [item.path for item in driven], word)
+        return made, made.unit
+    if word in ("", SCALE) and (found := places(model, route)):
         unit = found[0].unit
         if unit.startswith("rad | m") and found[0].component in infos:
             unit = _unit_of(infos[found[0].component])
-        return Property(found), unit
+        return Property(found, bool(word)), "" if word else unit
     if name == "slope":
         return Slope(), "rad"
-    if name in actuators:
-        raise SettingError(f"'{name}' is an actuator: vary its control, as '{name}/control', or a property by its path")
-    known = [*(info.name for info in mechanism.coordinates), *parameters, "slope"]
-    known += [f"{info.name}/speed" for info in mechanism.coordinates]
-    known += [f"{item.name}/control" for item in model.components(Actuator)]
-    near = did_you_mean(name, known) or ("; a path begins with /" if "/" in name else "")
-    raise SettingError(f"there is no coordinate, parameter or path '{name}' to vary{near}")
+    if named(route, model.components(Actuator)):
+        raise SettingError(
+            f"'{name}' is an actuator: vary its control, as '{route}/control', or a property by its path"
+        )
+    known = [*infos, *(f"{info}/speed" for info in infos), *parameters, "slope"]
+    known += [f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)]
+    known += spellings(model) if "/" in name else []
+    raise SettingError(
+        f"there is no coordinate, parameter, control or number '{name}' to vary{did_you_mean(name, known)}"
+    )
 
 
 def _coordinate(name: str, info: CoordinateInfo, is_speed: bool, model: Model) -> tuple[Target, str]:

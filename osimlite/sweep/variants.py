@@ -19,18 +19,16 @@ import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.schema.base import Component
-from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
-from osimlite.schema.functions import Constant
 from osimlite.schema.model import Model
 from osimlite.simulation.many import Renewal
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
+from osimlite.sweep.controls import Control, VariedControls
 from osimlite.sweep.plan import Plan
-from osimlite.sweep.properties import Setter
-from osimlite.sweep.variables import Control, Floats, Parameter, Property, Slope, Start
+from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
 
 if TYPE_CHECKING:
     from osimlite.gait.foot_contacts import FootContacts
@@ -200,8 +198,10 @@ class Variants:
             if isinstance(item.target, Start):
                 info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinate)]
                 found.append(info.default_speed if item.target.is_speed else info.default_value)
-            elif place in setters:
-                found.append(setters[place][0].get())
+            elif isinstance(item.target, Property):
+                found.append(1.0 if item.target.is_scaled else setters[place][0].get())
+            elif isinstance(item.target, Control):
+                found.append(item.target.present)
             else:
                 found.append(item.target.default if isinstance(item.target, Parameter) else 0.0)
         return found
@@ -233,6 +233,7 @@ class Variants:
         for place, setters in self._setters:
             for setter in setters:
                 setter.put(float(values[place]))
+        self._controls.put(values)
         for place in self._slopes:
             angle, g = float(values[place]), self._gravity
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
@@ -254,17 +255,16 @@ class Variants:
         for place in self._changes:
             target = self._plan.variables[place].target
             if isinstance(target, Property):
-                self._setters.append((place, [item.setter(model) for item in target.places]))
+                setters = [item.setter(model) for item in target.places]
+                self._setters.append((place, [item.scaling() for item in setters] if target.is_scaled else setters))
                 owners += [model.tree().by_path[item.component] for item in target.places]
             elif isinstance(target, Slope):
                 self._slopes.append(place)
                 owners.append(model)
-            elif isinstance(target, Control):
-                control = Constant(value=0.0)
-                brain = PrescribedController(name=f"varied_{place}", socket_actuators=(target.actuator,))
-                brain.ControlFunctions.objects.append(control)
-                owners.append(model.add(brain))
-                self._setters.append((place, [Setter(control, "value", None)]))
+        targets = ((place, self._plan.variables[place].target) for place in self._changes)
+        controls = {place: target for place, target in targets if isinstance(target, Control)}
+        self._controls = VariedControls(model, controls, self._plan.interpolation)
+        owners += self._controls.controllers
         can_renew = self._plan.engine == "compiled" and not self._parameters
         self._owners = owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
 

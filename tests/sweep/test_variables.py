@@ -13,8 +13,9 @@ from osimlite.errors import SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import CoordinateActuator
+from osimlite.sweep.controls import Control
 from osimlite.sweep.properties import places
-from osimlite.sweep.variables import Control, Parameter, Property, Slope, Start, Variable, parse, variables
+from osimlite.sweep.variables import Parameter, Property, Slope, Start, Variable, parse, variables
 
 MODEL = dynamic_walker()
 MECHANISM = build_mechanism(MODEL)
@@ -45,7 +46,7 @@ def test_controls():
     model.add(CoordinateActuator(name="motor", coordinate="RHip_rz"))
     for name in ("motor/control", "/forceset/motor/control"):
         (found,) = variables({name: "-1:1"}, model, build_mechanism(model))
-        assert found.target == Control("/forceset/motor")
+        assert found.target == Control(("/forceset/motor",))
     with pytest.raises(SettingError, match="'motor' is an actuator: vary its control, as 'motor/control', or"):
         variables({"motor": "0:1"}, model, build_mechanism(model), {})
     with pytest.raises(SettingError, match="did you mean 'motor/control'"):
@@ -114,7 +115,7 @@ def test_the_nearest_spelling_is_told(name, near):
 
 
 def test_a_path_without_its_slash_is_told():
-    with pytest.raises(SettingError, match="'bodyset/Pelvis/mass' to vary; a path begins with /"):
+    with pytest.raises(SettingError, match="'bodyset/Pelvis/mass' to vary; did you mean '/bodyset/Pelvis/mass'"):
         one("bodyset/Pelvis/mass")
 
 

@@ -96,6 +96,7 @@ class ModelControls:
 
     Attributes:
         controls: the functions of time.
+        reflexes: by the paths of the muscles that have one, what reflexes add where they lengthen the fastest.
 
     Raises:
         ModelError: a controller has no meaning, or a file that it names does not fit the model.
@@ -110,7 +111,7 @@ class ModelControls:
             self._first[path] = len(names)
             names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
         functions: list[list[Function]] = [[] for _ in names]
-        self._gains = dict.fromkeys(self._first, 0.0)
+        self.reflexes: dict[str, float] = {}
         self._refused: dict[str, UnsupportedError] = {}
         for controller, (actuator, signal, number) in _drives(builder):
             if not isinstance(actuator, Actuator):
@@ -124,7 +125,7 @@ class ModelControls:
             if isinstance(signal, UnsupportedError):
                 self._refused[path] = signal
             elif isinstance(signal, Reflex):
-                self._gains[path] += signal.gain
+                self.reflexes[path] = self.reflexes.get(path, 0.0) + signal.gain
             else:
                 functions[self._first[path] + (number or 0)].append(signal)
         self.controls = Controls(tuple(names), tuple(map(tuple, functions)))
@@ -143,7 +144,7 @@ class ModelControls:
     def gain(self, builder: ElementBuilder, actuator: Any) -> float:
         """What reflexes add to the control of a muscle, for how fast it lengthens, s/m."""
         fastest = actuator.optimal_fiber_length * actuator.max_contraction_velocity
-        gain = self._gains[builder.path(actuator)]
+        gain = self.reflexes.get(builder.path(actuator), 0.0)
         return gain / fastest if gain else 0.0
 
 

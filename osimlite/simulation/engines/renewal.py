@@ -77,6 +77,12 @@ class NumbersOnly:
             owners: forces, controllers, bodies and the model itself, if a property of theirs has changed.
         """
         made: dict[str, Any] = {}
+        owners, controls = list(owners), self._forces.controls
+        if any(isinstance(owner, Controller) for owner in owners):
+            self._builder.controls = ModelControls(self._builder)
+            controls = self._builder.controls.controls
+            # The gain of a reflex is a number of the muscle.
+            owners += [self._components[path] for path in self._builder.controls.reflexes if path in self._items]
         sharing = {type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)}
         for force in (*owners, *(other for each in sharing for other in self._model.components(each))):
             if isinstance(force, Force):
@@ -91,9 +97,7 @@ class NumbersOnly:
                 return None
             made |= {probe.path: probe for probe in probe_elements(self._builder, self._forces.elements)}
         elements = tuple(made.get(element.path, element) for element in self._forces.elements)
-        forces = replace(self._forces, elements=elements)
-        if any(isinstance(owner, Controller) for owner in owners):
-            forces = replace(forces, controls=ModelControls(self._builder).controls)
+        forces = replace(self._forces, elements=elements, controls=controls)
         mechanism = self._mechanism if only_forces else self._with_masses()
         if mechanism is None:
             return None
