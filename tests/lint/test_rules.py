@@ -13,6 +13,7 @@ from osimlite.document.source import Source
 from osimlite.lint import Severity, validate
 from osimlite.lint.engine import FAMILIES, Rule, all_rules
 from osimlite.lint.pages import index, page_of
+from osimlite.schema.model import CURRENT_VERSION
 
 HERE = Path(__file__).resolve().parent
 FIXTURES = HERE.parents[1] / "fixtures" / "lint"
@@ -31,7 +32,9 @@ def example(rule: Rule, heading: str) -> bytes:
     section = rule.page.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
     block = re.search(r"```(\S+)\n(.*?)```", section, re.DOTALL)
     assert block is not None, f"{rule.code} shows nothing under '{heading}'"
-    if block[1] in ("document", "setup", "sto", "trc"):
+    if block[1] == "setup":
+        return f'<OpenSimDocument Version="{CURRENT_VERSION}">\n{block[2]}</OpenSimDocument>\n'.encode()
+    if block[1] in ("document", "sto", "trc"):
         return block[2].replace("→", "\t").encode()
     return str(skeleton.document(block[2])).encode("latin-1" if block[1] == "latin-1" else "utf-8")
 

@@ -28,22 +28,18 @@ def missing_column(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg_no_knee.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg_no_knee.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
     """
     for item, tag, table in motions(setup):

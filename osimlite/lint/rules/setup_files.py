@@ -49,22 +49,18 @@ def missing_input(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>no_such_model.osim</model_file>
-            <coordinates_file></coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>no_such_model.osim</model_file>
+        <coordinates_file></coordinates_file>
+    </InverseDynamicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
     """
     for naming in setup.named_files("file"):
@@ -129,22 +125,18 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.osim</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.osim</coordinates_file>
+    </InverseDynamicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
     """
     for naming in setup.named_files("file"):
@@ -184,24 +176,20 @@ def lost_output(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <results_directory>no_such/folder</results_directory>
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <results_directory>no_such/folder</results_directory>
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <results_directory>results</results_directory>
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <results_directory>results</results_directory>
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
     """
     if setup.folder is None:
@@ -263,25 +251,21 @@ def tools_differ(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <time_range>0 0.5</time_range>
-            <coordinates_file>motion.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <time_range>0 0.5</time_range>
+        <coordinates_file>motion.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <time_range>0 0.5</time_range>
-            <external_loads_file>leg_grf.xml</external_loads_file>
-            <coordinates_file>motion.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <time_range>0 0.5</time_range>
+        <external_loads_file>leg_grf.xml</external_loads_file>
+        <coordinates_file>motion.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
     """
     if setup.tool is None or setup.tool[1] is not setup.top or not (mine := motion_of(*setup.tool)):

@@ -35,34 +35,30 @@ def load_columns(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <ExternalLoads name="loads">
-            <objects>
-                <ExternalForce name="right">
-                    <applied_to_body>shank</applied_to_body>
-                    <force_identifier>ground_force_v</force_identifier>
-                    <point_identifier>ground_force_q</point_identifier>
-                </ExternalForce>
-            </objects>
-            <datafile>leg_grf.mot</datafile>
-        </ExternalLoads>
-    </OpenSimDocument>
+    <ExternalLoads name="loads">
+        <objects>
+            <ExternalForce name="right">
+                <applied_to_body>shank</applied_to_body>
+                <force_identifier>ground_force_v</force_identifier>
+                <point_identifier>ground_force_q</point_identifier>
+            </ExternalForce>
+        </objects>
+        <datafile>leg_grf.mot</datafile>
+    </ExternalLoads>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <ExternalLoads name="loads">
-            <objects>
-                <ExternalForce name="right">
-                    <applied_to_body>shank</applied_to_body>
-                    <force_identifier>ground_force_v</force_identifier>
-                    <point_identifier>ground_force_p</point_identifier>
-                </ExternalForce>
-            </objects>
-            <datafile>leg_grf.mot</datafile>
-        </ExternalLoads>
-    </OpenSimDocument>
+    <ExternalLoads name="loads">
+        <objects>
+            <ExternalForce name="right">
+                <applied_to_body>shank</applied_to_body>
+                <force_identifier>ground_force_v</force_identifier>
+                <point_identifier>ground_force_p</point_identifier>
+            </ExternalForce>
+        </objects>
+        <datafile>leg_grf.mot</datafile>
+    </ExternalLoads>
     ```
     """
     for loads in setup.named("ExternalLoads"):
@@ -128,34 +124,30 @@ def load_place(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <ExternalLoads name="loads">
-            <objects>
-                <ExternalForce name="right">
-                    <applied_to_body>pelvis</applied_to_body>
-                    <force_identifier>ground_force_v</force_identifier>
-                    <point_identifier>ground_force_p</point_identifier>
-                </ExternalForce>
-            </objects>
-            <datafile>leg_grf.mot</datafile>
-        </ExternalLoads>
-    </OpenSimDocument>
+    <ExternalLoads name="loads">
+        <objects>
+            <ExternalForce name="right">
+                <applied_to_body>pelvis</applied_to_body>
+                <force_identifier>ground_force_v</force_identifier>
+                <point_identifier>ground_force_p</point_identifier>
+            </ExternalForce>
+        </objects>
+        <datafile>leg_grf.mot</datafile>
+    </ExternalLoads>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <ExternalLoads name="loads">
-            <objects>
-                <ExternalForce name="right">
-                    <applied_to_body>shank</applied_to_body>
-                    <force_identifier>ground_force_v</force_identifier>
-                    <point_identifier>ground_force_p</point_identifier>
-                </ExternalForce>
-            </objects>
-            <datafile>leg_grf.mot</datafile>
-        </ExternalLoads>
-    </OpenSimDocument>
+    <ExternalLoads name="loads">
+        <objects>
+            <ExternalForce name="right">
+                <applied_to_body>shank</applied_to_body>
+                <force_identifier>ground_force_v</force_identifier>
+                <point_identifier>ground_force_p</point_identifier>
+            </ExternalForce>
+        </objects>
+        <datafile>leg_grf.mot</datafile>
+    </ExternalLoads>
     ```
     """
     if setup.tree is None:

@@ -39,28 +39,24 @@ def unknown_name(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <AnalyzeTool name="analyze">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-            <AnalysisSet name="Analyses">
-                <objects> <BodyKinematics name="bk"> <bodies>thigh shnak</bodies> </BodyKinematics> </objects>
-            </AnalysisSet>
-        </AnalyzeTool>
-    </OpenSimDocument>
+    <AnalyzeTool name="analyze">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+        <AnalysisSet name="Analyses">
+            <objects> <BodyKinematics name="bk"> <bodies>thigh shnak</bodies> </BodyKinematics> </objects>
+        </AnalysisSet>
+    </AnalyzeTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <AnalyzeTool name="analyze">
-            <model_file>leg.osim</model_file>
-            <coordinates_file>leg.mot</coordinates_file>
-            <AnalysisSet name="Analyses">
-                <objects> <BodyKinematics name="bk"> <bodies>thigh shank</bodies> </BodyKinematics> </objects>
-            </AnalysisSet>
-        </AnalyzeTool>
-    </OpenSimDocument>
+    <AnalyzeTool name="analyze">
+        <model_file>leg.osim</model_file>
+        <coordinates_file>leg.mot</coordinates_file>
+        <AnalysisSet name="Analyses">
+            <objects> <BodyKinematics name="bk"> <bodies>thigh shank</bodies> </BodyKinematics> </objects>
+        </AnalysisSet>
+    </AnalyzeTool>
     ```
     """
     tree = setup.tree
@@ -182,24 +178,20 @@ def excluded_force(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <forces_to_exclude>Musles</forces_to_exclude>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <forces_to_exclude>Musles</forces_to_exclude>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseDynamicsTool name="id">
-            <model_file>leg.osim</model_file>
-            <forces_to_exclude>Muscles</forces_to_exclude>
-            <coordinates_file>leg.mot</coordinates_file>
-        </InverseDynamicsTool>
-    </OpenSimDocument>
+    <InverseDynamicsTool name="id">
+        <model_file>leg.osim</model_file>
+        <forces_to_exclude>Muscles</forces_to_exclude>
+        <coordinates_file>leg.mot</coordinates_file>
+    </InverseDynamicsTool>
     ```
     """
     tree = setup.tree

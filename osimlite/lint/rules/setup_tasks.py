@@ -27,20 +27,16 @@ def task_weight(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <IKTaskSet name="tasks">
-            <objects> <IKMarkerTask name="asis"> <weight>-5</weight> </IKMarkerTask> </objects>
-        </IKTaskSet>
-    </OpenSimDocument>
+    <IKTaskSet name="tasks">
+        <objects> <IKMarkerTask name="asis"> <weight>-5</weight> </IKMarkerTask> </objects>
+    </IKTaskSet>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <IKTaskSet name="tasks">
-            <objects> <IKMarkerTask name="asis"> <weight>5</weight> </IKMarkerTask> </objects>
-        </IKTaskSet>
-    </OpenSimDocument>
+    <IKTaskSet name="tasks">
+        <objects> <IKMarkerTask name="asis"> <weight>5</weight> </IKMarkerTask> </objects>
+    </IKTaskSet>
     ```
     """
     for tasks in setup.named("IKTaskSet"):
@@ -84,42 +80,38 @@ def unreachable_task(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseKinematicsTool name="ik">
-            <model_file>clamped.osim</model_file>
-            <marker_file>leg.trc</marker_file>
-            <output_motion_file>ik.mot</output_motion_file>
-            <IKTaskSet>
-                <objects>
-                    <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
-                    <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
-                    <IKCoordinateTask name="knee_angle">
-                        <weight>1</weight> <value_type>manual_value</value_type> <value>1</value>
-                    </IKCoordinateTask>
-                </objects>
-            </IKTaskSet>
-        </InverseKinematicsTool>
-    </OpenSimDocument>
+    <InverseKinematicsTool name="ik">
+        <model_file>clamped.osim</model_file>
+        <marker_file>leg.trc</marker_file>
+        <output_motion_file>ik.mot</output_motion_file>
+        <IKTaskSet>
+            <objects>
+                <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+                <IKCoordinateTask name="knee_angle">
+                    <weight>1</weight> <value_type>manual_value</value_type> <value>1</value>
+                </IKCoordinateTask>
+            </objects>
+        </IKTaskSet>
+    </InverseKinematicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseKinematicsTool name="ik">
-            <model_file>clamped.osim</model_file>
-            <marker_file>leg.trc</marker_file>
-            <output_motion_file>ik.mot</output_motion_file>
-            <IKTaskSet>
-                <objects>
-                    <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
-                    <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
-                    <IKCoordinateTask name="knee_angle">
-                        <weight>1</weight> <value_type>manual_value</value_type> <value>-1</value>
-                    </IKCoordinateTask>
-                </objects>
-            </IKTaskSet>
-        </InverseKinematicsTool>
-    </OpenSimDocument>
+    <InverseKinematicsTool name="ik">
+        <model_file>clamped.osim</model_file>
+        <marker_file>leg.trc</marker_file>
+        <output_motion_file>ik.mot</output_motion_file>
+        <IKTaskSet>
+            <objects>
+                <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+                <IKCoordinateTask name="knee_angle">
+                    <weight>1</weight> <value_type>manual_value</value_type> <value>-1</value>
+                </IKCoordinateTask>
+            </objects>
+        </IKTaskSet>
+    </InverseKinematicsTool>
     ```
     """
     coordinates: dict[str, Any] = {} if setup.tree is None else setup.tree.of_class("Coordinate")

@@ -50,26 +50,22 @@ def tool_setting(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseKinematicsTool name="ik">
-            <model_file>leg.osim</model_file>
-            <accuracy>0.5</accuracy>
-            <marker_file>leg.trc</marker_file>
-            <output_motion_file>ik.mot</output_motion_file>
-        </InverseKinematicsTool>
-    </OpenSimDocument>
+    <InverseKinematicsTool name="ik">
+        <model_file>leg.osim</model_file>
+        <accuracy>0.5</accuracy>
+        <marker_file>leg.trc</marker_file>
+        <output_motion_file>ik.mot</output_motion_file>
+    </InverseKinematicsTool>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <InverseKinematicsTool name="ik">
-            <model_file>leg.osim</model_file>
-            <accuracy>1e-5</accuracy>
-            <marker_file>leg.trc</marker_file>
-            <output_motion_file>ik.mot</output_motion_file>
-        </InverseKinematicsTool>
-    </OpenSimDocument>
+    <InverseKinematicsTool name="ik">
+        <model_file>leg.osim</model_file>
+        <accuracy>1e-5</accuracy>
+        <marker_file>leg.trc</marker_file>
+        <output_motion_file>ik.mot</output_motion_file>
+    </InverseKinematicsTool>
     ```
     """
     for of_class, tag, is_wrong, told, severity in _SETTINGS:
@@ -197,32 +193,28 @@ def scale_setting(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <OpenSimDocument Version="40600">
-        <MeasurementSet name="measurements">
-            <objects>
-                <Measurement name="thigh">
-                    <MarkerPairSet name="pairs">
-                        <objects> <MarkerPair name="first"> <markers>asis</markers> </MarkerPair> </objects>
-                    </MarkerPairSet>
-                </Measurement>
-            </objects>
-        </MeasurementSet>
-    </OpenSimDocument>
+    <MeasurementSet name="measurements">
+        <objects>
+            <Measurement name="thigh">
+                <MarkerPairSet name="pairs">
+                    <objects> <MarkerPair name="first"> <markers>asis</markers> </MarkerPair> </objects>
+                </MarkerPairSet>
+            </Measurement>
+        </objects>
+    </MeasurementSet>
     ```
 
     ## Use instead
     ```setup
-    <OpenSimDocument Version="40600">
-        <MeasurementSet name="measurements">
-            <objects>
-                <Measurement name="thigh">
-                    <MarkerPairSet name="pairs">
-                        <objects> <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair> </objects>
-                    </MarkerPairSet>
-                </Measurement>
-            </objects>
-        </MeasurementSet>
-    </OpenSimDocument>
+    <MeasurementSet name="measurements">
+        <objects>
+            <Measurement name="thigh">
+                <MarkerPairSet name="pairs">
+                    <objects> <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair> </objects>
+                </MarkerPairSet>
+            </Measurement>
+        </objects>
+    </MeasurementSet>
     ```
     """
     for tool in setup.named("ScaleTool"):
