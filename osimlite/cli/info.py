@@ -136,18 +136,17 @@ def _table(file: Path, everything: bool) -> None:
 
 def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
     """The properties of a document that name files and folders, with what they say and whether that is there."""
-    from osimlite.schema.fields import Reference
     from osimlite.schema.specs import reference_specs
 
     for item in top.walk():
         for spec in reference_specs(type(item)):
             value = getattr(item, spec.name)
-            if not isinstance(spec.kind, Reference) or not spec.kind.target.endswith(("file", "folder")):
+            if not spec.reference.target.endswith(("file", "folder")):
                 continue
             for name in value if isinstance(value, tuple) else (value,):
                 if name not in ("", None, "Unassigned"):
-                    lost = spec.kind.rule == "file" and not (folder / name.strip()).is_file()
-                    fate = " (not there)" if lost else " (written)" if spec.kind.rule.startswith("output") else ""
+                    lost = spec.reference.rule == "file" and not (folder / name.strip()).is_file()
+                    fate = " (not there)" if lost else " (written)" if spec.reference.rule.startswith("output") else ""
                     yield spec.name if item is top else f"{item.name or item.tag}: {spec.name}", f"{name}{fate}"
 
 

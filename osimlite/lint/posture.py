@@ -6,10 +6,11 @@ import math
 from typing import Any, cast
 
 from osimlite.lint.placement import Pose, Vector, on_base, poses_at
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
 from osimlite.lint.table import Table
 from osimlite.schema.states import motions_of
+from osimlite.schema.tree import is_a
 from osimlite.tables import StorageHeader
 
 
@@ -46,7 +47,7 @@ def marker_places(setup: Setup) -> dict[str, Vector]:
         poses = poses_at(model, {})
         found: dict[str, Vector] = {}
         # What a set of markers adds has absolute paths.
-        added = [item for _, top in setup.added for item in top.walk() if is_of(item, "Marker")]
+        added = [item for _, top in setup.added for item in top.walk() if is_a(item, "Marker")]
         for marker in (*model.named("Marker"), *added):
             frame = on_base(model, model.tree.walk(str(marker.socket_parent_frame), "/markerset", "Frame").target)
             if frame is not None and id(frame[0]) in poses:

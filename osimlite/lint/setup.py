@@ -23,8 +23,8 @@ from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, member_specs, name_spec, naming_specs, reference_specs
-from osimlite.schema.tree import Tree, Use
+from osimlite.schema.specs import FieldSpec, file_specs, member_specs, name_spec, naming_specs
+from osimlite.schema.tree import Tree, Use, is_a
 
 UNGIVEN = "OpenSim refuses it, unless a program or the GUI gives one"
 """What becomes of a tool that names no file where it needs one."""
@@ -106,10 +106,10 @@ class Setup(Subject):
 
     # ------------------------------------------------------------------------------------------------- files
 
-    def named_files(self, *rules: str) -> Iterator[Naming]:
-        """Every file that an object of the document names, by the rules of its properties."""
+    def named_files(self, rule: str) -> Iterator[Naming]:
+        """Every file that an object of the document names by a rule."""
         for item in self.own:
-            for spec, name in files_of(item, *rules):
+            for spec, name in files_of(item, rule):
                 yield Naming(item, spec, name, self.place(name.strip()))
 
     def place(self, name: str) -> str:
@@ -205,7 +205,7 @@ class Setup(Subject):
                 members = held if isinstance(held, list) else getattr(held, "objects", ())
                 named |= dict.fromkeys(map(id, members), spec.names)
             for spec in naming_specs(cls):
-                if names is not None and spec.kind.rule == names.rule:  # type: ignore[attr-defined]
+                if names is not None and spec.reference.rule == names.rule:
                     spec = spec._replace(kind=names)
                 value = getattr(item, spec.name)
                 if isinstance(value, tuple):
@@ -242,7 +242,7 @@ class Setup(Subject):
         if self.tree is None or self.tool is None:
             return set()
         names = {item.name for item in self.tree.of_class(target).values()}
-        return names | {item.name for _, added in self.added for item in added.walk() if is_of(item, target)}
+        return names | {item.name for _, added in self.added for item in added.walk() if is_a(item, target)}
 
     def is_bound(self, name: str) -> bool:
         """Whether a coordinate of the model is locked, prescribed, or follows from others."""
@@ -288,24 +288,29 @@ def is_given(name: str) -> bool:
     return name.strip() not in ("", "Unassigned")
 
 
-def files_of(item: Object, *rules: str) -> Iterator[tuple[FieldSpec, str]]:
-    """Every file that an object names, by the rules of its properties."""
-    for spec in reference_specs(type(item)):
-        if isinstance(spec.kind, Reference) and spec.kind.rule in rules:
-            value = getattr(item, spec.name)
-            for name in value if isinstance(value, tuple) else (value,):
-                if isinstance(name, str) and is_given(name):
-                    yield spec, name
+def content_of(spec: FieldSpec) -> str:
+    """What the file holds that a property names: a class of objects, or what kind of table."""
+    return spec.reference.target.removesuffix(" file")
 
 
-def is_of(item: Object, target: str) -> bool:
-    """Whether an object is of the class with this name, or of one derived from it."""
-    return any(base.__name__ == target for base in type(item).__mro__)
+def files_of(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
+    """Every file that an object names by a rule."""
+    for spec in file_specs(type(item), rule):
+        value = getattr(item, spec.name)
+        for name in value if isinstance(value, tuple) else (value,):
+            if isinstance(name, str) and is_given(name):
+                yield spec, name
+
+
+def motion_of(file: str, tool: Object) -> str:
+    """Where the coordinates are that a tool is given, by the file of its setup; "" if it is given none."""
+    name = next((name for spec, name in files_of(tool, "file") if content_of(spec) == "motion"), "")
+    return name and os.path.realpath(os.path.join(os.path.dirname(file), name.strip()))
 
 
 def members(owner: Any, target: str) -> list[Any]:
     """The objects of a set, or of a list, that are of a class: a text may put anything there."""
-    return [item for item in (owner if isinstance(owner, list) else owner.objects) if is_of(item, target)]
+    return [item for item in (owner if isinstance(owner, list) else owner.objects) if is_a(item, target)]
 
 
 def _files_read_by(top: Object) -> Iterator[str]:
@@ -321,6 +326,6 @@ def _model_named_by(top: Object) -> str | None:
     for item in top.walk():
         if "model_file" in vars(item):
             return str(vars(item)["model_file"])
-        if is_of(item, "ModelProcessor"):
+        if is_a(item, "ModelProcessor"):
             return str(getattr(item, "filepath", ""))
     return None

@@ -17,9 +17,8 @@ from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object, Unknown
-from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, lineage, reference_specs
+from osimlite.schema.specs import FieldSpec, file_specs, lineage
 from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:
@@ -176,6 +175,10 @@ class Subject(Checked):
             return None, 0
         return words[index], words[:index].count(words[index])
 
+    def notes_of(self, kind: str) -> list[tuple[Note, Object]]:
+        """What the reader noticed of a kind about objects, with the objects."""
+        return [(note, note.owner) for note in self.notes if note.kind == kind and note.owner is not None]
+
     def noted(self, item: Object, spec: FieldSpec) -> bool:
         """Whether the reader noticed something about the text of this property."""
         return (id(item), spec.name) in self._noted
@@ -242,9 +245,7 @@ class Subject(Checked):
         places.append(os.getcwd())
         found: dict[str, None] = {}
         for cls, items in self.by_class.items():
-            for spec in reference_specs(cls):
-                if not isinstance(spec.kind, Reference) or spec.kind.rule != "file":
-                    continue
+            for spec in file_specs(cls, "file"):
                 for item in items:
                     name = getattr(item, spec.name)
                     if name:

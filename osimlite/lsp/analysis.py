@@ -15,14 +15,14 @@ from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
 from osimlite.lint.engine import run, subject_in, use_classes
 from osimlite.lint.settings import settings_for
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_ours, is_table
 from osimlite.lsp.cursor import Cursor, cursor_at
 from osimlite.lsp.text import Text
 from osimlite.schema.base import Component, Object
 from osimlite.schema.editing import named_by
-from osimlite.schema.tree import Tree, Use
+from osimlite.schema.tree import Tree, Use, is_a
 
 
 class Target(NamedTuple):
@@ -217,7 +217,7 @@ class Analysis:
             # A study may hold its model itself.
             return self._target(setup.model_file or setup.tool[0], found)
         named = ((file, item) for file, top in setup.added for item in top.walk() if item.name == text)
-        return next((Target(*one, number=one[1]._index) for one in named if is_of(one[1], use.reference.target)), None)
+        return next((Target(*one, number=one[1]._index) for one in named if is_a(one[1], use.reference.target)), None)
 
     def _target(self, file: str, item: Component) -> Target:
         tree = self.tree

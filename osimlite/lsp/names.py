@@ -25,7 +25,8 @@ _NAMED_AFTER = {
     "MarkerWeight": Reference("marker-name", "Marker"),
 }
 """What objects of a class are called after, although nothing says that they must be."""
-_SUFFIXES = {"Model": (".osim",), "marker data": (".trc", ".sto"), "table": (".sto", ".mot")}
+_TABLE = (".sto", ".mot")
+_SUFFIXES = {"Model": (".osim",), "marker data": (".trc", ".sto"), "table": _TABLE, "motion": _TABLE}
 """How files of a content are called; others are documents."""
 
 

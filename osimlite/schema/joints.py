@@ -27,6 +27,8 @@ class Joint(ModelComponent, abstract=True):
 
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
     """The motion of each coordinate in order, or None if the joint's own properties decide it."""
+    speeds_are_rates: ClassVar[bool] = True
+    """Whether its speeds are the rates of its coordinates; otherwise those of its rotations are an angular velocity."""
 
     socket_parent_frame: PhysicalFrameSocket = ""
     """The frame F in which the joint measures its motion, most often an offset frame of the joint."""
@@ -135,6 +137,7 @@ class BallJoint(Joint):
     """Body-fixed rotations about X, Y, Z; the generalized speeds are the angular velocity of M in F, along F."""
 
     motion_types = ("rotational", "rotational", "rotational")
+    speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(3)
 
@@ -143,6 +146,7 @@ class FreeJoint(Joint):
     """Six degrees of freedom: rx, ry, rz as a BallJoint, then tx, ty, tz along the parent's axes."""
 
     motion_types = ("rotational", "rotational", "rotational", "translational", "translational", "translational")
+    speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(6)
 
@@ -151,6 +155,7 @@ class EllipsoidJoint(Joint):
     """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
 
     motion_types = ("rotational", "rotational", "rotational")
+    speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(3)
     radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
@@ -163,6 +168,7 @@ class ScapulothoracicJoint(Joint):
     """A shoulder blade that glides on an ellipsoid: abduction, elevation, upward rotation, winging."""
 
     motion_types = ("rotational", "rotational", "rotational", "rotational")
+    speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(4)
     thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)

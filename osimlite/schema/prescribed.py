@@ -1,16 +1,12 @@
 """Forces known beforehand: as functions of time, or as columns of a data file."""
 
+from typing import Annotated
+
 from osimlite.schema.base import made, none
 from osimlite.schema.fields import Flag, LegacyMany, Single
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import (
-    ExpressedInFrame,
-    FrameName,
-    LegacyInputTable,
-    MaybeColumnName,
-    PhysicalFrameSocket,
-)
+from osimlite.schema.references import ExpressedInFrame, FrameName, MaybeColumnName, PhysicalFrameSocket, reads
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup
 
 
@@ -57,5 +53,5 @@ class ExternalLoads(ModelComponentSet):
     """The forces, each with its columns of the file."""
     groups: LegacyMany[ObjectGroup] = none()
     """Named selections of the forces; the mechanics ignore them."""
-    datafile: LegacyInputTable = ""
+    datafile: Annotated[str, reads("table", legacy=True, required=True)] = ""
     """File of the columns (.sto, .mot); it replaces what the forces name as their source."""

@@ -62,14 +62,14 @@ ColumnName = Annotated[str, Reference("column", "column", required=False)]
 MaybeColumnName = Annotated[str | None, Reference("column", "column", "optional", required=False)]
 
 
-def reads(content: str, *, legacy: bool = False) -> Reference:
+def reads(content: str, *, legacy: bool = False, required: bool = False) -> Reference:
     """Marker of a file that a tool reads; `content` is the class of the object in it, or what kind of table it is."""
-    return Reference("file", f"{content} file", required=False, legacy=legacy)
+    return Reference("file", f"{content} file", required=required, legacy=legacy)
 
 
-def writes(content: str, *, legacy: bool = False) -> Reference:
-    """Marker of a file that a tool writes."""
-    return Reference("output-file", f"{content} file", required=False, legacy=legacy)
+def writes(content: str, *, legacy: bool = False, required: bool = False) -> Reference:
+    """Marker of a file that a tool writes; without the name of one that is required its results are lost."""
+    return Reference("output-file", f"{content} file", required=required, legacy=legacy)
 
 
 def several(rule: str, target: str, *words: str, legacy: bool = True, fate: Fate = "refused") -> Reference:
@@ -82,11 +82,12 @@ BodyName = Annotated[Named, Reference("body-name", "Body", required=False, legac
 BodiesOrCenterOfMass = Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")]
 LegacyCoordinateName = Annotated[CoordinateName, LEGACY]
 LegacyJointNames = Annotated[Names, several("joint-name", "Joint", "ALL", fate="left out")]
-InputModel = Annotated[str, reads("Model")]
-LegacyInputModel = Annotated[str, reads("Model", legacy=True)]
+InputModel = Annotated[str, reads("Model", required=True)]
+LegacyInputModel = Annotated[str, reads("Model", legacy=True, required=True)]
 LegacyOutputModel = Annotated[str, writes("Model", legacy=True)]
 InputTable = Annotated[str, reads("table")]
 LegacyInputTable = Annotated[str, reads("table", legacy=True)]
+LegacyInputMotion = Annotated[str, reads("motion", legacy=True, required=True)]
 LegacyInputMarkers = Annotated[str, reads("marker data", legacy=True)]
 LegacyInputLoads = Annotated[str, reads("ExternalLoads", legacy=True)]
 LegacyInputForceSets = Annotated[

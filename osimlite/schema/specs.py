@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.schema.fields import Held, Kind, Legacy, NamesOf, ObjectList, Reference, Tag, Value, class_in
 
@@ -34,6 +34,11 @@ class FieldSpec(NamedTuple):
     def legacy(self) -> bool:
         """Whether the property belongs to OpenSim's first property system."""
         return bool(getattr(self.kind, "legacy", False))
+
+    @property
+    def reference(self) -> Reference:
+        """What it names, of a property that names something."""
+        return cast("Reference", self.kind)
 
 
 @cache
@@ -101,6 +106,12 @@ def lineage(cls: type[Object]) -> tuple[str, ...]:
 def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that name other components."""
     return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Reference))
+
+
+@cache
+def file_specs(cls: type[Object], rule: str) -> tuple[FieldSpec, ...]:
+    """The properties of `cls` that name files by a rule: ``file``, ``output-file`` or ``output-folder``."""
+    return tuple(spec for spec in reference_specs(cls) if spec.reference.rule == rule)
 
 
 @cache

@@ -51,7 +51,7 @@ class Use(NamedTuple):
     @property
     def reference(self) -> Reference:
         """The kind of the reference."""
-        return cast("Reference", self.spec.kind)
+        return self.spec.reference
 
 
 class Tree:
@@ -147,7 +147,7 @@ class Tree:
                 if isinstance(value, tuple):
                     for position, word in enumerate(value):
                         yield Use(holder, owner, spec, word, position)
-                elif value or (value is not None and cast("Reference", spec.kind).required):
+                elif value or (value is not None and spec.reference.required):
                     yield Use(holder, owner, spec, value)
 
     def resolve(self, use: Use) -> Resolution:

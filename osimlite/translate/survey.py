@@ -16,7 +16,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.geometry import FrameGeometry
-from osimlite.schema.joints import BallJoint, EllipsoidJoint, FreeJoint, Joint, ScapulothoracicJoint
+from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.probes import Probe
@@ -30,9 +30,6 @@ COMPUTE = "compute its value by the file of coordinates"
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
 """Components that say nothing of their own: sets, and the axes that a viewer may draw at a frame."""
-
-ANGULAR_SPEEDS = (BallJoint, FreeJoint, EllipsoidJoint, ScapulothoracicJoint)
-"""Joints whose speeds are an angular velocity, not the rates of their coordinates."""
 
 _LOST: tuple[tuple[type[Component], str, str], ...] = (
     (Force, "force", "a force"),
@@ -161,7 +158,7 @@ class _Survey:
                     f"links {' '.join(between)}",
                 )
             moving = {index for part in chain for index in part.coordinates}
-            if isinstance(joint, ANGULAR_SPEEDS) and moving:
+            if moving and not joint.speeds_are_rates:
                 self.note(
                     "ball-joint",
                     path,

@@ -11,7 +11,6 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
-from osimlite.schema.fields import Reference
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import defaults, reference_specs
 from osimlite.schema.tree import Use
@@ -184,9 +183,7 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
 
 
 def _lists_contacts(holder: Object) -> bool:
-    return any(
-        isinstance(s.kind, Reference) and s.kind.target == "ContactGeometry" for s in reference_specs(type(holder))
-    )
+    return any(s.reference.target == "ContactGeometry" for s in reference_specs(type(holder)))
 
 
 def _text(use: Use) -> str:

@@ -9,23 +9,18 @@ from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.posture import angles_of, coordinate_of
-from osimlite.lint.setup import Setup, is_of, members
+from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.fields import Reference, Value
-from osimlite.schema.specs import field_specs, member_specs
+from osimlite.schema.specs import field_specs, file_specs, member_specs
 from osimlite.schema.states import variables
-from osimlite.schema.tree import Tree
+from osimlite.schema.tree import Tree, is_a
 from osimlite.text import listed
 
-_FILES = ("filepath", "marker_file")
-"""Properties that name the table of a goal."""
-_NEEDED = ("reference", "kinematics")
-"""Tables without which there is nothing to follow."""
 _ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
 """What lets a table have columns that nothing follows."""
-_REFUSED_JOINTS = ("FreeJoint", "BallJoint", "EllipsoidJoint", "ScapulothoracicJoint")
 
 
 @rule("OSIM861", "impossible-bounds", severity=ERROR, about="document")
@@ -163,17 +158,17 @@ def study_data(setup: Setup, found: Found) -> None:
     for item in setup.items:
         for spec in member_specs(type(item)) if getattr(item, "enabled", True) else ():
             held = getattr(item, spec.name)
-            tag = next((tag for tag in _FILES if hasattr(held, tag)), "")
+            assert spec.names is not None and spec.accepts is not None
+            tag = next((file.tag for file in file_specs(spec.accepts, "file")), "")
             name = getattr(held, tag, "").strip()
-            if not name and spec.tag in _NEEDED and tag:
+            if not name and spec.names.required and tag:
                 found(f"{called(item)} names no table to follow: OpenSim refuses it", item)
-            assert spec.names is not None
             table = setup.table(name)
             if table is not None and spec.names.target == "state variable":
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
                     found(f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study", held, tag=tag)
-            if table is not None and table.span is not None and is_of(item, "MocoTool"):
+            if table is not None and table.span is not None and is_a(item, "MocoTool"):
                 first, last = table.span
                 for time in ("initial_time", "final_time"):
                     wanted = getattr(item, time)
@@ -225,7 +220,7 @@ def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> l
     tree = setup.tree
     if tree is None or Unknown in tree.by_class or any(setup.named("ModelOperator")):
         return []
-    if any(is_of(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())):
+    if any(is_a(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())):
         return []
     return [column for column in table.columns if tree.lookup(reference, column, tree.model).target is None]
 
@@ -297,7 +292,7 @@ def study_parts(setup: Setup, found: Found) -> None:
     for processor in setup.named("ModelProcessor") if any(map(setup.named, ("MocoStudy", "MocoTool"))) else ():
         for joint in tree.of_class("Joint").values():
             faults = [f"{called(item)} is locked" for item in joint.coordinates if getattr(item, "locked", False)]
-            if type(joint).__name__ in _REFUSED_JOINTS:
+            if not joint.speeds_are_rates:
                 faults.append(f"{called(joint)} has speeds that are not the rates of its coordinates")
             for fault in faults if tree.path_of(joint) not in welded else ():
                 found(f"{fault}: Moco refuses the model", processor, tag="filepath")

@@ -12,7 +12,6 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, closest, nearest_name
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
-from osimlite.schema.fields import Reference
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.specs import reference_specs
@@ -272,8 +271,7 @@ def _uses(subject: Subject) -> Iterator[Use]:
     # An optional reference that OpenSim insists on all the same is not among the uses when it is left out.
     for cls, items in subject.by_class.items():
         for spec in reference_specs(cls):
-            kind = spec.kind
-            if isinstance(kind, Reference) and kind.shape == "optional" and kind.required:
+            if spec.reference.shape == "optional" and spec.reference.required:
                 for item in items:
                     if getattr(item, spec.name) is None:
                         yield Use(item, subject.owner(item), spec, "")

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.setup import Setup, is_of, members
+from osimlite.lint.setup import Setup, content_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import meant, nearest_name
 from osimlite.schema.states import variables
+from osimlite.schema.tree import is_a
 from osimlite.text import listed
 
 
@@ -46,7 +47,7 @@ def missing_column(setup: Setup, found: Found) -> None:
         names = setup.names_of("Coordinate")
         if not names:
             continue
-        plain = is_of(item, "InverseDynamicsTool")
+        plain = is_a(item, "InverseDynamicsTool")
         columns = {
             column if plain or "/" not in column else (parts[-2] if (parts := column.split("/"))[-1] == "value" else "")
             for column in table.columns
@@ -124,8 +125,7 @@ def _lacking_states(setup: Setup, table: Table) -> list[str]:
 
 def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
     """Every tool that is given a motion as coordinates, with the property and the table."""
-    for tag in ("coordinates_file", "desired_kinematics_file"):
-        for item in setup.having(tag):
-            table = setup.table(getattr(item, tag))
-            if table is not None and table.labels and not table.is_markers:
-                yield item, tag, table
+    for item, spec, name, _ in setup.named_files("file"):
+        table = setup.table(name) if content_of(spec) == "motion" else None
+        if table is not None and table.labels and not table.is_markers:
+            yield item, spec.tag, table

@@ -5,26 +5,15 @@ from __future__ import annotations
 import os
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import UNGIVEN, Naming, Setup, is_given, is_of
+from osimlite.lint.setup import UNGIVEN, Naming, Setup, content_of, is_given, motion_of
 from osimlite.lint.suffixes import is_table
 from osimlite.lint.words import called
-from osimlite.schema.base import Object
-from osimlite.schema.fields import Reference
+from osimlite.schema.specs import file_specs
+from osimlite.schema.tree import is_a
 
-_NEEDED = {
-    "InverseKinematicsTool": ("model_file", "marker_file"),
-    "InverseDynamicsTool": ("model_file", "coordinates_file"),
-    "AnalyzeTool": ("model_file",),
-    "ForwardTool": ("model_file",),
-    "IMUInverseKinematicsTool": ("model_file", "orientations_file"),
-    "IMUPlacer": ("model_file", "orientation_file_for_calibration"),
-    "CMCTool": ("model_file", "desired_kinematics_file", "task_set_file"),
-    "RRATool": ("model_file", "desired_kinematics_file", "task_set_file"),
-    "GenericModelMaker": ("model_file",),
-    "ExternalLoads": ("datafile",),
-}
-"""Without which files OpenSim refuses a tool, or crashes."""
-
+_TABLE = (".sto", ".mot", ".trc", ".csv")
+_ENDINGS = {"table": _TABLE, "motion": _TABLE, "marker data": (".trc", ".sto", ".c3d")}
+"""How files of a content are called; others are documents."""
 _SHARED = {
     "external_loads_file": "applies the loads of {}",
     "lowpass_cutoff_frequency_for_coordinates": "filters at {:g} Hz",
@@ -70,7 +59,7 @@ def missing_input(setup: Setup, found: Found) -> None:
         is_meant = slashed != naming.name and os.path.isfile(setup.place(slashed))
         twin = slashed if is_meant else _in_other_case(naming)
         why = "; a backslash separates no folders but on Windows" if "\\" in naming.name else ""
-        goes_on = is_of(naming.item, "ControlSetController")
+        goes_on = is_a(naming.item, "ControlSetController")
         fate = "OpenSim goes on without" if goes_on else "OpenSim refuses the setup"
         found(
             f"the file '{naming.name}' of {called(naming.item)} is not there{why}: {fate}",
@@ -85,16 +74,16 @@ def missing_input(setup: Setup, found: Found) -> None:
                 maker, tag="marker_set_file", suggestion="Unassigned",
             )  # fmt: skip
     for item in setup.items:
-        for tag in _NEEDED.get(type(item).__name__, ()):
-            if not is_given(getattr(item, tag)):
-                found(f"{called(item)} names no {tag}: {UNGIVEN}", item, tag=tag, severity=WARNING)
+        for spec in file_specs(type(item), "file"):
+            if spec.reference.required and not is_given(getattr(item, spec.name)):
+                found(f"{called(item)} names no {spec.tag}: {UNGIVEN}", item, tag=spec.tag, severity=WARNING)
         if (
-            is_of(item, "MocoPhase")
+            is_a(item, "MocoPhase")
             and item is not setup.top
             and not (item.model.filepath or getattr(item.model.model, "_index", None))
         ):
             found(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
-        if is_of(item, "AnalyzeTool"):
+        if is_a(item, "AnalyzeTool"):
             given = [tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))]
             if len(given) != 1:
                 what = "both a states_file and a coordinates_file" if given else "neither states nor coordinates"
@@ -140,23 +129,21 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
     ```
     """
     for naming in setup.named_files("file"):
-        assert isinstance(naming.spec.kind, Reference)
         if not os.path.isfile(naming.path):
             continue
-        wanted, _, either = naming.spec.kind.target.removesuffix(" file").partition(" or ")
+        wanted, _, either = content_of(naming.spec).partition(" or ")
         if either == "table" and is_table(naming.name):
             continue
-        endings = {"table": (".sto", ".mot", ".trc", ".csv"), "marker data": (".trc", ".sto", ".c3d")}.get(wanted)
-        if endings is not None:
-            if not naming.name.lower().endswith(endings):
+        if wanted in _ENDINGS:
+            if not naming.name.lower().endswith(_ENDINGS[wanted]):
                 found(
-                    f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(endings)})",
+                    f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(_ENDINGS[wanted])})",
                     naming.item, tag=naming.spec.tag,
                 )  # fmt: skip
         elif wanted[:1].isupper():
             top = None if is_table(naming.name) else setup.document(naming.name)
             held = "a table" if top is None else f"a {type(top).__name__}"
-            if is_table(naming.name) or (top is not None and not is_of(top, wanted)):
+            if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
                 found(
                     f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds {held}",
                     naming.item, tag=naming.spec.tag,
@@ -210,7 +197,7 @@ def lost_output(setup: Setup, found: Found) -> None:
     made = {os.path.normpath(naming.name) for naming in setup.named_files("output-folder")}
     for naming in setup.named_files("output-file"):
         folder = os.path.dirname(naming.name)
-        if is_of(naming.item, "InverseDynamicsTool"):
+        if is_a(naming.item, "InverseDynamicsTool"):
             if folder:
                 found(
                     f"OpenSim leaves the folder of '{naming.name}' out and writes into results_directory",
@@ -230,11 +217,9 @@ def lost_output(setup: Setup, found: Found) -> None:
                 tag="output_motion_file", severity=INFO, suggestion=f"{folder}/{name}",
             )  # fmt: skip
     for item in setup.items:
-        tag = {"InverseKinematicsTool": "output_motion_file", "InverseDynamicsTool": "output_gen_force_file"}.get(
-            type(item).__name__
-        )
-        if tag is not None and not getattr(item, tag).strip():
-            found(f"{called(item)} names no {tag}: its results get no proper file", item, tag=tag)
+        for spec in file_specs(type(item), "output-file"):
+            if spec.reference.required and not getattr(item, spec.name).strip():
+                found(f"{called(item)} names no {spec.tag}: its results get no proper file", item, tag=spec.tag)
 
 
 @rule("OSIM824", "tools-differ", severity=INFO, about="document")
@@ -284,12 +269,6 @@ def tools_differ(setup: Setup, found: Found) -> None:
                     f"'{os.path.basename(file)}' {what.format(two)} for the same motion, this tool does not",
                     setup.top, tag=tag,
                 )  # fmt: skip
-
-
-def motion_of(file: str, tool: Object) -> str:
-    """Where the coordinates are that a tool is given."""
-    name = getattr(tool, "coordinates_file", getattr(tool, "desired_kinematics_file", "")).strip()
-    return os.path.realpath(os.path.join(os.path.dirname(file), name)) if is_given(name) else ""
 
 
 def _says(value: str | float) -> bool:

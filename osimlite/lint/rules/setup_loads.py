@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.placement import Pose, Vector, dot
 from osimlite.lint.posture import poses_in
-from osimlite.lint.rules.setup_files import motion_of
-from osimlite.lint.setup import Setup, members
+from osimlite.lint.setup import Setup, members, motion_of
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
 from osimlite.text import listed

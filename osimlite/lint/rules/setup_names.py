@@ -6,13 +6,13 @@ from functools import cache
 from typing import Any
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.setup import Setup, is_of
+from osimlite.lint.setup import Setup
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Reference
 from osimlite.schema.specs import reference_specs
 from osimlite.schema.states import variables
-from osimlite.schema.tree import Tree, Use
+from osimlite.schema.tree import Tree, Use, is_a
 from osimlite.text import listed
 
 _KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
@@ -69,11 +69,11 @@ def unknown_name(setup: Setup, found: Found) -> None:
 
     for cls, items in setup.by_class.items():
         for spec in reference_specs(cls):
-            assert isinstance(spec.kind, Reference)
-            what = _what(spec.kind) if spec.kind.required else None
-            for item in items if what and spec.kind.shape != "list" else ():
+            kind = spec.reference
+            what = _what(kind) if kind.required and kind.shape != "list" else None
+            for item in items if what else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
-                    fate, severity = _FATES[spec.kind.fate]
+                    fate, severity = _FATES[kind.fate]
                     found(f"{called(item)} names no {what}: {fate}", item, tag=spec.tag, severity=severity)
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
 
@@ -102,7 +102,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
             f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}", item, **where,
             severity=severity, suggestion="all" if more else nearest_name(text, sorted(names)),
         )  # fmt: skip
-    if setup.tool is not None and is_of(setup.tool[1], "AbstractTool"):
+    if setup.tool is not None and is_a(setup.tool[1], "AbstractTool"):
         _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, found)
 
 
@@ -115,10 +115,10 @@ def _what(kind: Reference) -> str | None:
 def _looked_up(tree: Tree, use: Use, text: str) -> tuple[str | None, str, Component | None]:
     """What a text should name, if that is in the model, the text as it is looked up, and what it leads to."""
     item, kind, what = use.holder, use.reference, _what(use.reference)
-    if kind.rule == "socket" and is_of(item, "Controller"):
+    if kind.rule == "socket" and is_a(item, "Controller"):
         return "actuator", text.rpartition("/")[2], None
     if kind.rule == "socket" and kind.target.endswith("Frame"):
-        place = next((f"{path}/{item.name}" for cls, path in _PLACES.items() if is_of(item, cls)), "")
+        place = next((f"{path}/{item.name}" for cls, path in _PLACES.items() if is_a(item, cls)), "")
         what = "component" if place or text.startswith("/") else None
         return what, text, tree.walk(text, place, kind.target).target
     if kind.rule == "state-path" and kind.target == "output" and not text.startswith("/"):
@@ -201,7 +201,7 @@ def excluded_force(setup: Setup, found: Found) -> None:
     groups = [group.name for group in forces.groups]
     names = [force.name for force in forces.objects]
     for tool in setup.named("InverseDynamicsTool"):
-        if not tool.forces_to_exclude and any(is_of(force, "Muscle") for force in forces.objects):
+        if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
             found(f"{called(tool)} leaves out no force: muscles take part", tool, tag="forces_to_exclude")
     for use in setup.uses:
         word, words = str(use.value), use.reference.words

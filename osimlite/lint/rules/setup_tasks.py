@@ -8,8 +8,9 @@ from typing import Any
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.posture import angles_of
-from osimlite.lint.setup import Setup, is_of, members
+from osimlite.lint.setup import Setup, members
 from osimlite.lint.words import called
+from osimlite.schema.tree import is_a
 from osimlite.text import listed
 
 
@@ -59,7 +60,7 @@ def task_weight(setup: Setup, found: Found) -> None:
                 found(
                     f"{called(task)} {what}: it is not tracked", task, tag="weight", severity=INFO if given else WARNING
                 )
-            if is_of(task, "IKCoordinateTask") and task.value_type == "manual_value" and abs(task.value) > 6.3:
+            if is_a(task, "IKCoordinateTask") and task.value_type == "manual_value" and abs(task.value) > 6.3:
                 found(
                     f"the value of {called(task)} is {task.value:g}, and is in radians or metres", task, tag="value",
                     severity=WARNING,
@@ -126,7 +127,7 @@ def unreachable_task(setup: Setup, found: Found) -> None:
             given[column] = [row[place] * turn for row in rows if place < len(row) and row[place] == row[place]]
         for task in user.ik_task_set.objects:
             coordinate = coordinates.get(task.name)
-            if coordinate is None or not is_of(task, "IKCoordinateTask") or not task.apply:
+            if coordinate is None or not is_a(task, "IKCoordinateTask") or not task.apply:
                 continue
             values = {"manual_value": [task.value], "from_file": given.pop(task.name, [])}.get(task.value_type, [])
             low, high = coordinate.range

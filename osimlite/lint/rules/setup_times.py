@@ -10,11 +10,12 @@ from typing import Any
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
-from osimlite.lint.setup import Setup, is_given, is_of, members
+from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.specs import field_specs
+from osimlite.schema.tree import is_a
 from osimlite.tables import MarkerHeader
 
 _FIRST_STATES = 0.03
@@ -70,14 +71,14 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     for item, tags, first, last in _ranges(setup):
         if any(number != number for number in (first, last)):
             fate, severity = (
-                ("takes all times", WARNING) if is_of(item, "IMUInverseKinematicsTool") else ("refuses it", ERROR)
+                ("takes all times", WARNING) if is_a(item, "IMUInverseKinematicsTool") else ("refuses it", ERROR)
             )
             tag = tags[0] if first != first else tags[-1]
             found(f"a time of {called(item)} is no number: OpenSim {fate}", item, tag=tag, severity=severity)
             continue
-        if first > last or (first == last and is_of(item, "AbstractTool") and not is_of(item, "AnalyzeTool")):
+        if first > last or (first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")):
             # Nobody knows which of the two is wrong.
-            fate, severity = ("goes by the tool's times", WARNING) if is_of(item, "Analysis") else ("fails", ERROR)
+            fate, severity = ("goes by the tool's times", WARNING) if is_a(item, "Analysis") else ("fails", ERROR)
             for tag in tags:
                 found(
                     f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim {fate}",
@@ -133,7 +134,7 @@ def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, floa
 def _data_of(item: Any) -> Iterator[tuple[str, str]]:
     """The tables that a tool reads over its times, with what happens where they end."""
     for tag in ("marker_file", "coordinates_file", "desired_kinematics_file", "coordinate_file", "orientations_file"):
-        if is_of(item, "ForwardTool") or (tag == "coordinate_file" and is_of(item, "MarkerPlacer")):
+        if is_a(item, "ForwardTool") or (tag == "coordinate_file" and is_a(item, "MarkerPlacer")):
             continue
         yield (
             getattr(item, tag, ""),

@@ -9,8 +9,9 @@ from typing import Any
 
 from osimlite.lint.diagnostic import Severity
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import UNGIVEN, Setup, is_given, is_of, members
+from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
+from osimlite.schema.tree import is_a
 from osimlite.text import listed
 
 _SETTINGS: tuple[tuple[str, str, Callable[[Any], bool], str, Severity], ...] = (
@@ -74,32 +75,32 @@ def tool_setting(setup: Setup, found: Found) -> None:
             if is_wrong(value):
                 found(told.format(value), item, tag=tag, severity=severity)
     for tool in setup.named("AbstractTool"):
-        if not (tool.integrator_error_tolerance > 0.0 or is_of(tool, "AnalyzeTool")):
+        if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
             found(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
-                tool, tag="integrator_error_tolerance", severity=None if is_of(tool, "ForwardTool") else WARNING,
+                tool, tag="integrator_error_tolerance", severity=None if is_a(tool, "ForwardTool") else WARNING,
             )  # fmt: skip
-        if is_of(tool, "RRATool") and not tool.force_set_files:
+        if is_a(tool, "RRATool") and not tool.force_set_files:
             found(
                 f"{called(tool)} is given no forces that it could control: OpenSim fails", tool, tag="force_set_files"
             )
-        if tool.replace_force_set and not is_of(tool, "RRATool"):
+        if tool.replace_force_set and not is_a(tool, "RRATool"):
             found(
                 "the forces of force_set_files replace those of the model: its muscles are gone",
                 tool, tag="replace_force_set", severity=WARNING,
             )  # fmt: skip
-        if is_of(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
+        if is_a(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
             found(
                 "the muscles of the model are left in it, and OpenSim crashes: the forces of force_set_files are to "
                 "replace them",
                 tool, tag="replace_force_set",
             )  # fmt: skip
-        if is_of(tool, "RRATool") and tool.adjust_com_to_reduce_residuals and not str(tool.adjusted_com_body).strip():
+        if is_a(tool, "RRATool") and tool.adjust_com_to_reduce_residuals and not str(tool.adjusted_com_body).strip():
             found(
                 f"{called(tool)} is to move a center of mass, and adjusted_com_body names no body: OpenSim refuses it",
                 tool, tag="adjusted_com_body",
             )  # fmt: skip
-        if is_of(tool, "AnalyzeTool") and not tool.analysis_set.objects:
+        if is_a(tool, "AnalyzeTool") and not tool.analysis_set.objects:
             found(f"{called(tool)} has no analysis: OpenSim refuses it", tool)
     names = Counter(item.name for item in setup.named("Analysis"))
     for analysis in setup.named("Analysis"):
@@ -111,7 +112,7 @@ def tool_setting(setup: Setup, found: Found) -> None:
                 f"two analyses are called '{analysis.name}', and write to the same files", analysis, attribute="name",
                 severity=WARNING,
             )  # fmt: skip
-        if is_of(analysis, "StaticOptimization"):
+        if is_a(analysis, "StaticOptimization"):
             carrying = _carried_by_none(setup)
             if carrying:
                 found(
@@ -121,7 +122,7 @@ def tool_setting(setup: Setup, found: Found) -> None:
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
                 found(f"{called(analysis)} names no {what}: nothing is written", analysis, tag=tag, severity=WARNING)
-        if is_of(analysis, "MuscleAnalysis") and analysis.on:
+        if is_a(analysis, "MuscleAnalysis") and analysis.on:
             for tool in setup.named("AnalyzeTool"):
                 if is_given(tool.coordinates_file) and not tool.solve_for_equilibrium_for_auxiliary_states:
                     found(
@@ -129,9 +130,9 @@ def tool_setting(setup: Setup, found: Found) -> None:
                         "solve_for_equilibrium_for_auxiliary_states is false",
                         tool, tag="solve_for_equilibrium_for_auxiliary_states", severity=WARNING,
                     )  # fmt: skip
-        if is_of(analysis, "MuscleAnalysis") and not analysis.moment_arm_coordinate_list:
+        if is_a(analysis, "MuscleAnalysis") and not analysis.moment_arm_coordinate_list:
             found("no coordinate for moment arms: OpenSim fails", analysis, tag="moment_arm_coordinate_list")
-        if is_of(analysis, "JointReaction"):
+        if is_a(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
                 if word not in ("child", "parent"):
                     found(
@@ -168,11 +169,11 @@ def _carried_by_none(setup: Setup) -> list[str]:
     files = setup.having("force_set_files")
     if any(len(tool.force_set_files) > len(setup.added) for tool in files):
         return []
-    added = [force for _, top in setup.added for force in top.walk() if is_of(force, "Actuator")]
-    if any(not is_of(force, "PathActuator") for force in (*setup.tree.of_class("Actuator").values(), *added)):
+    added = [force for _, top in setup.added for force in top.walk() if is_a(force, "Actuator")]
+    if any(not is_a(force, "PathActuator") for force in (*setup.tree.of_class("Actuator").values(), *added)):
         return []
     parts: list[Any] = setup.tree.components
-    if any(is_of(part, "AbstractPathPoint") and str(part.socket_parent_frame) == "/ground" for part in parts):
+    if any(is_a(part, "AbstractPathPoint") and str(part.socket_parent_frame) == "/ground" for part in parts):
         return []
     joints: Any = setup.tree.of_class("Joint").values()
     on_ground = (joint for joint in joints if str(joint.socket_parent_frame).rpartition("/")[2].startswith("ground"))

@@ -22,9 +22,10 @@ from osimlite.schema.sets import ObjectGroup
 Bounds = Annotated[Reals, reals(most=2)]
 Strings = Annotated[tuple[str, ...], Value("string", "list")]
 OfStates = NamesOf(Reference("state-path", "state variable"))
+MaybeOfStates = NamesOf(Reference("state-path", "state variable", required=False))
 OfControls = NamesOf(Reference("state-path", "control"))
 OfFrames = NamesOf(Reference("model-path", "Frame", fate="left out"))
-OfMarkers = NamesOf(Reference("marker-name", "Marker", fate="left out"))
+OfMarkers = NamesOf(Reference("marker-name", "Marker", required=False, fate="left out"))
 OfOutputs = NamesOf(Reference("state-path", "output"))
 OfForces = NamesOf(Reference("state-path", "generalized force"))
 PatternOfStates = NamesOf(Reference("pattern", "state variable", fate="left out"))

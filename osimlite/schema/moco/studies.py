@@ -23,6 +23,7 @@ from osimlite.schema.moco.goals import MocoGoal
 from osimlite.schema.moco.parts import (
     ControlWeights,
     MarkerWeights,
+    MaybeOfStates,
     MocoBounds,
     MocoFinalBounds,
     MocoInitialBounds,
@@ -245,7 +246,7 @@ class MocoInverse(MocoTool):
 class MocoTrack(MocoTool):
     """Finds a motion that follows measured states or markers."""
 
-    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
     """How much deviations of states count."""

@@ -21,6 +21,7 @@ from osimlite.schema.moco.goals import ContactForcePaths, FramePaths, MocoGoal
 from osimlite.schema.moco.parts import (
     ControlWeights,
     FrameWeights,
+    MaybeOfStates,
     MocoWeightSet,
     OfControls,
     OfForces,
@@ -91,7 +92,7 @@ class MocoMarkerTrackingGoal(MocoGoal):
 class MocoTranslationTrackingGoal(MocoGoal):
     """Origins of frames follow given places."""
 
-    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
     """A motion of the model, from which the places are computed."""
     translation_reference_file: InputTable = ""
     """The places themselves, a column of vectors for each frame by its path."""
@@ -104,7 +105,7 @@ class MocoTranslationTrackingGoal(MocoGoal):
 class MocoOrientationTrackingGoal(MocoGoal):
     """Frames follow given orientations."""
 
-    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
     """A motion of the model, from which the orientations are computed."""
     rotation_reference_file: InputTable = ""
     """The orientations themselves, a column of quaternions for each frame by its path."""
@@ -117,7 +118,7 @@ class MocoOrientationTrackingGoal(MocoGoal):
 class MocoAngularVelocityTrackingGoal(MocoGoal):
     """Frames follow given angular velocities."""
 
-    states_reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
     """A motion of the model, from which the angular velocities are computed."""
     angular_velocity_reference_file: InputTable = ""
     """The angular velocities themselves, a column of vectors for each frame by its path."""

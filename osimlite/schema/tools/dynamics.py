@@ -8,12 +8,15 @@ from osimlite.schema.fields import LegacyFlag, LegacyInteger, LegacyNumber, Lega
 from osimlite.schema.references import (
     LegacyInputLoads,
     LegacyInputModel,
+    LegacyInputMotion,
     LegacyInputTable,
     LegacyJointNames,
     LegacyOutputFolder,
     LegacyOutputTable,
     Names,
+    reads,
     several,
+    writes,
 )
 from osimlite.schema.tools.analyses import AnalysisSet
 from osimlite.schema.tools.inverse_kinematics import Tool
@@ -37,11 +40,11 @@ class DynamicsTool(Tool, abstract=True):
 class InverseDynamicsTool(DynamicsTool):
     """Computes the generalized forces that a measured motion takes."""
 
-    coordinates_file: LegacyInputTable = "Unassigned"
+    coordinates_file: LegacyInputMotion = "Unassigned"
     """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
     lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the coordinates; negative for no filter."""
-    output_gen_force_file: LegacyOutputTable = "inverse_dynamics.sto"
+    output_gen_force_file: Annotated[str, writes("table", legacy=True, required=True)] = "inverse_dynamics.sto"
     """File for the generalized forces, in `results_directory`."""
     joints_to_report_body_forces: LegacyJointNames = ()
     """Joints whose generalized forces are also written as forces and torques on bodies, or ALL."""
@@ -91,7 +94,7 @@ class AnalyzeTool(AbstractTool):
 
     states_file: LegacyInputTable = ""
     """The motion, as states."""
-    coordinates_file: LegacyInputTable = ""
+    coordinates_file: Annotated[str, reads("motion", legacy=True)] = ""
     """The motion, as coordinates, if there is no `states_file`."""
     speeds_file: LegacyInputTable = ""
     """Generalized speeds; without it they are the derivatives of the coordinates."""

@@ -18,7 +18,7 @@ from osimlite.schema.fields import (
     vec3,
     word,
 )
-from osimlite.schema.references import InputModel, InputTable, OutputFolder, OutputTable, reads
+from osimlite.schema.references import InputModel, InputTable, OutputFolder, OutputTable, reads, writes
 from osimlite.schema.sets import ObjectGroup
 
 
@@ -86,10 +86,11 @@ class InverseKinematicsTool(InverseKinematicsToolBase):
 
     ik_task_set: Unnamed[IKTaskSet] = made(IKTaskSet)
     """The markers and coordinates with their weights; if none applies, all markers count the same."""
-    marker_file: Annotated[str, reads("marker data")] = ""
+    marker_file: Annotated[str, reads("marker data", required=True)] = ""
     """Measured markers (.trc, .sto)."""
     coordinate_file: InputTable = ""
     """Values of coordinates for tasks whose `value_type` is from_file; always read in degrees."""
+    output_motion_file: Annotated[str, writes("table", required=True)] = ""
     report_marker_locations: Flag = False
     """Whether the markers of the model are written for every frame."""
 
@@ -115,7 +116,7 @@ class IMUInverseKinematicsTool(InverseKinematicsToolBase):
 
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
-    orientations_file: InputTable = ""
+    orientations_file: Annotated[str, reads("table", required=True)] = ""
     """Measured orientations, a column of quaternions for each sensor (.sto)."""
     orientation_weights: Single[OrientationWeightSet] = made(OrientationWeightSet, name="orientation_weights")
     """How much each sensor counts."""

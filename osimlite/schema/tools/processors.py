@@ -6,7 +6,7 @@ from osimlite.schema.base import Object, none
 from osimlite.schema.fields import Flag, LegacyMany, Many, Number, Optional, Reference, maybe, real, word
 from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
-from osimlite.schema.references import InputModel, InputTable, Names, reads
+from osimlite.schema.references import InputTable, Names, reads
 from osimlite.schema.sets import ObjectGroup
 
 
@@ -17,7 +17,7 @@ class ModelOperator(Object, abstract=True):
 class ModelProcessor(Object):
     """A model and what is done to it before it is used."""
 
-    filepath: InputModel = ""
+    filepath: Annotated[str, reads("Model")] = ""
     """File of the model, found from the folder that OpenSim runs in."""
     operators: Many[ModelOperator] = none()
     """What is done, in this order."""

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from osimlite.schema.base import Object, none
 from osimlite.schema.fields import Many, Reference, Text, Vec3, real, vec3, word
-from osimlite.schema.references import InputModel, InputTable, writes
+from osimlite.schema.references import InputModel, reads, writes
 
 
 class IMUPlacer(Object):
@@ -18,7 +18,7 @@ class IMUPlacer(Object):
     """Axis of that sensor that points forwards."""
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
-    orientation_file_for_calibration: InputTable = ""
+    orientation_file_for_calibration: Annotated[str, reads("table", required=True)] = ""
     """Measured orientations, of which the first row counts (.sto)."""
     output_model_file: Annotated[str, writes("Model")] = ""
     """File for the model with its sensors."""

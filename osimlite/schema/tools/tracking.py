@@ -20,6 +20,7 @@ from osimlite.schema.fields import (
 from osimlite.schema.references import (
     BodyName,
     LegacyCoordinateName,
+    LegacyInputMotion,
     LegacyInputTable,
     LegacyOutputModel,
     Named,
@@ -31,7 +32,7 @@ from osimlite.schema.sets import ObjectGroup
 from osimlite.schema.tools.dynamics import AbstractTool
 
 _Direction = Annotated[Reals, reals(least=3, most=3, legacy=True)]
-_TaskSetFile = Annotated[str, reads("CMC_TaskSet", legacy=True)]
+_TaskSetFile = Annotated[str, reads("CMC_TaskSet", legacy=True, required=True)]
 _ControlSetFile = Annotated[str, reads("ControlSet", legacy=True)]
 _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
 
@@ -123,7 +124,7 @@ class CMCTool(AbstractTool):
     """Actuators and groups of them that are not controlled."""
     desired_points_file: LegacyInputTable = ""
     """Measured points that tasks follow."""
-    desired_kinematics_file: LegacyInputTable = ""
+    desired_kinematics_file: LegacyInputMotion = ""
     """The measured motion."""
     task_set_file: _TaskSetFile = ""
     """What is followed, and how closely."""
@@ -156,7 +157,7 @@ class RRATool(AbstractTool):
 
     desired_points_file: LegacyInputTable = ""
     """Measured points that tasks follow."""
-    desired_kinematics_file: LegacyInputTable = ""
+    desired_kinematics_file: LegacyInputMotion = ""
     """The measured motion."""
     task_set_file: _TaskSetFile = ""
     """What is followed, and how closely."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from osimlite.multibody.functions import Linear
 from osimlite.robot.drivers import Composed
+from osimlite.schema.joints import Joint
 from osimlite.translate.mjcf.draft import Draft, Follower
-from osimlite.translate.survey import ANGULAR_SPEEDS
 
 
 def add_coordinates(draft: Draft) -> None:
@@ -42,7 +42,7 @@ def add_coordinates(draft: Draft) -> None:
                     f"equality {lead.joint}",
                 )
     for joint in draft.tree.components:
-        if isinstance(joint, ANGULAR_SPEEDS):
+        if isinstance(joint, Joint) and not joint.speeds_are_rates:
             note(
                 "speeds",
                 draft.tree.path_of(joint) or "",
