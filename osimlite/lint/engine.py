@@ -49,6 +49,7 @@ _MODULES = (
     "text",
     "markup",
     "structure",
+    "classes",
     "leftovers",
     "versions",
     "values",

@@ -6,9 +6,8 @@ import re
 from pathlib import Path
 
 from osimlite.document.source import Source
-from osimlite.schema.model import Model
+from osimlite.lint.rules.classes import set_for
 from osimlite.schema.registry import class_for
-from osimlite.schema.specs import field_specs
 
 SKELETON = Path(__file__).resolve().parents[2] / "fixtures" / "lint" / "skeleton.osim"
 
@@ -43,7 +42,7 @@ def _placed(text: str, tag: str, name: str | None, element: str) -> str:
     for child in source.children(model):
         if source.spans[child].tag == tag:
             return _replaced(text, source, child, element)
-    holder = _set_for(tag)
+    holder = set_for(class_for(tag))
     if holder is None:
         return _at_the_end(text, element)
     number = source.child(model, holder)
@@ -57,16 +56,6 @@ def _placed(text: str, tag: str, name: str | None, element: str) -> str:
             return _replaced(text, source, member, element)
     place = source.spans[members].inner_end
     return text[:place] + element + "\n" + text[place:]
-
-
-def _set_for(tag: str) -> str | None:
-    cls = class_for(tag)
-    for spec in field_specs(Model).values():
-        members = field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
-        taken = members.accepts if members is not None and spec.tag != "ComponentSet" else None
-        if cls is not None and taken is not None and issubclass(cls, taken):
-            return spec.tag
-    return None
 
 
 def _replaced(text: str, source: Source, number: int, element: str) -> str:

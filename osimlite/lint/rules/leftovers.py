@@ -8,14 +8,13 @@ from math import isfinite
 
 from osimlite.document.lexical import ABSENT, Unclean, converter
 from osimlite.document.names import ATTRIBUTE
-from osimlite.document.notes import Note
 from osimlite.document.source import Source
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.schema.base import Component, Object
+from osimlite.schema.base import Component
 from osimlite.schema.fields import Value
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import field_specs
@@ -44,7 +43,7 @@ def unknown_attribute(subject: Subject, found: Found) -> None:
     <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
     ```
     """
-    for note, owner in _of_kind(subject, "unknown-attribute"):
+    for note, owner in subject.notes_of("unknown-attribute"):
         message = f"OpenSim ignores the attribute '{note.word}' of {called(owner)}"
         if note.word in field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
@@ -335,7 +334,3 @@ _KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-n
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
 _AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
 _BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")
-
-
-def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:
-    return [(note, note.owner) for note in subject.notes if note.kind == kind and note.owner is not None]

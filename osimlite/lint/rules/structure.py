@@ -1,15 +1,15 @@
-"""OSIM1xx: elements and attributes that OpenSim passes over, or that stand in the wrong place."""
+"""OSIM101, OSIM104 and OSIM107: elements that are no properties, that stand twice, or in a value."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 from osimlite.document.lexical import reads_as
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.fixes import renamed, replaced, without_element
+from osimlite.lint.fixes import renamed, without_element
 from osimlite.lint.old_tags import Successor, successor
+from osimlite.lint.rules.classes import part_for, set_for, wrapper_for
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, shown
 from osimlite.schema.base import Object
@@ -44,8 +44,8 @@ def unknown_tag(subject: Subject, found: Found) -> None:
     <Body name="thigh"> <mass>8</mass> <mass_center>0 -0.2 0</mass_center> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    for note, owner in _of_kind(subject, "unknown-tag"):
-        if _other_rule(note, owner):
+    for note, owner in subject.notes_of("unknown-tag"):
+        if wrapper_for(note, owner) is not None or part_for(note, owner) is not None:
             continue
         specs = field_specs(type(owner))
         old = successor(type(owner), note.word)
@@ -59,7 +59,7 @@ def unknown_tag(subject: Subject, found: Found) -> None:
             message += f" and keeps the default of {suggestion}{kept}" if suggestion not in _present(owner) else ""
         elif note.value is not None:
             message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
-            home = _set_for(note.value)
+            home = set_for(note.value)
             message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
         else:
             homes = _homes(note.word, type(owner))
@@ -120,82 +120,6 @@ def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: 
     )
 
 
-@rule("OSIM102", "unknown-class", severity=ERROR, mends="both")
-def unknown_class(subject: Subject, found: Found) -> None:
-    """An object is of a class that OpenSim does not have.
-
-    ## What it does
-    Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the wrong case, or of a
-    plug-in. Names the nearest class that may stand there.
-
-    ## Why is this bad
-    In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the object out. Of a
-    plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same. With the file
-    that the setting `classes` names, osimlite knows the classes of a plug-in as well.
-
-    ## Example
-    ```xml
-    <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
-    ```
-    """
-    for note, owner in _of_kind(subject, "unknown-class"):
-        fate = _fate(subject, note)
-        accepted = _acceptable(note.spec)
-        suggestion = nearest(note.word, accepted) or nearest(note.word, tags(), cutoff=80)
-        message = f"OpenSim has no class '{note.word}' and {fate}"
-        if suggestion is None:
-            message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
-        same = suggestion is not None and suggestion.lower() == note.word.lower()
-        fix = renamed(subject.source, note.number, suggestion, safe=same)
-        found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
-
-
-@rule("OSIM103", "wrong-class", severity=ERROR)
-def wrong_class(subject: Subject, found: Found) -> None:
-    """An object of a known class stands where that class may not stand.
-
-    ## What it does
-    Reports members of a set, or of another property, that are of a class the property does not take.
-
-    ## Why is this bad
-    In a set OpenSim refuses to load the file; elsewhere it leaves the object out.
-
-    ## Example
-    ```xml
-    <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
-    ```
-    """
-    for note, owner in _of_kind(subject, "wrong-class"):
-        assert note.spec is not None and note.spec.accepts is not None
-        kinds = note.spec.accepts.__name__
-        home = _set_for(note.value)
-        where = f"; it belongs in the {home}" if home else ""
-        holder = f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
-        found(
-            f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(subject, note)}{where}",
-            owner,
-            number=note.number,
-        )
-
-
 @rule("OSIM104", "duplicate-tag", severity=ERROR, mends="safe")
 def duplicate_tag(subject: Subject, found: Found) -> None:
     """A property is given twice.
@@ -217,7 +141,7 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
     <Body name="thigh"> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    for note, owner in _of_kind(subject, "duplicate-tag"):
+    for note, owner in subject.notes_of("duplicate-tag"):
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
         taken = "" if isinstance(note.spec.kind, Held) else f", {shown(value)},"
@@ -260,7 +184,7 @@ def element_in_value(subject: Subject, found: Found) -> None:
     <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    for note, owner in _of_kind(subject, "child-in-value"):
+    for note, owner in subject.notes_of("child-in-value"):
         assert note.spec is not None
         if note.word == "!--":
             found(
@@ -282,123 +206,8 @@ def element_in_value(subject: Subject, found: Found) -> None:
                 found("a CDATA section is only a part of this value: OpenSim refuses the file", at=place)
 
 
-@rule("OSIM108", "wrong-part-name", severity=ERROR, mends="unsafe")
-def wrong_part_name(subject: Subject, found: Found) -> None:
-    """A part of an object has a name other than that of its property.
-
-    ## What it does
-    Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it by its name.
-
-    ## Why is this bad
-    OpenSim does not take the object and goes on with the default: everything inside is lost.
-
-    ## Example
-    ```xml
-    <Body name="thigh">
-        <FrameGeometry name="axes"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
-        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh">
-        <FrameGeometry name="frame_geometry"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
-        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
-    ```
-    """
-    for note, owner in _of_kind(subject, "unknown-tag"):
-        spec = _part_for(note, owner)
-        if spec is not None:
-            assert subject.source is not None
-            found(
-                f"{called(owner)} takes its {spec.tag} by that name; OpenSim ignores this {note.word}",
-                owner,
-                number=note.number,
-                attribute="name",
-                suggestion=spec.tag,
-                fix=replaced(
-                    subject.source, subject.position(None, number=note.number, attribute="name"), spec.tag, safe=False
-                ),
-            )
-
-
-@rule("OSIM109", "missing-wrapper", severity=ERROR)
-def missing_wrapper(subject: Subject, found: Found) -> None:
-    """Members of a set do not stand in its `<objects>`.
-
-    ## What it does
-    Reports objects that stand directly in a set or in the object that should list them.
-
-    ## Why is this bad
-    OpenSim looks for members inside `<objects>` only, and ignores these.
-
-    ## Example
-    ```xml
-    <MarkerSet>
-        <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-    </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
-    ```
-    """
-    reported = set()
-    for note, owner in _of_kind(subject, "unknown-tag"):
-        wrapper = _wrapper_for(note, owner)
-        if wrapper is None or id(owner) in reported:
-            continue
-        reported.add(id(owner))
-        found(
-            f"{called(owner)} holds {note.word} objects inside <{wrapper}> only; OpenSim ignores this one"
-            + (" and the others" if _more_without_wrapper(subject, owner) else ""),
-            owner,
-            number=note.number,
-            suggestion=f"<{wrapper}>",
-        )
-
-
 _OFF = re.compile(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
 _CDATA = re.compile(r">([^<>]*)<!\[CDATA\[.*?\]\]>([^<]*)(?=<)", re.DOTALL)
-
-
-def _of_kind(subject: Subject, kind: str) -> list[tuple[Note, Object]]:
-    return [(note, note.owner) for note in subject.notes if note.kind == kind and note.owner is not None]
-
-
-def _other_rule(note: Note, owner: Object) -> bool:
-    return _wrapper_for(note, owner) is not None or _part_for(note, owner) is not None
-
-
-def _wrapper_for(note: Note, owner: Object) -> str | None:
-    """The list of `owner` that an object standing directly in it belongs in."""
-    if note.value is None or _part_for(note, owner) is not None:
-        return None
-    lists = (s for s in field_specs(type(owner)).values() if isinstance(s.kind, Held) and s.kind.form == "list")
-    best = next((s for s in lists if s.accepts and issubclass(note.value, s.accepts) and s.tag != "components"), None)
-    return best.tag if best is not None else None
-
-
-def _part_for(note: Note, owner: Object) -> FieldSpec | None:
-    """The one-object property that takes the class of this element, if it would only be called right."""
-    if note.value is None:
-        return None
-    for spec in field_specs(type(owner)).values():
-        free = isinstance(spec.kind, Held) and spec.kind.form == "single" and spec.name not in owner.model_fields_set
-        if free and spec.accepts is not None and issubclass(note.value, spec.accepts):
-            return spec
-    return None
-
-
-def _more_without_wrapper(subject: Subject, owner: Object) -> bool:
-    return sum(1 for note, other in _of_kind(subject, "unknown-tag") if other is owner and note.value is not None) > 1
 
 
 def _present(owner: Object) -> set[str]:
@@ -423,36 +232,3 @@ def _homes(tag: str, owner: type[Object]) -> list[str]:
         if spec is not None and spec.declared_in.__module__.rpartition(".")[0] == package:
             homes.add(spec.declared_in.__name__)
     return sorted(homes)
-
-
-def _fate(subject: Subject, note: Note) -> str:
-    """What OpenSim does with an object it cannot take."""
-    spec = note.spec
-    if spec is None or not isinstance(spec.kind, Held):
-        return "leaves the object out"
-    if spec.tag == "objects":
-        return "refuses to load the file"
-    if spec.kind.form != "single":
-        return "leaves the object out"
-    attributes = None if subject.source is None else subject.source.attributes_of(note.number)
-    if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
-        return "refuses to load the file"
-    return "leaves the object out, and fails where it needs one"
-
-
-def _acceptable(spec: FieldSpec | None) -> Sequence[str]:
-    if spec is None or spec.accepts is None:
-        return tags()
-    return [tag for tag in tags() if (cls := class_for(tag)) is not None and issubclass(cls, spec.accepts)]
-
-
-def _set_for(cls: type[Object] | None) -> str | None:
-    """The set of a model that takes objects of a class."""
-    if cls is None:
-        return None
-    for spec in field_specs(Model).values():
-        members = field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
-        taken = members.accepts if members is not None and spec.tag != "ComponentSet" else None
-        if taken is not None and issubclass(cls, taken):
-            return spec.tag
-    return None
