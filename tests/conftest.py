@@ -59,6 +59,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("corpus_model", models or [absent])
 
 
+# Before pytest-xdist reads the groups: unless it is the first, all groups would be for nothing.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what reads real files for `-m "not corpus"`, keep modules in one process, skip cases of missing engines."""
     missing = [engine for engine, package in ENGINES.items() if find_spec(package) is None]

@@ -13,7 +13,8 @@ from tests.simulation.test_mesh_contact import thrown
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
-from tests.simulation.test_compiled_forces import assert_same, chain, engines, floor, states
+from tests.simulation.force_cases import chain, floor
+from tests.simulation.test_compiled_forces import assert_same, engines, states
 
 
 def touching(surfaces) -> ElasticFoundationForce:

@@ -15,7 +15,7 @@ from osimlite.errors import ModelError, OsimliteError, SettingError, SimulationE
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
-from tests.simulation.test_compiled_forces import FORCES, with_force
+from tests.simulation.force_cases import FORCES, with_force
 
 NUMBERS = re.compile(r"<(\w+)>([-+0-9.eE \n\t]*\d[-+0-9.eE \n\t]*)</\1>")
 EXTREMES = (

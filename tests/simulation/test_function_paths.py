@@ -17,7 +17,7 @@ from osimlite.schema.functions import (
 )
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import FunctionBasedPath
-from tests.simulation.test_compiled_forces import with_force
+from tests.simulation.force_cases import with_force
 
 ONE, TWO = ("/jointset/j2/q2_0",), ("/jointset/j2/q2_0", "/jointset/j0/q0_3")
 PLANE = MultivariatePolynomialFunction(dimension=2, order=1, coefficients=(0.3, 0.2, -0.1))

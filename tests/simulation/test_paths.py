@@ -15,7 +15,7 @@ from osimlite.schema.functions import Constant, Sine
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import MovingPathPoint, PathPoint
 from tests.simulation.elements.muscle_rows import hung, line
-from tests.simulation.test_compiled_forces import FORCES, with_force
+from tests.simulation.force_cases import FORCES, with_force
 
 FILES = {"gait10dof18musc": "m0005", "gait2392": "m0014"}
 """Where the models are in the corpus."""

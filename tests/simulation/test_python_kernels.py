@@ -11,7 +11,8 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.kernels import layout
 from tests.simulation.checked import Checked, bounded
-from tests.simulation.test_compiled_forces import FORCES, states, with_force
+from tests.simulation.force_cases import FORCES, with_force
+from tests.simulation.test_compiled_forces import states
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
