@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.errors import SettingError
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.stepper import Progress
@@ -55,6 +56,9 @@ class Options:
             that separates too fast to push takes the force of those after it.
         own_activation_times: let the activation of every DeGrooteFregly2016Muscle have its own time constants and
             smoothing; OpenSim takes those of the first one for all.
+        wrapping: how paths bend around surfaces: as in "opensim", or along a "geodesic": smooth, the shortest way (or
+            where a side is asked for at least a stationary one), with all surfaces of a path taken together, so that
+            speed and moment arms are derivatives of the length.
         opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
             :func:`osimlite.multibody.build_mechanism`.
         rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
@@ -76,6 +80,7 @@ class Options:
     skip_unsupported: bool = False
     simbody_early_return: bool = False
     own_activation_times: bool = False
+    wrapping: str = OPENSIM
     opensim_derivatives: bool = False
     rolling: bool = False
     external_loads: str | Path | None = None

@@ -17,6 +17,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements import ElementBuilder, Forces
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
@@ -31,14 +32,19 @@ ROUNDING = 1e-12
 """What is left of a moment arm, or a speed, of 0."""
 
 
-def paths(model: Model) -> Paths:
+def paths(model: Model, wrapping: str = OPENSIM) -> Paths:
     """The paths of a model: of its muscles, ligaments, springs and actuators, whether these act or not.
 
+    Args:
+        model: whose paths.
+        wrapping: "opensim", or "geodesic": see :class:`osimlite.simulation.Options`.
+
     Raises:
+        SettingError: there is no such wrapping.
         UnsupportedError: a path, a joint or a constraint of an unknown class.
         ModelError: something makes no sense.
     """
-    return Paths(model)
+    return Paths(model, wrapping)
 
 
 class Paths:
@@ -49,6 +55,7 @@ class Paths:
 
     Args:
         model: whose paths.
+        wrapping: how they bend around surfaces.
 
     Attributes:
         names: component paths of their owners, in the order of the model.
@@ -56,9 +63,9 @@ class Paths:
         mechanism: of the model.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, wrapping: str = OPENSIM) -> None:
         self.mechanism = build_mechanism(model)
-        builder = ElementBuilder(model, self.mechanism, Path())
+        builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
         owners = [
             owner
             for owner in builder.tree.components
@@ -81,7 +88,8 @@ class Paths:
         """Lengthening speed of each path (m/s) for generalized speeds u, given as the values are.
 
         As in OpenSim it is the sum over all pairs of neighbouring points, tangent points moving with their bodies: the
-        rate of the length only where the path on a surface is the shortest, and no point comes or goes.
+        rate of the length only where no point comes or goes, and where the path on a surface is the shortest. Along
+        geodesics it is.
         """
         speeds = self._system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
         return dict(zip(self.names, speeds.tolist(), strict=True))

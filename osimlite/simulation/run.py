@@ -66,7 +66,7 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
         return trajectory
 
 
-TOLD = "skip_unsupported", "simbody_early_return", "own_activation_times", "opensim_derivatives", "rolling"
+TOLD = "skip_unsupported", "simbody_early_return", "own_activation_times", "wrapping", "opensim_derivatives", "rolling"
 """What the summary says besides the settings of the run."""
 
 
@@ -106,6 +106,7 @@ class Simulation:
             skip_unsupported=chosen.skip_unsupported,
             simbody_early_return=chosen.simbody_early_return,
             own_activation_times=chosen.own_activation_times,
+            wrapping=chosen.wrapping,
             external_loads=chosen.external_loads,
             folder=chosen.folder,
         )

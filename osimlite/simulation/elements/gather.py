@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.errors import ModelError, UnsupportedError
+from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.multibody.schema_functions import numeric
@@ -20,13 +20,16 @@ from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.controls import NO_CONTROLS, Controls, ModelControls
-from osimlite.text import listed
+from osimlite.text import listed, or_known
 
 if TYPE_CHECKING:
     from osimlite.meshes.folders import MeshFolders
     from osimlite.simulation.elements.items import ForceElement
 
 Triple = tuple[float, float, float]
+
+WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
+"""How paths may bend around surfaces."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ def force_elements(
     skip_unsupported: bool = False,
     simbody_early_return: bool = False,
     own_activation_times: bool = False,
+    wrapping: str = OPENSIM,
     external_loads: str | Path | None = None,
     folder: str | Path | None = None,
 ) -> Forces:
@@ -59,6 +63,7 @@ def force_elements(
         skip_unsupported: leave out what cannot be computed instead of raising.
         simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
         own_activation_times: do not reproduce OpenSim's defect in the activation of several DeGrooteFregly2016Muscles.
+        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
         external_loads: a file of ExternalLoads, which follow the forces of the model.
         folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
 
@@ -67,7 +72,9 @@ def force_elements(
         ModelError: a force names what does not exist, or a parameter has no meaning.
         OsimliteError: a file that is named cannot be read.
     """
-    builder = ElementBuilder(model, mechanism, Path(folder or "."), simbody_early_return, own_activation_times)
+    builder = ElementBuilder(
+        model, mechanism, Path(folder or "."), simbody_early_return, own_activation_times, wrapping
+    )
     elements: list[ForceElement] = []
     skipped: list[str] = []
     for component in builder.forces():
@@ -114,16 +121,28 @@ class ElementBuilder:
         folder: of the model's file.
         early_return: whether Simbody's defect in contact is reproduced.
         own_times: whether OpenSim's defect in activation is not.
+        geodesic: whether paths bend around surfaces along geodesics.
+
+    Raises:
+        SettingError: there is no such wrapping.
     """
 
     def __init__(
-        self, model: Model, mechanism: Mechanism, folder: Path, early_return: bool = False, own_times: bool = False
+        self,
+        model: Model,
+        mechanism: Mechanism,
+        folder: Path,
+        early_return: bool = False,
+        own_times: bool = False,
+        wrapping: str = OPENSIM,
     ) -> None:
+        if wrapping not in WRAPPINGS:
+            raise SettingError(f"there is no wrapping '{wrapping}'{or_known(wrapping, WRAPPINGS)}")
         self.model = model
         self.tree = model.tree()
         self.mechanism = mechanism
         self.folder = folder
-        self.early_return, self.own_times = early_return, own_times
+        self.early_return, self.own_times, self.geodesic = early_return, own_times, wrapping == GEODESIC
 
     @property
     def mesh_folders(self) -> MeshFolders:

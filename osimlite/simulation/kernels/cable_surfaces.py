@@ -41,14 +41,18 @@ END_NUMBERS = 15
 
 START, END, A, R, A_RATE, R_RATE, ARC, STEP = 0, 15, 30, 31, 32, 33, 34, 35
 """Of a geodesic: its ends; the Jacobi fields at the end, and their derivatives; its length, m; the step of the
-integration to begin with, m."""
+integration to begin with, m; 0 to integrate by extrapolation, as exactly as may be."""
 GEODESIC_NUMBERS = 36
 
 SIZE = 10
 """Of the state that is integrated: place, R, A, and their derivatives."""
-GEODESIC_ROOM = 8 * SIZE
+COLUMNS = 7
+GEODESIC_ROOM = (3 + COLUMNS) * SIZE
+"""Of room for an integration: columns of the extrapolation, or what a step of Merson's takes."""
 ACCURACY, CONSTRAINT, SMALLEST = 1e-10, 1e-9, 2.0**-45.5
 """Of a step, of what the surface demands, and the smallest step, m."""
+EXACT = 1e-12
+"""By this the last column of an extrapolation may move the end, m; it is better than that by far."""
 MOST_STEPS, MOST_CORRECTIONS = 10_000, 10
 LEAST, MOST, SAFETY, STRETCH, LESS, MORE = 0.1, 5.0, 0.9, 0.1, 0.9, 1.2
 """How step sizes change, as in Simbody's GeodesicIntegrator."""
@@ -140,6 +144,8 @@ def shoot(p: Floats, point: Vector, direction: Vector, length: float, geodesic: 
         set_end(p, end, (c * tx - s * ty, s * tx + c * ty, tz), at(geodesic, END))
         geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = 1.0, 0.0, length, 1.0
         return True
+    if geodesic[STEP] == 0.0:
+        return extrapolate(p, point, direction, length, geodesic, room)
     return integrate(p, point, direction, length, geodesic, room)
 
 
@@ -205,6 +211,63 @@ def integrate(p: Floats, point: Vector, direction: Vector, length: float, geodes
     if taken >= 2:
         geodesic[STEP] = first if first < geodesic[STEP] else max(geodesic[STEP], second)
     return True
+
+
+def extrapolate(p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats) -> bool:
+    """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in steps as long as that may take."""
+    y = room
+    put(y, 0, point)
+    put(y, 5, unit(direction))
+    y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
+    if not project(p, y):
+        return False
+    set_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
+    left = step = length
+    while left > 0.0:
+        step = min(step, left)
+        while not leap(p, step, room):
+            step *= 0.5
+            if not step > SMALLEST:
+                return False
+        left -= step
+        if not project(p, y):
+            return False
+    set_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
+    geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
+    return True
+
+
+def leap(p: Floats, step: float, room: Floats) -> bool:
+    """A step by midpoint rules of 2, 4, 6 ... parts, extrapolated; whether it is as exact as may be."""
+    y, f, old, columns = room, at(room, SIZE), at(room, 2 * SIZE), at(room, 3 * SIZE)
+    for column in range(COLUMNS):
+        new, parts = at(columns, column * SIZE), 2 * column + 2
+        h = step / parts
+        slope(p, y, f)
+        for k in range(SIZE):
+            old[k], new[k] = y[k], y[k] + h * f[k]
+        for _ in range(1, parts):
+            slope(p, new, f)
+            for k in range(SIZE):
+                old[k], new[k] = new[k], old[k] + 2.0 * h * f[k]
+        # Neville's scheme towards h = 0: each row takes the place of the one before, from its end on.
+        error = 0.0
+        for other in range(column - 1, -1, -1):
+            row, last, ratio = (
+                at(columns, other * SIZE),
+                at(columns, (other + 1) * SIZE),
+                (column + 1.0) / (other + 1.0),
+            )
+            error = 0.0
+            for k in range(SIZE):
+                row[k] = last[k] + (last[k] - row[k]) / (ratio * ratio - 1.0)
+                if k < 3:
+                    error = max(error, abs(row[k] - last[k]))
+        if column > 1 and error <= EXACT:
+            for k in range(SIZE):
+                y[k] = columns[k]
+            return True
+    return False
 
 
 def slope(p: Floats, y: Floats, f: Floats) -> None:

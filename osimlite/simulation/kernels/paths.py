@@ -26,11 +26,12 @@ then of two tangent points for each wrap."""
 
 NODE_INTS = 8
 LINK, BODY, KIND, OF, AT, TABLES = 0, 1, 2, 3, 4, 5
-"""Of a node: its link and body; the degree of freedom of its coordinate (-1 if that is locked), or the number of the
-surface that a tangent point is on; place of its numbers, and of the tables of its three functions."""
+"""Of a node: its link and body (there is no line that pulls between two nodes of one body); the degree of freedom of
+its coordinate (-1 if that is locked), or the number of the surface that a tangent point is on; place of its numbers,
+and of the tables of its three functions."""
 
-FIXED, CONDITIONAL, MOVING, TANGENT = 0, 1, 2, 3
-"""Kinds of nodes."""
+FIXED, CONDITIONAL, MOVING, CLAMPED, TANGENT = 0, 1, 2, 3, 4
+"""Kinds of nodes; a clamped one is a moving one that stands still outside its range, as its place does."""
 
 STATION, VALUE, LOW, HIGH, TURN = 0, 3, 4, 5, 6
 """Numbers of a node: a point of the link (m); value of a locked coordinate, and the range of any; rotation in the link
@@ -85,12 +86,15 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
                 if not n[LOW] <= value <= n[HIGH]:
                     continue
             else:
-                # As in OpenSim, the place is that of the clamped coordinate, its derivative that of the coordinate.
+                # As in OpenSim, the place is that of the clamped coordinate, its derivative that of the coordinate;
+                # of a clamped point that is zero.
                 clamped, t = min(max(value, n[LOW]), n[HIGH]), at(n, TURN)
                 qx, dx, _ = value_at(at(p, node[TABLES]), clamped)
                 qy, dy, _ = value_at(at(p, node[TABLES + 1]), clamped)
                 qz, dz, _ = value_at(at(p, node[TABLES + 2]), clamped)
-                if clamped != value:
+                if clamped != value and node[KIND] == CLAMPED:
+                    dx = dy = dz = 0.0
+                elif clamped != value:
                     _, dx, _ = value_at(at(p, node[TABLES]), value)
                     _, dy, _ = value_at(at(p, node[TABLES + 1]), value)
                     _, dz, _ = value_at(at(p, node[TABLES + 2]), value)
@@ -139,7 +143,7 @@ def spot(node: Ints, here: Floats) -> Vector:
 def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
     """Velocity of a node; tangent points move with the body of their surface."""
     v = velocity(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2])
-    if node[KIND] == MOVING and node[OF] >= 0:
+    if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
         return along(v, y[s[FREEDOMS] + node[OF]], vector(here, GRADIENT))
     return v
 
@@ -161,7 +165,7 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
             pull = times(tension, vector(here, ALONG))
         fx, fy, fz = force = minus(pull, back)
         apply_force(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2], fx, fy, fz)
-        if node[KIND] == MOVING and node[OF] >= 0:
+        if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
             f[s[FREEDOMS] + node[OF]] += dot(force, vector(here, GRADIENT))
     return OK
 

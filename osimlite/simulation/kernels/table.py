@@ -54,6 +54,7 @@ LAW_MODULES = {
     "pull_points": "paths",
     "pull_each": "paths",
     "wrapped_path": "path_wraps",
+    "geodesic_path": "geodesic_paths",
 }
 """The module of each of the engine's own."""
 

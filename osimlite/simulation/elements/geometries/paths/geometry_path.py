@@ -5,8 +5,9 @@ The points are fixed, move along a coordinate, or come and go with one.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, ClassVar
 
@@ -20,10 +21,12 @@ from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, Movin
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
 from osimlite.simulation.kernels.functions import table_of_one
+from osimlite.simulation.kernels.geodesic_paths import slots_and_room
 from osimlite.simulation.kernels.layout import OWN
 from osimlite.simulation.kernels.path_wraps import SURFACE_WORK
-from osimlite.simulation.kernels.paths import CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
+from osimlite.simulation.kernels.paths import CLAMPED, CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
 from osimlite.simulation.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 
 TOLERANCE = 1e-5
@@ -54,8 +57,11 @@ class Node:
     functions: tuple[Function, ...] = ()
     name: str = ""
 
-    def packed(self, places: Places, of: int, first: int, path: str) -> tuple[list[int], list[float]]:
-        """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to."""
+    def packed(self, places: Places, of: int, first: int, path: str, piece: int) -> tuple[list[int], list[float]]:
+        """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to.
+
+        Between two nodes in a row that are of one piece there is no line that pulls.
+        """
         link, frame = places.placement(self.body)
         frame = frame @ self.frame
         value = places.locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
@@ -65,7 +71,7 @@ class Node:
         for function in self.functions:
             tables.append(first + len(numbers))
             numbers += table_of_one(function, f"the place of a point of '{path}'")
-        return [link, self.body, self.kind, of, first, *(tables or (0, 0, 0))], numbers
+        return [link, piece, self.kind, of, first, *(tables or (0, 0, 0))], numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +82,7 @@ class Surface:
         number: tells it from other surfaces of the path.
         tangent: a node at its middle, with its axes.
         law: name of the law of the surface; empty if the surface is not active.
-        numbers: what the law is given.
+        numbers: what the law is given, or those of :mod:`osimlite.simulation.kernels.geodesic_starts`.
         first: number of the first point between which and the last one the path may wrap.
         last: number of the last one.
     """
@@ -96,12 +102,14 @@ class ThroughPoints:
     Attributes:
         path: of its owner.
         points: that it runs through.
-        surfaces: that it wraps around.
+        surfaces: that it wraps around; along geodesics a surface for each point that a piece around it may begin at.
+        geodesic: whether it does so along geodesics.
     """
 
     path: str
     points: tuple[Node, ...]
     surfaces: tuple[Surface, ...] = ()
+    geodesic: bool = False
 
     coupled: ClassVar[bool] = True
 
@@ -110,7 +118,7 @@ class ThroughPoints:
         parts = [Item("pull_points", is_part=True)]
         wraps: list[int] = []
         behind = sum(bool(surface.law) for surface in self.surfaces)
-        for surface in self.surfaces:
+        for surface in () if self.geodesic else self.surfaces:
             if surface.law:
                 parts.append(Item(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True))
                 wraps.append(OWN * (behind + 2 - len(parts)))
@@ -120,11 +128,20 @@ class ThroughPoints:
         nodes = [(point, places.freedom(point.coordinate)) for point in self.points]
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
         ints, numbers = [OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
-        for node, of in nodes:
-            own, more = node.packed(places, of, len(numbers), self.path)
+        for number, (node, of) in enumerate(nodes):
+            # A geodesic path pulls along all lines, since a point may move in its body, but for chords of surfaces.
+            piece = node.body if not self.geodesic else (-1 - of if node.kind == TANGENT else number)
+            own, more = node.packed(places, of, len(numbers), self.path, piece)
             ints += own
             numbers += more
         kernel, room = "wrapped_path" if self.surfaces else "straight_path", ORDER + len(nodes) * (1 + NODE_WORK)
+        if self.geodesic and self.surfaces:
+            for surface in self.surfaces:
+                wraps += len(numbers), surface.first, surface.last
+                numbers += surface.numbers
+            most = max(Counter(surface.first for surface in self.surfaces).values())
+            slots, room = slots_and_room(most, len(self.surfaces), room)
+            kernel, wraps = "geodesic_path", wraps + slots
         return [*parts, Item(kernel, (*ints, *wraps), tuple(numbers), room=room, is_part=True)]
 
 
@@ -153,7 +170,11 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         if type(surface) not in LAWS:
             raise builder.unsupported(owner, f" around the {kind_of(surface)} '{surface.name}'")
         surfaces.append(_surface(builder, wrap, surface, numbers[id(surface)], alone, len(points)))
-    return ThroughPoints(builder.path(owner), tuple(points), tuple(surfaces))
+    if builder.geodesic:
+        points = [replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points]
+        pieces = [(surface, k) for surface in surfaces if surface.law for k in range(surface.first, surface.last)]
+        surfaces = [replace(surface, number=number, first=k) for number, (surface, k) in enumerate(pieces)]
+    return ThroughPoints(builder.path(owner), tuple(points), tuple(surfaces), builder.geodesic)
 
 
 def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int) -> Surface:
@@ -176,7 +197,23 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
     body, placed = builder.placement(frame)
     placed = placed @ offset(surface.translation, surface.xyz_body_rotation)
     tangent = Node(body, placed, np.zeros(3), TANGENT, name=surface.name)
-    return Surface(number, tangent, law if surface.active else "", (*side, method, alone, *sizes), first, last)
+    numbers = (*side, method, alone, *sizes)
+    if builder.geodesic:
+        numbers = (*side, *_geodesic(surface))
+    is_none = not surface.active or (builder.geodesic and min(sizes) == 0.0)
+    return Surface(number, tangent, "" if is_none else law, numbers, first, last)
+
+
+def _geodesic(surface: WrapObject) -> tuple[float, ...]:
+    """Half the length of a surface, and its numbers in :mod:`osimlite.simulation.kernels.cable_surfaces`."""
+    if isinstance(surface, WrapCylinder):
+        return surface.length / 2.0, CYLINDER, surface.radius, surface.radius**2, 1.0, 1.0, 0.0
+    if isinstance(surface, WrapSphere):
+        return inf, SPHERE, surface.radius, surface.radius**2, 1.0, 1.0, 1.0
+    if isinstance(surface, WrapEllipsoid):
+        return inf, ELLIPSOID, 1.0, 1.0, *(float(radius) ** -2 for radius in surface.dimensions)
+    assert isinstance(surface, WrapTorus)
+    return inf, TORUS, surface.outer_radius, surface.inner_radius, 0.0, 0.0, 0.0
 
 
 def _fixed(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:

@@ -1,0 +1,258 @@
+"""Paths that are the shortest around their surfaces, or at least stationary: what `wrapping="geodesic"` asks for.
+
+Between two neighbouring points each PathWrap whose range holds both bends the path where that touches, whatever it does
+between other points. So its surface stands in the path once for each point that a bent piece may begin at. A piece is
+bent around one surface at a time, until this changes little; then all geodesics are corrected at once, as those of a
+cable, until lines go over into them without a bend. What is found depends on the pose alone.
+
+A surface inside which a point of the piece lies bends it nowhere, as in OpenSim.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.simulation.kernels.cable_paths import (
+    GEODESIC,
+    GROUND_END,
+    GROUND_START,
+    IN_GROUND,
+    OBSTACLE_WORK,
+    STATE,
+    TOUCHES,
+    correct,
+    draw_lines,
+    end_to_ground,
+    roughness,
+    solver_room,
+)
+from osimlite.simulation.kernels.cable_paths import SURFACE as CABLE_SURFACE
+from osimlite.simulation.kernels.cable_surfaces import (
+    ARC,
+    END,
+    GEODESIC_ROOM,
+    POINT,
+    SQUARE,
+    START,
+    STEP,
+    SURFACE_NUMBERS,
+    shoot,
+    value,
+)
+from osimlite.simulation.kernels.geodesic_starts import SURFACE, start
+from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
+from osimlite.simulation.kernels.path_wraps import FIRST, LAST, WRAP_INTS, in_surface
+from osimlite.simulation.kernels.paths import (
+    AT,
+    COUNT,
+    IS_KEPT,
+    LINK,
+    NODE_INTS,
+    NODE_WORK,
+    NODES_AT,
+    ORDER,
+    PLACE,
+    POINTS,
+    STATION,
+    TURN,
+    WRAPS,
+    measure_points,
+    place_points,
+)
+from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.points import direction, station
+from osimlite.simulation.kernels.vectors import put, vector
+
+PLACES = 0
+"""Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its piece begins at, and the
+last one that it may end at."""
+CHAIN, SOLVER, POSES, ELEMENTS = 0, 1, 2, 3
+"""Integers after the wraps: where in the record the slots are, room for a search, and the poses of the surfaces; then
+the slots as elements of a cable. The first slot has the place of the point that a piece begins at; then come what the
+piece bends around, and the place where it ends."""
+OWNER = OBSTACLE_WORK + SURFACE_NUMBERS
+SLOT = OWNER + 1
+"""Of a slot: an obstacle of a cable; the surface; the number of the wrap."""
+
+IS_NEAR, POSE_NUMBERS = 12, 13
+"""Of a surface: after its rotation by rows and its place in ground, whether it may bend the piece at hand."""
+
+TOUCH, SMOOTH, STALLED = 1e-10, 1e-12, 1e-8
+"""Angles (rad): by which a piece turns at least around a surface that it is put on; at which a search ends, and below
+which it ends when that does not get less."""
+INSIDE = 1e-9
+"""A point counts as inside a surface if it is so far below it, in units of its function."""
+LOOSE, TURNS, ROUNDS = 3, 12, 30
+"""So many times each of several surfaces is put into a piece anew; so often surfaces may come and go; rounds of a
+search."""
+
+
+def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
+    """The integers after the wraps, and how long the record gets, if that of a path without wraps has a length.
+
+    Args:
+        most: so many surfaces may bend one piece.
+        wraps: number of wraps.
+        room: length of the record without slots.
+    """
+    poses = room + SLOT * (most + 2)
+    solver = poses + POSE_NUMBERS * wraps
+    slots = [room, solver, poses]
+    for place in range(room, poses, SLOT):
+        slots += 1, 0, place + OBSTACLE_WORK - CABLE_SURFACE, place
+    return slots, solver + solver_room(most)
+
+
+def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Length and speed of a path with wraps."""
+    place_points(s, x, w, y, item)
+    i, p = at(s, item), at(x, s[item + NUMBERS])
+    found, points, size = at(w, i[RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
+    order, work = at(found, ORDER), at(found, ORDER + size)
+    slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
+    place_surfaces(s, w, i, p)
+    for k in range(int(found[COUNT]) - 2, -1, -1):
+        count = bend(i, p, found, int(order[k]), int(order[k + 1]))
+        if count > 0:
+            for other in range(int(found[COUNT]) - 1, k, -1):
+                order[other + 2 * count] = order[other]
+            found[COUNT] += 2.0 * count
+        for number in range(count):
+            slot = at(found, slots[CHAIN] + SLOT * (number + 1))
+            node = points + 2 * int(slot[OWNER])
+            one, two = at(work, NODE_WORK * node), at(work, NODE_WORK * (node + 1))
+            put(one, PLACE, vector(slot, GROUND_START + POINT))
+            put(two, PLACE, vector(slot, GROUND_END + POINT))
+            one[SURFACE_LENGTH], two[SURFACE_LENGTH] = 0.0, slot[GEODESIC + ARC]
+            one[IS_KEPT] = two[IS_KEPT] = 0.0
+            order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
+    measure_points(s, w, y, item)
+    return OK
+
+
+def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
+    """Where the surfaces are in ground."""
+    size = i[POINTS] + 2 * i[WRAPS]
+    poses = at(w, i[RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
+    for number in range(i[WRAPS]):
+        node, pose = at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)), at(poses, POSE_NUMBERS * number)
+        n = at(p, node[AT])
+        link, t = node[LINK], at(n, TURN)
+        for axis in range(3):
+            pose[axis], pose[3 + axis], pose[6 + axis] = direction(s, w, link, t[axis], t[3 + axis], t[6 + axis])
+        put(pose, 9, station(s, w, link, n[STATION], n[STATION + 1], n[STATION + 2]))
+
+
+def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
+    """Bend the piece between two points around its surfaces; returns around how many, which then are in the slots."""
+    size = i[POINTS] + 2 * i[WRAPS]
+    work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
+    slots = at(wraps, WRAP_INTS * i[WRAPS])
+    chain, room = at(found, slots[CHAIN]), at(found, slots[SOLVER])
+    put(chain, 0, vector(work, NODE_WORK * one + PLACE))
+    put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
+    near = find_near(wraps, p, found, slots, i[WRAPS], one, two)
+    count, loose = 0, LOOSE if near > 1 else 0
+    for turn in range(TURNS if near > 0 else 0):
+        changed = False
+        for number in range(i[WRAPS]):
+            pose = at(found, slots[POSES] + POSE_NUMBERS * number)
+            if pose[IS_NEAR] != 0.0:
+                place = place_of(chain, count, number)
+                if place > 0 and (turn < loose or not chain[SLOT * place + GEODESIC + ARC] > 0.0):
+                    take_out(chain, count, place)
+                    count, place, changed = count - 1, 0, True
+                if place == 0 and put_in(at(p, wraps[WRAP_INTS * number + PLACES]), pose, chain, count, number, room):
+                    count, changed = count + 1, True
+        if not changed and turn != loose:
+            break
+        if turn >= loose:
+            smooth(slots, found, count)
+    return count
+
+
+def find_near(wraps: Ints, p: Floats, found: Floats, slots: Ints, count: int, one: int, two: int) -> int:
+    """Note which wraps may bend the piece between two points, from outside of their surfaces; returns how many."""
+    chain, near = at(found, slots[CHAIN]), 0
+    for number in range(count):
+        own, pose = at(wraps, WRAP_INTS * number), at(found, slots[POSES] + POSE_NUMBERS * number)
+        pose[IS_NEAR] = 0.0
+        if own[FIRST] == one and two <= own[LAST]:
+            surface = at(p, own[PLACES] + SURFACE)
+            inside = INSIDE * surface[SQUARE]
+            first, second = in_surface(pose, vector(chain, 0)), in_surface(pose, vector(chain, SLOT))
+            if value(surface, first) <= inside and value(surface, second) <= inside:
+                pose[IS_NEAR] = 1.0
+                near += 1
+    return near
+
+
+def place_of(chain: Floats, count: int, number: int) -> int:
+    """The slot of a wrap, 0 if it is in none."""
+    for k in range(1, count + 1):
+        if chain[SLOT * k + OWNER] == number:
+            return k
+    return 0
+
+
+def take_out(chain: Floats, count: int, place: int) -> None:
+    """Take what is in a slot out of the chain."""
+    for k in range(SLOT * place, SLOT * (count + 1)):
+        chain[k] = chain[k + SLOT]
+
+
+def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room: Floats) -> bool:
+    """Put a surface into that piece of the chain which it turns most, if there is one."""
+    place, most = 0, TOUCH
+    point = way = (0.0, 0.0, 0.0)
+    arc = 0.0
+    for k in range(count + 1):
+        ahead = at(chain, SLOT * (k + 1))
+        first = vector(chain, SLOT * k + (GROUND_END + POINT if k > 0 else 0))
+        second = vector(ahead, GROUND_START + POINT if k < count else 0)
+        turn, meets, along, length = start(p, in_surface(pose, first), in_surface(pose, second))
+        if turn > most:
+            place, most, point, way, arc = k + 1, turn, meets, along, length
+    if place == 0:
+        return False
+    for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
+        chain[k] = chain[k - SLOT]
+    slot = at(chain, SLOT * place)
+    slot[STATE], slot[OWNER] = TOUCHES, number
+    slot[GEODESIC + STEP] = 0.0
+    for k in range(IS_NEAR):
+        slot[IN_GROUND + k] = pose[k]
+    for k in range(SURFACE_NUMBERS):
+        slot[OBSTACLE_WORK + k] = p[SURFACE + k]
+    if not shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room):
+        take_out(chain, count + 1, place)
+        return False
+    to_ground(slot)
+    return True
+
+
+def to_ground(slot: Floats) -> None:
+    """Both ends of a geodesic in ground."""
+    end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + START), at(slot, GROUND_START))
+    end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + END), at(slot, GROUND_END))
+
+
+def smooth(slots: Ints, found: Floats, count: int) -> None:
+    """Correct all geodesics of a piece until it is smooth, or one of them gets too short to be any."""
+    elements, room = at(slots, ELEMENTS), at(found, slots[SOLVER])
+    lines = at(room, GEODESIC_ROOM)
+    values, before = at(lines, 4 * (count + 1)), inf
+    for _ in range(ROUNDS):
+        draw_lines(elements, found, 0, count + 1, lines)
+        rough = roughness(elements, found, 0, count + 1, lines, values)
+        if not rough > SMOOTH or before <= rough < STALLED:
+            return
+        before = rough
+        if not correct(elements, found, found, 0, count + 1, count, rough, room):
+            return
+        for k in range(1, count + 1):
+            slot = at(found, slots[CHAIN] + SLOT * k)
+            if not slot[GEODESIC + ARC] > 0.0:
+                return
+            to_ground(slot)

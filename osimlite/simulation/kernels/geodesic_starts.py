@@ -1,0 +1,188 @@
+"""Where a path begins to bend around a surface, if it does: exact on cylinders and spheres, near enough on others.
+
+A straight piece of a path bends around a surface that it would go through. On which side is told by the quadrant of the
+surface, of all sides by where the way is shorter:
+
+- a cylinder with a side x or y: the path never goes through the half plane behind its axis, on the side that is not
+  active. So it bends around the active side also where it misses the cylinder but would pass behind it;
+- a sphere or an ellipsoid with a side: the path bends outwards there, from its nearest way out as in a mirror; only a
+  great circle is a geodesic, so the path may go around the far side;
+- a torus: the path goes through the hole, and never through the plane outside of the ring.
+
+All points are in the frame of the surface, in m. Neighbours of a piece that are inside count as on the surface.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, inf, pi, sin, sqrt
+
+from osimlite.simulation.kernels.cable_surfaces import CYLINDER, KIND, RADIUS, SPHERE, SQUARE, TORUS, TUBE, WEIGHTS
+from osimlite.simulation.kernels.closest_on_ellipsoid import closest_point
+from osimlite.simulation.kernels.pointers import Floats, at
+from osimlite.simulation.kernels.vectors import (
+    Vector,
+    along,
+    component,
+    cross,
+    dot,
+    elementwise,
+    minus,
+    norm,
+    replaced,
+    times,
+    unit,
+    vector,
+)
+from osimlite.simulation.kernels.wrap_sides import on_side
+
+AXIS, SIDE, HALF_LENGTH, SURFACE = 0, 1, 2, 3
+"""Numbers of what a path wraps around: axis and sign of its side, half its length (of a cylinder), the surface."""
+
+Start = tuple[float, Vector, Vector, float]
+"""The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
+surface; its direction there; its length on the surface, m."""
+
+LEAST = 1e-100
+"""What is not divided by."""
+SAMPLES, STEPS = 16, 6
+"""The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
+PIECES = 8
+"""By so many pieces a length on an ellipsoid is measured at first."""
+
+
+def start(p: Floats, first: Vector, second: Vector) -> Start:
+    """Where a straight piece between two points begins to bend around what the numbers tell of."""
+    axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
+    if surface[KIND] == CYLINDER:
+        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, axis, side)
+    if surface[KIND] == TORUS:
+        return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side)
+    return around_ellipsoid(surface, first, second, axis, side)
+
+
+def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
+    """The start on a cylinder about z: a straight line once the cylinder is rolled out.
+
+    As in OpenSim there is none if the path would meet and leave the cylinder beyond its ends.
+    """
+    px, py, pz = first
+    qx, qy, qz = second
+    # Angles from the middle of the active side, which leap behind it.
+    ux, uy = (side, 0.0) if axis == 0 else (0.0, side)
+    if side == 0.0 or axis == 2:
+        side, ux, uy = 0.0, px, py
+    one = atan2(ux * py - uy * px, ux * px + uy * py)
+    sweep = atan2(ux * qy - uy * qx, ux * qx + uy * qy) - one
+    way = 1.0 if sweep >= 0.0 else -1.0
+    far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
+    line1, line2 = sqrt(max(far1 * far1 - radius * radius, 0.0)), sqrt(max(far2 * far2 - radius * radius, 0.0))
+    before = atan2(line1, radius)
+    turn = abs(sweep) - before - atan2(line2, radius)
+    size = sqrt(ux * ux + uy * uy)
+    c, s = cos(one + way * before) / size, sin(one + way * before) / size
+    nx, ny = c * ux - s * uy, c * uy + s * ux
+    slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, LEAST)
+    z = pz + slope * line1
+    if abs(z) > half_length and abs(qz - slope * line2) > half_length:
+        turn = 0.0
+    return turn, (radius * nx, radius * ny, z), (-way * ny, way * nx, slope), radius * turn * sqrt(1.0 + slope * slope)
+
+
+def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: float) -> Start:
+    """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
+
+    The circle is in the plane of the ends and the way from the middle of the chord straight out of the surface.
+    """
+    weights = vector(p, WEIGHTS)
+    wx, wy, wz = times(1.0 / p[SQUARE], weights)
+    scale = sx, sy, sz = sqrt(wx), sqrt(wy), sqrt(wz)
+    radii = 1.0 / sx, 1.0 / sy, 1.0 / sz
+    one, two = elementwise(scale, first), elementwise(scale, second)
+    way = minus(two, one)
+    part = min(max(-dot(one, way) / max(dot(way, way), LEAST), 0.0), 1.0)
+    middle = along(one, part, way)
+    if not dot(middle, middle) < 1.0:
+        return 0.0, first, way, 0.0
+    out = middle
+    if p[KIND] != SPHERE:
+        a, b, c = radii
+        factor = 3.0 / (a + b + c)
+        nearest = closest_point(times(factor, radii), times(factor, elementwise(radii, middle)))
+        out = elementwise(scale, elementwise(weights, nearest))
+    if norm(cross(out, way)) < LEAST:
+        wx, wy, wz = elementwise(way, way)
+        out = replaced((0.0, 0.0, 0.0), 0 if wx <= min(wy, wz) else (1 if wy <= wz else 2), 1.0)
+    if side != 0.0 and not on_side(out, axis, side):
+        # Towards where a mirror would have it, which itself is near no geodesic.
+        mirrored = replaced(out, axis, -component(out, axis))
+        out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
+    normal = unit(cross(out, way))
+    centre = times(dot(normal, one), normal)
+    radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
+    a1, a2 = touching(minus(one, centre), radius, normal, 1.0), touching(minus(two, centre), radius, normal, -1.0)
+    across = cross(normal, a1)
+    turn = atan2(dot(across, a2), dot(a1, a2))
+    if turn < -1e-6:
+        turn += 2.0 * pi
+    length = 0.0
+    for k in range(PIECES):
+        angle = turn * (k + 0.5) / PIECES
+        length += norm(elementwise(radii, along(times(cos(angle), across), -sin(angle), a1)))
+    ways = elementwise(radii, across)
+    return turn, elementwise(radii, along(centre, 1.0, a1)), ways, turn / PIECES * length
+
+
+def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
+    """Where the line from a point touches a circle about the origin that is gone around in a way; not from inside."""
+    distance = max(norm(point), LEAST)
+    cosine = min(radius / distance, 1.0)
+    foot = times(radius * cosine / distance, point)
+    return along(foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point))
+
+
+def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
+    """The start on a torus about z: as on a cylinder in the place of the ring that is nearest to the line."""
+    way = minus(second, first)
+    best, least = 0.0, inf
+    for k in range(SAMPLES + 1):
+        distance = distance_from_ring(along(first, k / SAMPLES, way), ring)
+        if distance < least:
+            best, least = k / SAMPLES, distance
+    wx, wy, wz = way
+    for _ in range(STEPS):
+        x, y, z = along(first, best, way)
+        square = max(x * x + y * y, LEAST)
+        outer, flat = sqrt(square), x * wx + y * wy
+        slope = flat * (1.0 - ring / outer) + z * wz
+        bends = (wx * wx + wy * wy) * (1.0 - ring / outer) + ring * flat * flat / (square * outer) + wz * wz
+        if not bends > 0.0:
+            break
+        best = min(max(best - slope / bends, 0.0), 1.0)
+    x, y, z = near = along(first, best, way)
+    if side != 0.0 and not on_side(near, axis, side):
+        return 0.0, first, way, 0.0
+    rx, ry, _ = inwards = unit((-x, -y, 0.0))
+    centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
+    turn, point, along_way, length = around_cylinder(
+        tube, inf, seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent), 0, 1.0
+    )
+    return turn, along(back(point, inwards, tangent), 1.0, centre), back(along_way, inwards, tangent), length
+
+
+def distance_from_ring(point: Vector, ring: float) -> float:
+    """Squared distance from a ring about z."""
+    x, y, z = point
+    across = sqrt(x * x + y * y) - ring
+    return across * across + z * z
+
+
+def seen(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
+    """A vector along the axes of the cylinder in the place of the ring: inwards, down, and along the ring."""
+    _, _, z = point
+    return dot(inwards, point), -z, dot(tangent, point)
+
+
+def back(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
+    """A vector along these axes, in the frame of the torus."""
+    x, y, z = point
+    return along(along((0.0, 0.0, -y), x, inwards), z, tangent)
