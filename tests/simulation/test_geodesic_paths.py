@@ -6,12 +6,14 @@ from math import acos, hypot, pi, sqrt
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
 
 import osimlite
 from osimlite.errors import SettingError
 from tests.simulation.checked import Checked
 from tests.simulation.test_path_wraps import PATH, SETUPS, wrapped
+
+
+integrate = pytest.importorskip("scipy.integrate")
 
 
 def surface(kind, sizes, quadrant="all"):
@@ -61,14 +63,14 @@ def test_ellipse_of_an_ellipsoid():
     # From (-d, 0) the tangent touches where cos t = -a / d.
     t = acos(-a / 0.1)
     line = hypot(0.1 + a * np.cos(t), b * np.sin(t))
-    arc, _ = quad(lambda t: hypot(a * np.sin(t), b * np.cos(t)), pi - t, t, epsabs=1e-14)
+    arc, _ = integrate.quad(lambda t: hypot(a * np.sin(t), b * np.cos(t)), pi - t, t, epsabs=1e-14)
     assert length(paths, (-0.1, 1e-13, 0.0), (0.1, 1e-13, 0.0)) == pytest.approx(2 * line + arc, rel=1e-11)
 
 
 def test_ellipsoid_against_another_integrator():
     """Lines through two points that are tangent to one geodesic."""
     weights = np.array((0.03, 0.05, 0.04)) ** -2
-    first, second = np.array((-0.08, 0.03, 0.05)), np.array((0.09, 0.02, -0.04))
+    first, second = np.array((-0.08, 0.01, 0.03)), np.array((0.09, 0.01, -0.02))
 
     def rates(_, y):
         normal = weights * y[:3]
@@ -79,7 +81,7 @@ def test_ellipsoid_against_another_integrator():
     before, after = start - first, second - end
     arc = length(paths, first, second) - np.linalg.norm(before) - np.linalg.norm(after)
     y = [*start, *(before / np.linalg.norm(before))]
-    found = solve_ivp(rates, (0.0, arc), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    found = integrate.solve_ivp(rates, (0.0, arc), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
     assert weights @ start**2 == pytest.approx(1.0, abs=1e-10)
     assert (weights * start) @ before == pytest.approx(0.0, abs=1e-9)
     assert found == pytest.approx([*end, *(after / np.linalg.norm(after))], abs=1e-9)
