@@ -158,13 +158,13 @@ def _stamp_since(file: str, moment: int) -> list[int] | None:
 def _code() -> str:
     """Which code this is. In a working copy the version stays the same while rules change: the files then tell."""
     package = Path(__file__).parents[1]
-    newest = count = 0
-    for part in ("document", "document/upgrade", "lint", "lint/rules", "schema", "schema/tools"):
-        with os.scandir(package / part) as entries:
-            for entry in entries:
-                if entry.name.endswith(".py"):
-                    newest, count = max(newest, entry.stat().st_mtime_ns), count + 1
-    return f"{__version__} {newest} {count}"
+    places = [
+        next(os.walk(package)),
+        *(place for part in ("document", "lint", "schema") for place in os.walk(package / part)),
+    ]
+    files = (os.path.join(folder, file) for folder, _, names in places for file in names if file.endswith(".py"))
+    times = [os.stat(file).st_mtime_ns for file in files]
+    return f"{__version__} {max(times)} {len(times)}"
 
 
 def _outside(values: Any) -> tuple[str, Stamp]:

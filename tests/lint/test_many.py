@@ -13,7 +13,7 @@ import pytest
 from osimlite.errors import MissingFileError
 from osimlite.lint import Config, validate
 from osimlite.lint import many as module
-from osimlite.lint.cache import NAME, folder_for
+from osimlite.lint.cache import NAME, _code, folder_for
 from osimlite.lint.many import Texts, check_files, settings_of
 from osimlite.lint.suffixes import is_ours
 
@@ -248,3 +248,9 @@ def test_the_text_of_a_file_that_has_gone_is_empty(project):
 )
 def test_xml_of_other_programs_is_known_by_its_root(text, ours):
     assert is_ours(text.encode()) is ours
+
+
+def test_every_part_that_checks_tells_which_code_this_is():
+    package = Path(module.__file__).parents[1]
+    checking = [file for part in ("document", "lint", "schema") for file in (package / part).rglob("*.py")]
+    assert _code().endswith(f" {len(checking) + len([*package.glob('*.py')])}")
