@@ -225,9 +225,9 @@ class _Declarations:
         """Type, kind and default of a property that holds objects."""
         name = row["name"]
         typed = str(row.get("accepts_base") or row.get("type"))
-        accepts = self.cls(typed, owner, name, typed)
+        accepts: Any = self.cls(typed, owner, name, typed)
         if shape == "list":
-            return list[accepts], Held("list", legacy), none()  # type: ignore[valid-type]
+            return list[accepts], Held("list", legacy), none()
         default = row.get("default")
         if shape == "optional" and not default:
             return accepts | None, Held("optional", legacy), None

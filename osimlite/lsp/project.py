@@ -127,7 +127,7 @@ class Project:
         own = self.analysis(target.file)
         item = None if own is None or target.number is None else own.objects.get(target.number)
         place = None if own is None or item is None or item._index is None else own.name_of(item._index)
-        if own is None or item is None or place is None or item.name != target.item.name:  # type: ignore[union-attr]
+        if own is None or item is None or place is None or target.item is None or item.name != target.item.name:
             raise ModelError(f"the text does not give '{target.path or target.file}' a name; nothing can be renamed")
         path, changes = f"/{name}", {}
         if own.document is not None and own.document.model is not None:

@@ -98,7 +98,7 @@ class Server(LanguageServer):
             self.window_show_message(types.ShowMessageParams(types.MessageType.Error, str(error)))
             return
         except Exception as error:
-            # The next keystroke may well be checked again: a server that ends takes everything else with it.
+            # Nobody waits for this task: what goes wrong in it would be told to no one.
             self.report_server_error(error, FeatureRequestError)
             return
         self._took[uri] = min(time.monotonic() - began, LONGEST_PAUSE)
