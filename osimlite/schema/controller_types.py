@@ -4,9 +4,9 @@ from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, Object, made, none
 from osimlite.schema.controllers import Controller
-from osimlite.schema.fields import Many, Reference, Single, Value, Vector, real
+from osimlite.schema.fields import Many, Single, Value, Vector, real
 from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import MaybeFileName, Names, NumberInputs, reads
+from osimlite.schema.references import MaybeFileName, NumberInputs, reads
 
 
 class PrescribedController(Controller):
@@ -23,7 +23,6 @@ class PrescribedController(Controller):
 class ControlSetController(Controller):
     """Controls read from a file of control curves."""
 
-    socket_actuators: Annotated[Names, Reference("socket", "Actuator", "list", required=False, fate="left out")] = ()
     controls_file: Annotated[str, reads("ControlSet or table", legacy=True)] = "Unassigned"
     """File of control curves (.xml) or of columns (.sto)."""
 

@@ -104,8 +104,9 @@ class Reference(Kind):
 
     `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim class that the
     named component must be; OpenSim insists on one if it is `required`. In Python the component itself may be given;
-    the printer turns it into the right text. In a setup `words` may stand there besides names, and `fate` says what
-    OpenSim does with a name that leads to nothing: refuse it, leave it out, or ignore the property anyway.
+    the printer turns it into the right text. In a setup `words` may stand there besides names, of some properties in
+    `any_case`, and `fate` says what OpenSim does with a name that leads to nothing: refuse it, leave it out, or ignore
+    the property anyway.
     """
 
     rule: str
@@ -115,6 +116,11 @@ class Reference(Kind):
     legacy: bool = False
     words: tuple[str, ...] = ()
     fate: Fate = "refused"
+    any_case: bool = False
+
+    def takes(self, word: str) -> bool:
+        """Whether a text is one of the words that may stand there besides names."""
+        return word in self.words or (self.any_case and word.lower() in map(str.lower, self.words))
 
     def check(self, value: Any, accepts: type | None) -> Any:
         """Return the text or the component, or a tuple of them; ValueError if a component is of another class."""

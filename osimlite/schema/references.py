@@ -72,16 +72,17 @@ def writes(content: str, *, legacy: bool = False, required: bool = False) -> Ref
     return Reference("output-file", f"{content} file", required=required, legacy=legacy)
 
 
-def several(rule: str, target: str, *words: str, legacy: bool = True, fate: Fate = "refused") -> Reference:
+def several(
+    rule: str, target: str, *words: str, any_case: bool = False, legacy: bool = True, fate: Fate = "refused"
+) -> Reference:
     """Marker of a list of names, or of `words`, in what a tool is told."""
-    return Reference(rule, target, "list", required=False, legacy=legacy, words=words, fate=fate)
+    return Reference(rule, target, "list", False, legacy, words, fate, any_case)
 
 
 # What tools name in the model that they work on, and the files that they are given and write.
 BodyName = Annotated[Named, Reference("body-name", "Body", required=False, legacy=True)]
-BodiesOrCenterOfMass = Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")]
 LegacyCoordinateName = Annotated[CoordinateName, LEGACY]
-LegacyJointNames = Annotated[Names, several("joint-name", "Joint", "ALL", fate="left out")]
+LegacyJointNames = Annotated[Names, several("joint-name", "Joint", "ALL", any_case=True, fate="left out")]
 InputModel = Annotated[str, reads("Model", required=True)]
 LegacyInputModel = Annotated[str, reads("Model", legacy=True, required=True)]
 LegacyOutputModel = Annotated[str, writes("Model", legacy=True)]

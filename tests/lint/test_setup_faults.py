@@ -66,6 +66,29 @@ def test_a_model_may_be_named_by_its_absolute_path(pipeline):
     assert checked(*sorted(pipeline.iterdir())) == []
 
 
+@pytest.mark.parametrize(
+    ("version", "given", "severities"),
+    [
+        (40600, "socket_actuators>/forceset/nosuch", ["error"]),
+        (40600, "socket_actuators>hamstrings_r", ["error"]),
+        (40600, "socket_actuators>../../forceset/hamstrings_r", []),
+        (40600, "socket_actuators>/forceset/hip_flexion_r_reserve", []),
+        (40500, "actuator_list>nosuch", ["warning"]),
+        (40500, "actuator_list>hamstrings_r", []),
+    ],
+)
+def test_a_controller_names_actuators_by_their_paths_and_names_of_older_documents_are_left_out(
+    pipeline, version, given, severities
+):
+    """As OpenSim 4.6 takes them."""
+    text = TEXTS["forward.xml"].replace('"40600"', f'"{version}"')
+    text = text.replace("<results_directory>", "<force_set_files>reserves.xml</force_set_files><results_directory>")
+    text = text.replace("<enabled>true", f"<{given}</{given.partition('>')[0]}>\n<enabled>true", 1)
+    (pipeline / "forward.xml").write_text(text)
+    report = run(subject_of(str(pipeline / "forward.xml")))
+    assert [str(finding.severity) for finding in report if finding.code == "OSIM831"] == severities
+
+
 @pytest.mark.parametrize("fault", HARMLESS, ids=lambda fault: str(fault.number))
 def test_what_is_harmless_is_not_found(pipeline, fault):
     put_in(pipeline, fault)

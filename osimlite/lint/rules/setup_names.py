@@ -20,7 +20,7 @@ _KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle"
 _PATHS = ("model-path", "state-path", "pattern")
 """The other rules that lead from a setup into the model, whatever their target is."""
 _FATES = {"refused": ("OpenSim refuses it", None), "left out": ("OpenSim leaves it out", WARNING)}
-_PLACES = {"Marker": "/markerset", "Force": "/forceset"}
+_PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/controllerset"}
 """Where in the model stands what a tool adds to it; relative paths start there."""
 
 
@@ -81,26 +81,30 @@ def unknown_name(setup: Setup, found: Found) -> None:
     def known(what: str, rule: str) -> set[str]:
         if rule in _PATHS:
             return set(variables(tree, what))
+        if what == "Actuator":
+            return {*variables(tree, what), *(f"/forceset/{name}" for name in setup.names_of(what))}
         return set() if what == "component" else setup.names_of({"frame": "Body"}.get(what, what.capitalize()))
 
     for use in setup.uses:
         item, kind, text = use.holder, use.reference, str(use.value).strip()
-        if not text or text.lower() == "unassigned" or text in kind.words or kind.fate == "ignored":
+        if not text or text.lower() == "unassigned" or kind.takes(text) or kind.fate == "ignored":
             continue
         if not counts(item):
             continue
-        what, text, target = _looked_up(tree, use, text)
+        what, text, target = _looked_up(setup, tree, use, text)
         if what is None or target is not None:
             continue
         names = known(what, kind.rule)
         if text in names or not unknown.isdisjoint(text.split("/")) or _is_made(setup, text):
             continue
-        fate, severity = _FATES[kind.fate]
-        more = "; it is written in small letters" if text == "ALL" and "all" in kind.words else ""
+        # Of names in the older <actuator_list> only those are missed that are to have a function each.
+        is_lost = kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
+        fate, severity = _FATES["left out" if is_lost else kind.fate]
+        more = "; it is written in small letters" if text.lower() in kind.words else ""
         where: Any = {"attribute": "name"} if use.spec.tag == "@name" else {"tag": use.spec.tag, "word": text}
         found(
             f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}", item, **where,
-            severity=severity, suggestion="all" if more else nearest_name(text, sorted(names)),
+            severity=severity, suggestion=text.lower() if more else nearest_name(text, sorted(names)),
         )  # fmt: skip
     if setup.tool is not None and is_a(setup.tool[1], "AbstractTool"):
         _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, found)
@@ -112,14 +116,16 @@ def _what(kind: Reference) -> str | None:
     return kind.target if kind.rule in _PATHS else next(by_rule, None)
 
 
-def _looked_up(tree: Tree, use: Use, text: str) -> tuple[str | None, str, Component | None]:
+def _looked_up(setup: Setup, tree: Tree, use: Use, text: str) -> tuple[str | None, str, Component | None]:
     """What a text should name, if that is in the model, the text as it is looked up, and what it leads to."""
     item, kind, what = use.holder, use.reference, _what(use.reference)
-    if kind.rule == "socket" and is_a(item, "Controller"):
+    if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
+        # A name, that OpenSim looks for everywhere.
         return "actuator", text.rpartition("/")[2], None
-    if kind.rule == "socket" and kind.target.endswith("Frame"):
+    if kind.rule == "socket" and kind.target.endswith(("Frame", "Actuator")):
         place = next((f"{path}/{item.name}" for cls, path in _PLACES.items() if is_a(item, cls)), "")
-        what = "component" if place or text.startswith("/") else None
+        named = kind.target if kind.target == "Actuator" else "component"
+        what = named if place or text.startswith("/") else None
         return what, text, tree.walk(text, place, kind.target).target
     if kind.rule == "state-path" and kind.target == "output" and not text.startswith("/"):
         text = f"/{text}"
@@ -204,13 +210,13 @@ def excluded_force(setup: Setup, found: Found) -> None:
         if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
             found(f"{called(tool)} leaves out no force: muscles take part", tool, tag="forces_to_exclude")
     for use in setup.uses:
-        word, words = str(use.value), use.reference.words
-        if use.spec.tag != "forces_to_exclude" or word.upper() in words or word in (groups or names):
+        word = str(use.value)
+        if use.spec.tag != "forces_to_exclude" or use.reference.takes(word) or word in (groups or names):
             continue
         why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
         found(
             f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
             "nothing out for it",
             use.holder, tag="forces_to_exclude", word=word,
-            suggestion=nearest_name(word, [*words, *groups, *([] if groups else names)]),
+            suggestion=nearest_name(word, [*use.reference.words, *groups, *([] if groups else names)]),
         )  # fmt: skip

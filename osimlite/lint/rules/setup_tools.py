@@ -134,7 +134,7 @@ def tool_setting(setup: Setup, found: Found) -> None:
             found("no coordinate for moment arms: OpenSim fails", analysis, tag="moment_arm_coordinate_list")
         if is_a(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
-                if word not in ("child", "parent"):
+                if word.lower() not in ("child", "parent"):
                     found(
                         f"'{word}' is neither child nor parent: OpenSim refuses it", analysis, tag="apply_on_bodies",
                         word=word, suggestion=nearest_name(word, ["child", "parent"]),

@@ -20,7 +20,6 @@ from osimlite.schema.fields import (
     reals,
 )
 from osimlite.schema.references import (
-    BodiesOrCenterOfMass,
     LegacyInputTable,
     LegacyJointNames,
     Named,
@@ -61,7 +60,7 @@ class Actuation(Analysis):
 class BodyKinematics(Analysis):
     """Places, velocities and accelerations of bodies."""
 
-    bodies: BodiesOrCenterOfMass = ("all",)
+    bodies: Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")] = ("all",)
     """Names of bodies, `all`, or center_of_mass."""
     express_results_in_body_local_frame: LegacyFlag = False
     """Whether velocities and accelerations are along the axes of the body; otherwise of ground."""
@@ -92,9 +91,11 @@ class IMUDataReporter(Analysis):
 class InducedAccelerations(Analysis):
     """What each force contributes to accelerations."""
 
-    coordinate_names: Annotated[Names, several("coordinate-name", "Coordinate", "all")] = ()
+    coordinate_names: Annotated[Names, several("coordinate-name", "Coordinate", "all", any_case=True)] = ()
     """Coordinates whose accelerations are divided up, or `all`."""
-    body_names: BodiesOrCenterOfMass = ("center_of_mass",)
+    body_names: Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass", any_case=True)] = (
+        "center_of_mass",
+    )
     """Bodies whose accelerations are divided up, `all`, or center_of_mass."""
     constraint_set: LegacyUnnamed[ConstraintSet] = made(ConstraintSet)
     """Constraints that stand for the contact with the ground."""
@@ -115,7 +116,9 @@ class JointReaction(Analysis):
     """Joints that are written, or ALL."""
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
     """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
-    express_in_frame: Annotated[Names, several("frame-path-or-member", "Frame", "child", "parent")] = ("ground",)
+    express_in_frame: Annotated[Names, several("frame-path-or-member", "Frame", "child", "parent", any_case=True)] = (
+        "ground",
+    )
     """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
 
 
@@ -131,9 +134,9 @@ class MuscleAnalysis(Analysis):
 
     muscle_list: Annotated[Names, several("muscle-name", "Muscle", "all", fate="left out")] = ("all",)
     """Muscles that are written, or `all`."""
-    moment_arm_coordinate_list: Annotated[Names, several("coordinate-name", "Coordinate", "all", fate="left out")] = (
-        "all",
-    )
+    moment_arm_coordinate_list: Annotated[
+        Names, several("coordinate-name", "Coordinate", "all", any_case=True, fate="left out")
+    ] = ("all",)
     """Coordinates about which moment arms are computed, or `all`."""
     compute_moments: LegacyFlag = True
     """Whether moments are computed besides moment arms."""

@@ -30,7 +30,7 @@ class DynamicsTool(Tool, abstract=True):
     time_range: Annotated[Reals, reals("s", least=2, most=2, legacy=True)] = (float("-inf"), float("inf"))
     """First and last time."""
     forces_to_exclude: Annotated[
-        Names, several("set-member", "Force", "MUSCLES", "ACTUATORS", "ALL", fate="left out")
+        Names, several("set-member", "Force", "MUSCLES", "ACTUATORS", "ALL", any_case=True, fate="left out")
     ] = ()
     """Forces that do not act: ALL, ACTUATORS, MUSCLES, groups of the model's forces, names of forces."""
     external_loads_file: LegacyInputLoads = "Unassigned"
