@@ -110,7 +110,8 @@ def _check(source: Source, given: Config) -> Report:
 
     assert source.file is not None
     with collector_paused():
-        return run(subject_in(source, settings_of(source.file).config_for(source.file, given)))
+        # No rule that is about measures mends anything.
+        return run(subject_in(source, settings_of(source.file).config_for(source.file, given)), measure=False)
 
 
 def _fail_on_of(files: list[str]) -> Severity:
@@ -198,8 +199,8 @@ def _width() -> int:
 
 def _statistics(report: Report) -> str:
     from osimlite.lint.engine import all_rules
-    from osimlite.lint.reporters.style import summary
+    from osimlite.lint.reporters.style import summary, unmeasured
 
     known = {rule.code: rule for rule in all_rules()}
     rows = [f"{count:6d}  {code}  {known[code].name}" for code, count in report.codes.most_common()]
-    return "\n".join([*rows, summary(report)]) + "\n"
+    return "\n".join([*rows, summary(report), *filter(None, [unmeasured(report)])]) + "\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
@@ -39,7 +40,7 @@ def without_baseline(path: str | Path, report: Report) -> Report:
             counts[_key(finding)] -= 1
         else:
             kept.append(finding)
-    return Report(kept, report.texts, report.checked, len(report.findings) - len(kept))
+    return replace(report, findings=kept, known=len(report.findings) - len(kept))
 
 
 def _key(finding: Finding) -> tuple[str, str, str, str]:

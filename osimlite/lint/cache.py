@@ -20,7 +20,8 @@ from zlib import crc32
 from osimlite import __version__
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file, stamped
-from osimlite.lint.diagnostic import Edit, Finding, Fix, Severity
+from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
+from osimlite.lint.measures import can_measure
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 NAME = ".osimlite_cache"
 Stamp = tuple[int, int] | None
+_PARTS = ("document", "forces", "lint", "measuring", "multibody", "schema", "simulation")
+"""Where the code is that findings come from."""
 
 
 class Cache:
@@ -38,15 +41,22 @@ class Cache:
         self.folder = folder / __version__
         self._stamps: dict[str, Stamp] = {}
 
-    def get(self, file: str, key: str) -> list[Finding] | None:
-        """The findings in a file, None unless they were kept for this key and nothing has changed since."""
+    def get(self, file: str, key: str) -> Report | None:
+        """What was found in a file, None unless it was kept for this key and nothing has changed since."""
         try:
             match json.loads(read_file(self._entry(file))):
-                case {"key": str(kept), "text": [*text], "outside": [*outside], "findings": [*findings], **rest}:
+                case {
+                    "key": str(kept),
+                    "text": [*text],
+                    "outside": [*outside],
+                    "findings": [*findings],
+                    "unmeasured": [*why_not],
+                    **rest,
+                }:
                     stamps = dict(map(_outside, outside))
                     if kept != key or any(self._stamp(path) != stamp for path, stamp in stamps.items()):
                         return None
-                    known = [_finding(file, values) for values in findings]
+                    known = Report([_finding(file, values) for values in findings], unmeasured=why_not)
                     now = time_ns()
                     if rest.get("file") != _own_stamp(file):
                         if text != text_of(read_file(file)):
@@ -57,16 +67,14 @@ class Cache:
             pass
         return None
 
-    def put(
-        self, file: str, key: str, text: list[object], findings: Iterable[Finding], outside: Iterable[str], since: int
-    ) -> None:
+    def put(self, file: str, key: str, text: list[object], report: Report, outside: Iterable[str], since: int) -> None:
         """Keep what was found.
 
         Args:
             file: its path.
             key: what the entry holds for.
             text: the text that was checked.
-            findings: in it.
+            report: of it.
             outside: the paths at which the check looked for something.
             since: when the check began, ns.
         """
@@ -79,7 +87,8 @@ class Cache:
                 "file": _stamp_since(file, since),
                 "text": text,
                 "outside": [(path, self._stamp(path)) for path in outside],
-                "findings": [_values(finding) for finding in findings],
+                "findings": [_values(finding) for finding in report],
+                "unmeasured": report.unmeasured,
             }
             from tempfile import mkstemp
 
@@ -130,7 +139,7 @@ def key_of(file: str, config: Config) -> str:
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
         _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
-        [(path, stamped(path)) for path in config.classes], config.target_version,
+        [(path, stamped(path)) for path in config.classes], config.target_version, can_measure(),
     )  # fmt: skip
     return blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16).hexdigest()
 
@@ -160,7 +169,7 @@ def _code() -> str:
     package = Path(__file__).parents[1]
     places = [
         next(os.walk(package)),
-        *(place for part in ("document", "lint", "schema") for place in os.walk(package / part)),
+        *(place for part in _PARTS for place in os.walk(package / part)),
     ]
     files = (os.path.join(folder, file) for folder, _, names in places for file in names if file.endswith(".py"))
     times = [os.stat(file).st_mtime_ns for file in files]

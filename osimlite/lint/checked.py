@@ -46,6 +46,10 @@ class Checked:
         """Whether a rule has anything to look at."""
         return rule.about == self.about
 
+    def unmeasured(self) -> str:
+        """Measure what rules about measures speak of; why that cannot be done, if it cannot."""
+        return ""
+
     def path(self, item: Object | None) -> str:
         """The absolute path of the component an object belongs to."""
         return ""

@@ -106,13 +106,15 @@ class Report:
     """Everything found in one or several models, sorted by file and place.
 
     `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the files,
-    `known` what a baseline has left out.
+    `known` what a baseline has left out. `unmeasured` has, of each file whose paths and muscles could not be measured,
+    its name and why.
     """
 
     findings: list[Finding] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
     checked: int = 1
     known: int = 0
+    unmeasured: list[str] = field(default_factory=list)
 
     @property
     def errors(self) -> list[Finding]:
@@ -163,4 +165,5 @@ def merged(reports: Iterable[Report]) -> Report:
         whole.findings.extend(report.findings)
         whole.texts.update(report.texts)
         whole.checked += report.checked
+        whole.unmeasured += report.unmeasured
     return whole

@@ -21,6 +21,7 @@ from osimlite.files import read_file
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
+from osimlite.lint.measures import MEASURES
 from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_document, is_table
 from osimlite.lint.suppressions import Suppression
@@ -71,6 +72,8 @@ _MODULES = (
     "paths",
     "wraps",
     "muscles",
+    "measured_paths",
+    "measured_muscles",
     "files",
     "tables",
     "table_rows",
@@ -125,7 +128,7 @@ class Rule:
 
     `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
     version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
-    at: ``model``, ``table`` or ``document`` (a setup, or a part of one).
+    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's paths and muscles).
     """
 
     code: str
@@ -251,24 +254,35 @@ def check_model(model: Model, config: Config | None = None) -> Report:
         return run(Subject(model, config))
 
 
-def run(subject: Checked) -> Report:
-    """Run every rule that is wanted, and return all findings sorted by place."""
+def run(subject: Checked, *, measure: bool = True) -> Report:
+    """Run every rule that is wanted, and return all findings sorted by place.
+
+    Args:
+        subject: what is checked.
+        measure: whether rules run that are about what is measured of paths and muscles, which takes longer.
+    """
     findings: list[Finding] = []
-    for known in all_rules():
-        if subject.config.wants(known) and subject.is_for(known):
+    wanted = [known for known in all_rules() if subject.config.wants(known) and subject.is_for(known)]
+    measuring = [known for known in wanted if known.about == MEASURES]
+    why_not = "" if not measuring else subject.unmeasured() if measure else "nobody asked"
+    left_out = measuring if why_not else []
+    for known in wanted:
+        if known not in left_out:
             known.check(subject, _collector(known, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
     comments = subject.suppressions()
     if comments:
-        findings = _not_ignored(subject, comments, findings)
+        findings = _not_ignored(subject, comments, findings, left_out)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
-    return Report(unique)
+    return Report(unique, unmeasured=[f"{subject.file or 'the model'}: {why_not}"] if why_not and measure else [])
 
 
-def _not_ignored(subject: Checked, comments: list[Suppression], findings: list[Finding]) -> list[Finding]:
+def _not_ignored(
+    subject: Checked, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
+) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
     kept = [finding for finding in findings if not any([comment.covers(finding) for comment in comments])]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
@@ -276,9 +290,11 @@ def _not_ignored(subject: Checked, comments: list[Suppression], findings: list[F
         found = _collector(unused, subject, kept)
         for comment in comments:
             for code in comment.codes:
+                named = [known for known in all_rules() if known.matches(code)]
                 # Of a rule that did not run nobody can say that nothing was found.
-                ran = any(known.matches(code) and subject.config.wants(known) for known in all_rules())
-                if code not in comment.used and (ran or not any(known.matches(code) for known in all_rules())):
+                is_silent = any(known in left_out for known in named)
+                ran = not named or (any(map(subject.config.wants, named)) and not is_silent)
+                if code not in comment.used and ran:
                     found(f"nothing is found here that '{code}' would ignore", at=comment.place)
             if not comment.codes:
                 found("this comment names no code to ignore", at=comment.place)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from time import time_ns
@@ -14,7 +15,7 @@ from osimlite.errors import MissingFileError
 from osimlite.files import read_standard_input
 from osimlite.lint.cache import Cache, folder_for, key_of, text_of
 from osimlite.lint.config import Config
-from osimlite.lint.diagnostic import Finding, Report
+from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.settings import Settings, settings_for
 
 WORTH_SHARING = 4_000_000
@@ -52,7 +53,7 @@ def check_files(
         MissingFileError: a file is missing or cannot be read.
         OsimliteError: the settings make no sense.
     """
-    found: dict[str, list[Finding]] = {}
+    found: dict[str, Report] = {}
     texts = Texts()
     jobs: list[Job] = []
     caches: dict[Path, Cache] = {}
@@ -71,11 +72,12 @@ def check_files(
             jobs.append(job)
         else:
             found[file] = known
-    for count, (job, findings) in enumerate(_checked(jobs, processes), len(found) + 1):
-        found[job.file] = findings
+    for count, (job, report) in enumerate(_checked(jobs, processes), len(found) + 1):
+        found[job.file] = report
         if progress is not None:
             progress(count, len(files))
-    return Report([finding for file in files for finding in found[file]], texts, len(files))
+    whole = merged(found[file] for file in files)
+    return replace(whole, texts=texts, checked=len(files))
 
 
 class Texts(dict[str, str]):
@@ -100,7 +102,7 @@ def _resolved(folder: str) -> Path:
     return Path(folder).resolve()
 
 
-def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, list[Finding]]]:
+def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, Report]]:
     if not jobs:
         return
     if processes is None:
@@ -136,7 +138,7 @@ def _processes(jobs: list[Job]) -> int:
     return min(present, len(jobs), 61)
 
 
-def check_one(job: Job) -> list[Finding]:
+def check_one(job: Job) -> Report:
     """Check one file, and keep what was found."""
     from osimlite.document.reader import collector_paused
     from osimlite.lint.engine import run, subject_of
@@ -144,19 +146,19 @@ def check_one(job: Job) -> list[Finding]:
     began = time_ns()
     with collector_paused():
         subject = subject_of(job.file, job.config)
-        findings = run(subject).findings
+        report = run(subject)
         outside = subject.outside() if job.kept_in is not None else None
         if job.kept_in is not None and outside is not None:
             # A file that changes while it is checked must not be taken for one that was checked after.
             key, text = key_of(job.file, job.config), text_of(subject.data)
-            Cache(job.kept_in).put(job.file, key, text, findings, outside, began)
-    return findings
+            Cache(job.kept_in).put(job.file, key, text, report, outside, began)
+    return report
 
 
-def _standard_input(config: Config, texts: dict[str, str]) -> list[Finding]:
+def _standard_input(config: Config, texts: dict[str, str]) -> Report:
     from osimlite.document.source import Source
     from osimlite.lint.engine import check_source
 
     source = Source(read_standard_input(), "<stdin>")
     texts["<stdin>"] = source.text
-    return check_source(source, config).findings
+    return check_source(source, config)

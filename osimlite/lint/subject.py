@@ -15,6 +15,7 @@ from osimlite.document.survey import Survey
 from osimlite.errors import DocumentError, SpecialFileError
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
+from osimlite.lint.measures import MEASURES, has_measures, unmeasured
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.model import Model
@@ -66,11 +67,17 @@ class Subject(Checked):
 
     def is_for(self, rule: Rule) -> bool:
         """Whether a rule has anything to look at; of a text with a syntax error only what is said in one place."""
+        if rule.about == MEASURES and self.about == "model":
+            return self.model is not None and self.sure_until is None and has_measures(self)
         if rule.about != self.about:
             return False
         if rule.code[4] == "0":
             return self.source is not None
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
+
+    def unmeasured(self) -> str:
+        """Measure paths and muscles of the model; why that cannot be done, if it cannot."""
+        return unmeasured(self)
 
     @cached_property
     def folder(self) -> Path | None:

@@ -94,7 +94,8 @@ class Analysis:
     def report(self) -> Report:
         """What the rules find."""
         with collector_paused():
-            return Report([]) if self.is_foreign else run(self.subject)
+            # Measuring paths takes too long for every change of a text; `osimlite validate` does it.
+            return Report([]) if self.is_foreign else run(self.subject, measure=False)
 
     @property
     def is_checked(self) -> bool:

@@ -23,8 +23,9 @@ from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED
+from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED, SURFACE
 from osimlite.simulation.kernels.projection import REDUNDANT
+from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 
@@ -100,6 +101,13 @@ class Paths:
         Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k and n + 2 k + 1.
         """
         return self._system.nodes(self.mechanism.values(q), self.routes)
+
+    def lengths_on_surfaces(self, q: Values) -> dict[str, dict[str, float]]:
+        """Length of each path through points on each of its surfaces, by their names (m); 0 where it passes by.
+
+        NaN where OpenSim has the path wrap, finds no points for it, and goes straight through the surface.
+        """
+        return self._system.on_surfaces(self.mechanism.values(q), self.routes)
 
     def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
         """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.
@@ -208,6 +216,30 @@ class _System(System):
                 order = record[ORDER : ORDER + int(record[COUNT])].astype(int)
                 work = record[ORDER + len(route.points) + 2 * len(route.surfaces) :]
                 found[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
+        return found
+
+    def on_surfaces(self, q: Array, routes: Mapping[str, Along]) -> dict[str, dict[str, float]]:
+        """The lengths of each path on its surfaces, see :meth:`Paths.lengths_on_surfaces`."""
+        through = [
+            (name, route, [place for place, _ in items])
+            for (name, route), items in zip(routes.items(), self._items, strict=True)
+            if isinstance(route, ThroughPoints) and route.surfaces
+        ]
+        for _, _, (_, *laws, _) in through:
+            # What the law of a surface says of a piece stays where it is until it is asked again.
+            self._w[[place + SURFACE_LENGTH for place in laws]] = 0.0
+        self._evaluated(q, np.zeros(len(q)))
+        found: dict[str, dict[str, float]] = {}
+        for name, route, (_, *laws, path) in through:
+            size, law = len(route.points) + 2 * len(route.surfaces), iter(laws)
+            order = self._w[path + ORDER :][: int(self._w[path + COUNT])]
+            found[name] = {}
+            for second, surface in zip(range(len(route.points) + 1, size, 2), route.surfaces, strict=True):
+                # Of a piece that goes straight on, 0 or NaN.
+                length = 0.0 * self._w[next(law) + SURFACE_LENGTH] if surface.law else 0.0
+                if second in order:
+                    length = self._w[path + ORDER + size + NODE_WORK * second + SURFACE]
+                found[name][surface.tangent.name] = float(length)
         return found
 
     def _evaluated(self, q: Array, u: Array) -> None:

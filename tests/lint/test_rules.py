@@ -24,7 +24,15 @@ assert _spec is not None and _spec.loader is not None
 skeleton = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(skeleton)
 
+MEASURED = "OSIM63"
+"""Rules that speak of every muscle and path there is, wherever another rule has an example."""
+
 RULES = [pytest.param(rule, id=rule.code) for rule in all_rules()]
+
+
+def checked(path: Path, rule: Rule):
+    """What is found in an example or fixture of a rule."""
+    return validate(path, ignore="" if rule.code.startswith(MEASURED) else MEASURED)
 
 
 def example(rule: Rule, heading: str) -> bytes:
@@ -66,14 +74,14 @@ def example_file(rule: Rule, heading: str, folder: Path) -> Path:
 @pytest.mark.parametrize("rule", RULES)
 def test_the_example_of_a_page_has_the_finding(rule, tmp_path):
     path = example_file(rule, "Example", tmp_path)
-    report = validate(path)
+    report = checked(path, rule)
     assert set(report.codes) == {rule.code}, str(report)
     assert all(finding.line is not None for finding in report)
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_the_mended_example_has_no_finding(rule, tmp_path):
-    assert str(validate(example_file(rule, "Use instead", tmp_path))) == "nothing found"
+    assert str(checked(example_file(rule, "Use instead", tmp_path), rule)) == "nothing found"
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -83,10 +91,10 @@ def test_a_rule_has_fixtures_that_fail_and_that_pass(rule):
     assert failing and passing, f"fixtures/lint/{rule.code} needs fail-NN-* and pass-*"
     for path in failing:
         expected = int(path.name.split("-")[1])
-        report = validate(path)
+        report = checked(path, rule)
         assert dict(report.codes) == {rule.code: expected}, f"{path.name}:\n{report}"
     for path in passing:
-        assert str(validate(path)) == "nothing found", path.name
+        assert str(checked(path, rule)) == "nothing found", path.name
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -94,7 +102,7 @@ def test_a_rule_mends_as_its_page_says(rule):
     kinds = {
         "safe" if finding.fix.safe else "unsafe"
         for path in (FIXTURES / rule.code).glob("fail-*")
-        for finding in validate(path)
+        for finding in checked(path, rule)
         if finding.fix is not None
     }
     assert kinds == {"": set(), "both": {"safe", "unsafe"}}.get(rule.mends, {rule.mends})

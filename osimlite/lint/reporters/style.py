@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from osimlite.lint.diagnostic import Report, Severity
+from osimlite.text import visible
 
 _CODES = {
     Severity.ERROR: "1;31",
@@ -35,6 +36,14 @@ def summary(report: Report, colour: bool = False) -> str:
     if not parts:
         return painted(f"Nothing found in {files}{known}.", "good", colour)
     return f"Found {', '.join(parts)} in {files}{known}."
+
+
+def unmeasured(report: Report) -> str:
+    """That paths and muscles could not be measured, and why; nothing if they were."""
+    if not report.unmeasured:
+        return ""
+    more = f", and {len(report.unmeasured) - 1} more" if len(report.unmeasured) > 1 else ""
+    return visible(f"Paths and muscles (OSIM63) were not measured: {report.unmeasured[0]}{more}.")
 
 
 def _plural(noun: str, count: int) -> str:

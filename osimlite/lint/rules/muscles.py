@@ -207,6 +207,99 @@ def out_of_reach(subject: Subject, found: Found) -> None:
             )
 
 
+@rule("OSIM624", "shared-time-constants", severity=WARNING)
+def shared_time_constants(subject: Subject, found: Found) -> None:
+    """Muscles differ in time constants that OpenSim has only once.
+
+    ## What it does
+    Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`, `deactivation_time_constant` or
+    `activation_dynamics_smoothing` is not that of the first one in the model, among those whose activation is a state.
+
+    ## Why is this bad
+    OpenSim keeps these three for the whole process. They are those of the muscle that it computes first, also if that
+    belongs to a model that was loaded before: a muscle of 30 ms that comes after one of 15 ms is activated twice as
+    fast as its file says. Muscles of other classes each have their own.
+
+    ## Example
+    ```xml
+    <DeGrooteFregly2016Muscle name="fast">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                        <location>0 0.17 0</location> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <ignore_tendon_compliance>true</ignore_tendon_compliance>
+        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+    </DeGrooteFregly2016Muscle>
+    <DeGrooteFregly2016Muscle name="slow">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                        <location>0 0.17 0</location> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <ignore_tendon_compliance>true</ignore_tendon_compliance>
+        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+        <activation_time_constant>0.03</activation_time_constant>
+    </DeGrooteFregly2016Muscle>
+    ```
+
+    ## Use instead
+    ```xml
+    <DeGrooteFregly2016Muscle name="fast">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                        <location>0 0.17 0</location> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <ignore_tendon_compliance>true</ignore_tendon_compliance>
+        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+    </DeGrooteFregly2016Muscle>
+    <DeGrooteFregly2016Muscle name="slow">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                        <location>0 0.17 0</location> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <ignore_tendon_compliance>true</ignore_tendon_compliance>
+        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+    </DeGrooteFregly2016Muscle>
+    ```
+    """
+    first = None
+    for muscle in subject.named("DeGrooteFregly2016Muscle"):
+        if muscle.ignore_activation_dynamics:
+            continue
+        first = first or muscle
+        for tag in _SHARED:
+            own, counts = getattr(muscle, tag), getattr(first, tag)
+            if own != counts:
+                found(
+                    f"{tag} of {called(muscle)} is {quantity(own)}, and OpenSim computes with {quantity(counts)}, that "
+                    f"of {called(first)}",
+                    muscle,
+                    tag=tag if tag in muscle.model_fields_set else None,
+                )
+
+
+_SHARED = ("activation_time_constant", "deactivation_time_constant", "activation_dynamics_smoothing")
+
+
 def _in_ground(subject: Subject, path: GeometryPath) -> list[Vector]:
     """Where the points of a path are in the default pose that belong to it there; none if one of them is not known."""
     poses, places = default_poses(subject), []

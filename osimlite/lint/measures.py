@@ -1,0 +1,152 @@
+"""What is measured of the paths and muscles of a model, for the rules that are about it.
+
+The linter computes without a numeric library. Numbers that need one come from :mod:`osimlite.measuring`, which stands
+above linter and simulation: it is loaded by its name, for a model that has something to measure.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from math import degrees
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+from osimlite.errors import OsimliteError
+from osimlite.text import listed
+
+if TYPE_CHECKING:
+    from osimlite.lint.subject import Subject
+
+MEASURES = "measures"
+"""What rules are about that need them."""
+
+_MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
+
+
+class Pose(NamedTuple):
+    """The default pose but for one coordinate (rad or m); the default pose itself if that has no name."""
+
+    coordinate: str = ""
+    value: float = 0.0
+    is_angle: bool = False
+
+    def __str__(self) -> str:
+        if not self.coordinate:
+            return "in the default pose"
+        value = f"{degrees(self.value):.4g} deg" if self.is_angle else f"{self.value:.4g} m"
+        return f"at '{self.coordinate}' = {value}"
+
+
+class Jump(NamedTuple):
+    """A length of a path that jumps: by how much (m), where, and which points or surfaces come or go there."""
+
+    owner: str
+    size: float
+    pose: Pose
+    parts: tuple[str, ...]
+
+
+class LengthOnSurface(NamedTuple):
+    """A length of a path on one of its surfaces (m) that is negative, or NaN where OpenSim finds no way around it."""
+
+    owner: str
+    surface: str
+    length: float
+    pose: Pose
+
+
+class MovingPoint(NamedTuple):
+    """A moving point at an end of its coordinate's range.
+
+    Attributes:
+        owner: path of what has the point.
+        point: its name.
+        pose: the end of the range.
+        beyond: by how much the coordinate is outside what the functions are given for there (rad or m), 0 if inside.
+        moved: how far they let the point move on that way, m.
+        rate: of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1.
+    """
+
+    owner: str
+    point: str
+    pose: Pose
+    beyond: float
+    moved: float
+    rate: float
+
+
+class Start(NamedTuple):
+    """A muscle in the state that it starts with, and in equilibrium at the same activation, in the default pose.
+
+    Attributes:
+        owner: its path.
+        lengths: of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none.
+        tensions: of the tendon, in max_isometric_force.
+        velocity: of the fibers at the start, in optimal fiber lengths per second.
+    """
+
+    owner: str
+    lengths: tuple[float, float]
+    tensions: tuple[float, float]
+    velocity: float
+
+
+class Reach(NamedTuple):
+    """The fibers of a muscle in equilibrium, fully active where its path is shortest, at rest where it is longest.
+
+    Attributes:
+        owner: path of the muscle.
+        is_active: whether they are.
+        pose: where.
+        length: of the fibers, in optimal fiber lengths.
+        is_limit: whether that is the least that its curves and its pennation allow.
+    """
+
+    owner: str
+    is_active: bool
+    pose: Pose
+    length: float
+    is_limit: bool
+
+
+class Measures(NamedTuple):
+    """What is measured of a model; paths are looked at in `poses` poses."""
+
+    poses: int
+    jumps: list[Jump]
+    on_surfaces: list[LengthOnSurface]
+    moving_points: list[MovingPoint]
+    starts: list[Start]
+    reaches: list[Reach]
+
+
+def has_measures(subject: Subject) -> bool:
+    """Whether a model has muscles, or paths whose lengths do not follow from fixed points."""
+    return any(next(subject.named(name), None) is not None for name in _MEASURED)
+
+
+def can_measure() -> bool:
+    """Whether all is installed that this takes."""
+    return not _missing()
+
+
+def unmeasured(subject: Subject) -> str:
+    """Measure a model; why that cannot be done, if it cannot."""
+    if not can_measure():
+        return f"that needs {listed(_missing())}; run: pip install 'osimlite[sim]'"
+    try:
+        subject.kept[MEASURES] = import_module("osimlite.measuring").measured(subject.model)
+    except OsimliteError as error:
+        return error.message
+    return ""
+
+
+def measures_of(subject: Subject) -> Measures:
+    """What was measured of a model."""
+    return cast("Measures", subject.kept[MEASURES])
+
+
+@cache
+def _missing() -> list[str]:
+    return [name for name in ("numpy", "numba") if find_spec(name) is None]

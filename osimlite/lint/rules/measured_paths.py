@@ -1,0 +1,254 @@
+"""OSIM632 to OSIM634: lengths of paths, measured over the ranges of the coordinates."""
+
+from __future__ import annotations
+
+from math import degrees
+
+from osimlite.lint.config import Threshold
+from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.measures import MEASURES, Jump, MovingPoint, measures_of
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called
+from osimlite.text import listed
+
+JUMP = Threshold("path-jump", 0.001, "m", "so far may a path jump; less than 0.0005 is not looked for")
+
+
+@rule("OSIM632", "path-jump", severity=WARNING, thresholds=(JUMP,), about=MEASURES)
+def path_jump(subject: Subject, found: Found) -> None:
+    """The length of a path jumps.
+
+    ## What it does
+    Reports paths whose length jumps by a millimetre or more where a coordinate takes a value within its range, the
+    others being as in the default pose: since a conditional point comes or goes, or since OpenSim finds another way
+    around a surface. Each path is reported once, with its greatest jump. Nine values of each coordinate are looked at,
+    the ends of the ranges of conditional points, and what lies between two values where the length changes otherwise
+    than next to them.
+
+    ## Why is this bad
+    The muscle's force jumps there, and so do accelerations: integrators take ever smaller steps, optimisations have no
+    derivative, and a fiber is torn at once by as much as the path jumps. The moment arm tells nothing of it. A wrap
+    surface, or a moving point, in place of the conditional point makes the length continuous.
+
+    ## Example
+    ```xml
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <ConditionalPathPoint name="b">
+                        <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.05 -0.2 0</location>
+                        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 -1</range>
+                    </ConditionalPathPoint>
+                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+
+    ## Use instead
+    ```xml
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <ConditionalPathPoint name="b">
+                        <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.05 -0.2 0</location>
+                        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 0</range>
+                    </ConditionalPathPoint>
+                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+    """
+    least = subject.config.value_of(JUMP)
+    greatest: dict[str, Jump] = {}
+    for jump in measures_of(subject).jumps:
+        if jump.size >= max(least, greatest[jump.owner].size if jump.owner in greatest else 0.0):
+            greatest[jump.owner] = jump
+    for jump in greatest.values():
+        owner = subject.tree.at(jump.owner)
+        parts = listed([f"'{part}'" for part in jump.parts])
+        why = f"{parts} {'come or go' if len(jump.parts) > 1 else 'comes or goes'}" if parts else "its way changes"
+        length = f"the length of the path of {called(owner)}"
+        found(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {why}", owner)
+
+
+@rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES)
+def length_of_wrap(subject: Subject, found: Found) -> None:
+    """OpenSim computes a negative length of a path on a surface, or none.
+
+    ## What it does
+    Reports wraps of which OpenSim subtracts the length of the path on the surface instead of adding it, which happens
+    on the far side of a sphere whose `quadrant` is not all of it; and wraps for which it finds no points, so that the
+    path goes straight through the surface, which happens where the line between the points goes through the middle of a
+    sphere. Looked at are the default pose, and nine values of each coordinate over its range.
+
+    ## Why is this bad
+    The path is too short, by centimetres and perhaps below zero; forces and moment arms are those of another path.
+    Where a path goes through the middle of a sphere its length jumps.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+        <WrapObjectSet name="wrapobjectset">
+            <objects>
+                <WrapSphere name="condyle">
+                    <quadrant>x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
+                </WrapSphere>
+            </objects>
+        </WrapObjectSet>
+    </Body>
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>-0.039 -0.18 0</location> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>-0.039 -0.22 0.001</location> </PathPoint>
+                </objects>
+            </PathPointSet>
+            <PathWrapSet>
+                <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
+            </PathWrapSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+        <WrapObjectSet name="wrapobjectset">
+            <objects>
+                <WrapSphere name="condyle">
+                    <quadrant>-x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
+                </WrapSphere>
+            </objects>
+        </WrapObjectSet>
+    </Body>
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>-0.039 -0.18 0</location> </PathPoint>
+                    <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                        <location>-0.039 -0.22 0.001</location> </PathPoint>
+                </objects>
+            </PathPointSet>
+            <PathWrapSet>
+                <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
+            </PathWrapSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+    """
+    for item in measures_of(subject).on_surfaces:
+        owner = subject.tree.at(item.owner)
+        path = f"the path of {called(owner)}"
+        if item.length < 0.0:
+            found(f"OpenSim counts {path} on '{item.surface}' as {1000.0 * item.length:.3g} mm {item.pose}", owner)
+        else:
+            found(f"{path} goes straight through '{item.surface}' {item.pose}: OpenSim finds no points", owner)
+
+
+MADE_UP = Threshold("made-up-path", 0.001, "m", "a moving point may move by so much where its functions are not given")
+RATE = Threshold("resting-point", 0.005, "m per rad or m", "a point that rests outside a range may be said to move so")
+
+
+@rule("OSIM634", "moving-point-range", severity=WARNING, thresholds=(MADE_UP, RATE), about=MEASURES)
+def moving_point_range(subject: Subject, found: Found) -> None:
+    """A moving path point has no place for all values of its coordinate.
+
+    ## What it does
+    Reports moving points whose functions end before the range of their coordinate does, and make the point move on by a
+    millimetre or more from there to the end of the range. As an info it reports those whose place would go on changing
+    at an end of the range by 5 mm per radian or more, if nothing keeps the coordinate within: that is, if no
+    CoordinateLimitForce acts on it and it is neither locked nor prescribed.
+
+    ## Why is this bad
+    Where functions are not given OpenSim prolongs them: a spline by a straight line, a GCVSpline by a parabola or so,
+    which soon leads off the bone. Outside the range of the coordinate a moving point rests in OpenSim, while the speed
+    of the path, its moment arm and its work go on as if the point moved: the length and its rate contradict each other,
+    and energy is not conserved. Nothing keeps a coordinate in its range in a simulation, `clamped` neither.
+
+    ## Example
+    ```xml
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <MovingPathPoint name="b">
+                        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                        <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
+                        <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
+                        <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
+                        <x_location> <SimmSpline> <x>-1 -0.5 0</x> <y>0.02 0.03 0.05</y> </SimmSpline> </x_location>
+                        <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
+                        <z_location> <Constant> <value>0</value> </Constant> </z_location>
+                    </MovingPathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+
+    ## Use instead
+    ```xml
+    <PathSpring name="spring">
+        <GeometryPath name="path">
+            <PathPointSet>
+                <objects>
+                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                    <MovingPathPoint name="b">
+                        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                        <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
+                        <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
+                        <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
+                        <x_location> <SimmSpline> <x>-2.1 -1 0</x> <y>0.018 0.02 0.05</y> </SimmSpline> </x_location>
+                        <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
+                        <z_location> <Constant> <value>0</value> </Constant> </z_location>
+                    </MovingPathPoint>
+                </objects>
+            </PathPointSet>
+        </GeometryPath>
+        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    </PathSpring>
+    ```
+    """
+    made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)
+    kept = {force.coordinate for force in subject.named("CoordinateLimitForce")}
+    worst: dict[tuple[str, str], MovingPoint] = {}
+    for point in measures_of(subject).moving_points:
+        if point.moved >= made_up or (point.rate >= rate and point.pose.coordinate not in kept):
+            other = worst.setdefault((point.owner, point.point), point)
+            worst[point.owner, point.point] = max(other, point, key=lambda it: (it.moved >= made_up, it.moved, it.rate))
+    for point in worst.values():
+        owner, end, is_angle = subject.tree.at(point.owner), point.pose, point.pose.is_angle
+        names = f"'{point.point}' of {called(owner)}"
+        if point.moved >= made_up:
+            beyond = f"{degrees(point.beyond):.3g} deg" if is_angle else f"{point.beyond:.3g} m"
+            found(
+                f"the functions of the place of {names} end {beyond} before the range of '{end.coordinate}': OpenSim "
+                f"lets it move on by {1000.0 * point.moved:.3g} mm, to its place {end}",
+                owner,
+            )
+        else:
+            found(
+                f"beyond the range of '{end.coordinate}', which nothing keeps it in, {names} rests and OpenSim goes on "
+                f"as if it moved, by {1000.0 * point.rate:.3g} mm per {'rad' if is_angle else 'm'} {end}",
+                owner,
+                severity=INFO,
+            )

@@ -1,0 +1,103 @@
+"""Muscles where they start, and where their paths are shortest and longest, in equilibrium at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import repeat
+from math import nan
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from osimlite.lint.measures import Pose, Reach, Start
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.kind import Kind, kind_of_class
+from osimlite.simulation.elements.parameters import Fields, Number, Numbers
+
+ROUNDING = 1e-9
+
+
+class Fibers(NamedTuple):
+    """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer.
+
+    Attributes:
+        path: of the muscle.
+        kind: of the muscle.
+        component: the muscle.
+        values: of the parameters of the law, but for the control.
+    """
+
+    path: str
+    kind: Kind
+    component: Any
+    values: tuple[Any, ...]
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether there is something to bring into equilibrium."""
+        kind = self.kind
+        return any(state.name in kind.settled and state.exists(self.component) for state in kind.states)
+
+    def starts(self) -> dict[str, float]:
+        """The states where they start."""
+        return {state.name: float(state.start(self.component)) for state in self.kind.states}
+
+    def settled(self, length: float, states: dict[str, float]) -> dict[str, float]:
+        """The states in equilibrium at a length of the path (m), NaN if there is none."""
+        if not self.is_elastic:
+            return states
+        is_found, *found = self._asked(self.kind.equilibrium, length, states)
+        return states | dict(zip(self.kind.settled, found if is_found else repeat(nan), strict=False))
+
+    def at(self, length: float, states: dict[str, float]) -> dict[str, float]:
+        """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
+        known = dict(zip(self.kind.outputs, map(float, self._asked(self.kind.law, length, states)), strict=False))
+        known["tension"] /= self.component.max_isometric_force
+        known["fiber_length"] /= self.component.optimal_fiber_length
+        return known
+
+    def _asked(self, law: Callable[..., Any] | None, length: float, states: dict[str, float]) -> Sequence[Any]:
+        assert law is not None
+        given = [states[state.name] for state in self.kind.states if state.given]
+        try:
+            found: Sequence[Any] = law(length, 0.0, states.get("activation", 1.0), *given, *self.values)
+        except (ArithmeticError, ValueError):
+            # Machine code has no number there.
+            return [nan] * len(self.kind.outputs)
+        return found
+
+
+def fibers_of(model: Model, mechanism: Mechanism) -> Iterator[Fibers]:
+    """The muscles that pull, whose laws are given numbers: those of Thelen, Millard, De Groote, Meyer."""
+    builder = ElementBuilder(model, mechanism, Path())
+    for muscle in model.components(Muscle):
+        kind = kind_of_class(type(muscle))
+        if kind is None or not muscle.appliesForce:
+            continue
+        _, *terms = kind.terms
+        if all(isinstance(term, Fields | Number | Numbers) for term in terms):
+            if kind.check is not None:
+                kind.check(builder, muscle)
+            yield Fibers(builder.path(muscle), kind, muscle, tuple(term.read(builder, muscle) for term in terms))
+
+
+def start_of(fibers: Fibers, length: float) -> Start | None:
+    """Start and equilibrium at a length of the path, m; None of a muscle that has nothing to bring into equilibrium."""
+    if not fibers.is_elastic:
+        return None
+    states = fibers.starts()
+    one, two = fibers.at(length, states), fibers.at(length, fibers.settled(length, states))
+    velocity = one["fiber_velocity"] / fibers.component.optimal_fiber_length
+    lengths, tensions = ((one[name], two[name]) for name in ("fiber_length", "tension"))
+    return Start(fibers.path, lengths, tensions, velocity)
+
+
+def reach_of(fibers: Fibers, length: float, is_active: bool, pose: Pose) -> Reach:
+    """Fibers in equilibrium at a length of the path, m."""
+    known = fibers.at(length, fibers.settled(length, fibers.starts() | {"activation": float(is_active)}))
+    numbers = fibers.values[0]
+    least = getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0)) / fibers.component.optimal_fiber_length
+    is_limit = known["fiber_length"] <= least * (1.0 + ROUNDING) or known["cos_pennation"] <= 0.0
+    return Reach(fibers.path, is_active, pose, known["fiber_length"], is_limit)

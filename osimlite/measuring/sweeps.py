@@ -1,0 +1,98 @@
+"""The poses that are looked at: the default one, and each coordinate alone over its range."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from osimlite.errors import SimulationError
+from osimlite.lint.measures import Pose
+from osimlite.multibody.linear import stacked
+from osimlite.multibody.parts import CoordinateInfo
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.paths import Paths
+
+VALUES = 9
+"""Of each coordinate."""
+WIDEST = 4.0 * pi
+"""A wider range (rad or m) stands for none."""
+STILL = 1e-9
+"""A length that changes by less (m) does not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A coordinate over its range, the others as in the default pose, or as near to it as constraints let them be.
+
+    Attributes:
+        paths: whose lengths change.
+        place: of the coordinate in the mechanism.
+        poses: values of all coordinates (k, n), those of this one increasing; as far as constraints allow.
+        lengths: of all paths there (k, p), m.
+    """
+
+    paths: Paths
+    place: int
+    poses: Array
+    lengths: Array
+
+    @property
+    def values(self) -> Array:
+        """Values (k,) of the coordinate, rad or m."""
+        values: Array = self.poses[:, self.place]
+        return values
+
+    @property
+    def info(self) -> CoordinateInfo:
+        """The coordinate."""
+        return self.paths.mechanism.coordinates[self.place]
+
+    def pose(self, value: float) -> Pose:
+        """What people call the pose at a value of the coordinate."""
+        return Pose(self.info.name, float(value), self.info.motion_type == "rotational")
+
+    def at(self, value: float) -> Array:
+        """Values (n,) of all coordinates at one of this, along straight lines between the poses."""
+        k = min(max(int(np.searchsorted(self.values, value)), 1), len(self.values) - 1)
+        before, after = self.poses[k - 1 : k + 1]
+        part = (value - before[self.place]) / (after[self.place] - before[self.place])
+        between: Array = before + part * (after - before)
+        return between
+
+
+def lengths(paths: Paths, q: Array) -> Array:
+    """Lengths (p,) of all paths, m."""
+    return np.array(list(paths.lengths(q).values()))
+
+
+def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
+    """A sweep of each coordinate that changes the length of a path."""
+    tied = _tied(paths, start)
+    for place, info in enumerate(paths.mechanism.coordinates):
+        low, high = info.range
+        if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
+            continue
+        poses = []
+        for value in np.linspace(low, high, VALUES):
+            q = start.copy()
+            q[place] = value
+            with suppress(SimulationError):
+                poses.append(paths.mechanism.assemble(q, kept=(place,)) if tied[place] else q)
+        rows = np.array([lengths(paths, q) for q in poses])
+        if len(rows) > 1 and np.ptp(rows, axis=0).max(initial=0.0) > STILL:
+            yield Sweep(paths, place, np.array(poses), rows)
+
+
+def _tied(paths: Paths, start: Array) -> Array:
+    """Whether each coordinate (n,) is in the equations of a constraint."""
+    constraints = paths.mechanism.constraints
+    if not constraints:
+        return np.zeros(len(start), dtype=bool)
+    state = paths.mechanism.at(start)
+    rows, _ = stacked([item.velocity_equations(state) for item in constraints])
+    tied: Array = np.abs(rows).max(axis=0) > 0.0
+    return tied
