@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from itertools import repeat
 from math import nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from osimlite.errors import ModelError
 from osimlite.lint.measures import Pose, Reach, Start
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
@@ -77,7 +79,10 @@ def fibers_of(model: Model, mechanism: Mechanism) -> Iterator[Fibers]:
         if kind is None or not muscle.appliesForce:
             continue
         _, *terms = kind.terms
-        if all(isinstance(term, Fields | Number | Numbers) for term in terms):
+        if not all(isinstance(term, Fields | Number | Numbers) for term in terms):
+            continue
+        # What OpenSim refuses, other rules have told.
+        with suppress(ModelError):
             if kind.check is not None:
                 kind.check(builder, muscle)
             yield Fibers(builder.path(muscle), kind, muscle, tuple(term.read(builder, muscle) for term in terms))
