@@ -59,15 +59,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("corpus_model", models or [absent])
 
 
-# Before pytest-xdist reads the groups: unless it is the first, all groups would be for nothing.
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what reads real files for `-m "not corpus"`, keep modules in one process, skip cases of missing engines."""
+    """Mark what reads real files for `-m "not corpus"`, and skip cases of missing engines."""
     missing = [engine for engine, package in ENGINES.items() if find_spec(package) is None]
     for item in items:
-        # What a module sets up is set up once; real files are many, and each is for itself.
-        if "corpus_model" not in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.xdist_group(str(item.path)))
         cases = item.callspec.params.values() if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ()
         for engine in missing:
             if engine in [case for case in cases if isinstance(case, str)]:
