@@ -10,34 +10,16 @@ A surface inside which a point of the piece lies bends it nowhere, as in OpenSim
 
 from __future__ import annotations
 
-from math import inf
-
-from osimlite.simulation.kernels.cable_paths import (
-    GEODESIC,
-    GROUND_END,
-    GROUND_START,
-    IN_GROUND,
-    OBSTACLE_WORK,
-    STATE,
-    TOUCHES,
-    correct,
-    draw_lines,
-    end_to_ground,
-    roughness,
-    solver_room,
-)
-from osimlite.simulation.kernels.cable_paths import SURFACE as CABLE_SURFACE
-from osimlite.simulation.kernels.cable_surfaces import (
-    ARC,
-    END,
-    GEODESIC_ROOM,
-    POINT,
-    SQUARE,
-    START,
-    STEP,
-    SURFACE_NUMBERS,
-    shoot,
-    value,
+from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
+from osimlite.simulation.kernels.cable_surfaces import ARC, POINT, SQUARE, STEP, SURFACE_NUMBERS, shoot, value
+from osimlite.simulation.kernels.geodesic_search import (
+    OWNER,
+    SLOT,
+    end_before,
+    search_room,
+    smooth,
+    start_after,
+    to_ground,
 )
 from osimlite.simulation.kernels.geodesic_starts import SURFACE, start
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
@@ -67,25 +49,18 @@ from osimlite.simulation.kernels.vectors import put, vector
 PLACES = 0
 """Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its piece begins at, and the
 last one that it may end at."""
-CHAIN, SOLVER, POSES, ELEMENTS = 0, 1, 2, 3
-"""Integers after the wraps: where in the record the slots are, room for a search, and the poses of the surfaces; then
-the slots as elements of a cable. The first slot has the place of the point that a piece begins at; then come what the
-piece bends around, and the place where it ends."""
-OWNER = OBSTACLE_WORK + SURFACE_NUMBERS
-SLOT = OWNER + 1
-"""Of a slot: an obstacle of a cable; the surface; the number of the wrap."""
+CHAIN, SEARCH, POSES = 0, 1, 2
+"""Integers after the wraps: where in the record the slots are, room for a search, and the poses of the surfaces."""
+HOW, POSE_NUMBERS = 12, 13
+NOT, SHORT_WAY, OTHER_WAY = 0.0, 1.0, -1.0
+"""Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand."""
 
-IS_NEAR, POSE_NUMBERS = 12, 13
-"""Of a surface: after its rotation by rows and its place in ground, whether it may bend the piece at hand."""
-
-TOUCH, SMOOTH, STALLED = 1e-10, 1e-12, 1e-8
-"""Angles (rad): by which a piece turns at least around a surface that it is put on; at which a search ends, and below
-which it ends when that does not get less."""
+TOUCH = 1e-10
+"""The angle (rad) by which a piece turns at least around a surface that it is put on."""
 INSIDE = 1e-9
 """A point counts as inside a surface if it is so far below it, in units of its function."""
-LOOSE, TURNS, ROUNDS = 3, 12, 30
-"""So many times each of several surfaces is put into a piece anew; so often surfaces may come and go; rounds of a
-search."""
+LOOSE, TURNS = 3, 12
+"""So many times each of several surfaces is put into a piece anew; so often surfaces may come and go."""
 
 
 def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
@@ -96,12 +71,9 @@ def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
         wraps: number of wraps.
         room: length of the record without slots.
     """
-    poses = room + SLOT * (most + 2)
-    solver = poses + POSE_NUMBERS * wraps
-    slots = [room, solver, poses]
-    for place in range(room, poses, SLOT):
-        slots += 1, 0, place + OBSTACLE_WORK - CABLE_SURFACE, place
-    return slots, solver + solver_room(most)
+    search = room + SLOT * (most + 2)
+    poses = search + search_room(most)
+    return [room, search, poses], poses + POSE_NUMBERS * wraps
 
 
 def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -149,7 +121,7 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     size = i[POINTS] + 2 * i[WRAPS]
     work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
-    chain, room = at(found, slots[CHAIN]), at(found, slots[SOLVER])
+    chain, room, poses = at(found, slots[CHAIN]), at(found, slots[SEARCH]), at(found, slots[POSES])
     put(chain, 0, vector(work, NODE_WORK * one + PLACE))
     put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
     near = find_near(wraps, p, found, slots, i[WRAPS], one, two)
@@ -157,8 +129,8 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     for turn in range(TURNS if near > 0 else 0):
         changed = False
         for number in range(i[WRAPS]):
-            pose = at(found, slots[POSES] + POSE_NUMBERS * number)
-            if pose[IS_NEAR] != 0.0:
+            pose = at(poses, POSE_NUMBERS * number)
+            if pose[HOW] != NOT:
                 place = place_of(chain, count, number)
                 if place > 0 and (turn < loose or not chain[SLOT * place + GEODESIC + ARC] > 0.0):
                     take_out(chain, count, place)
@@ -167,8 +139,12 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
                     count, changed = count + 1, True
         if not changed and turn != loose:
             break
-        if turn >= loose:
-            smooth(slots, found, count)
+        if turn >= loose and not smooth(chain, count, room):
+            # There need not be a geodesic on a side of an ellipsoid: there may be one on the other.
+            for k in range(1, count + 1):
+                poses[POSE_NUMBERS * int(chain[SLOT * k + OWNER]) + HOW] = OTHER_WAY
+            put(chain, SLOT, vector(chain, SLOT * (count + 1)))
+            count = 0
     return count
 
 
@@ -177,13 +153,13 @@ def find_near(wraps: Ints, p: Floats, found: Floats, slots: Ints, count: int, on
     chain, near = at(found, slots[CHAIN]), 0
     for number in range(count):
         own, pose = at(wraps, WRAP_INTS * number), at(found, slots[POSES] + POSE_NUMBERS * number)
-        pose[IS_NEAR] = 0.0
+        pose[HOW] = NOT
         if own[FIRST] == one and two <= own[LAST]:
             surface = at(p, own[PLACES] + SURFACE)
             inside = INSIDE * surface[SQUARE]
             first, second = in_surface(pose, vector(chain, 0)), in_surface(pose, vector(chain, SLOT))
             if value(surface, first) <= inside and value(surface, second) <= inside:
-                pose[IS_NEAR] = 1.0
+                pose[HOW] = SHORT_WAY
                 near += 1
     return near
 
@@ -208,10 +184,8 @@ def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room
     point = way = (0.0, 0.0, 0.0)
     arc = 0.0
     for k in range(count + 1):
-        ahead = at(chain, SLOT * (k + 1))
-        first = vector(chain, SLOT * k + (GROUND_END + POINT if k > 0 else 0))
-        second = vector(ahead, GROUND_START + POINT if k < count else 0)
-        turn, meets, along, length = start(p, in_surface(pose, first), in_surface(pose, second))
+        first, second = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
+        turn, meets, along, length = start(p, first, second, pose[HOW])
         if turn > most:
             place, most, point, way, arc = k + 1, turn, meets, along, length
     if place == 0:
@@ -219,9 +193,8 @@ def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room
     for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
         chain[k] = chain[k - SLOT]
     slot = at(chain, SLOT * place)
-    slot[STATE], slot[OWNER] = TOUCHES, number
-    slot[GEODESIC + STEP] = 0.0
-    for k in range(IS_NEAR):
+    slot[OWNER], slot[GEODESIC + STEP] = number, 0.0
+    for k in range(HOW):
         slot[IN_GROUND + k] = pose[k]
     for k in range(SURFACE_NUMBERS):
         slot[OBSTACLE_WORK + k] = p[SURFACE + k]
@@ -230,29 +203,3 @@ def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room
         return False
     to_ground(slot)
     return True
-
-
-def to_ground(slot: Floats) -> None:
-    """Both ends of a geodesic in ground."""
-    end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + START), at(slot, GROUND_START))
-    end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + END), at(slot, GROUND_END))
-
-
-def smooth(slots: Ints, found: Floats, count: int) -> None:
-    """Correct all geodesics of a piece until it is smooth, or one of them gets too short to be any."""
-    elements, room = at(slots, ELEMENTS), at(found, slots[SOLVER])
-    lines = at(room, GEODESIC_ROOM)
-    values, before = at(lines, 4 * (count + 1)), inf
-    for _ in range(ROUNDS):
-        draw_lines(elements, found, 0, count + 1, lines)
-        rough = roughness(elements, found, 0, count + 1, lines, values)
-        if not rough > SMOOTH or before <= rough < STALLED:
-            return
-        before = rough
-        if not correct(elements, found, found, 0, count + 1, count, rough, room):
-            return
-        for k in range(1, count + 1):
-            slot = at(found, slots[CHAIN] + SLOT * k)
-            if not slot[GEODESIC + ARC] > 0.0:
-                return
-            to_ground(slot)

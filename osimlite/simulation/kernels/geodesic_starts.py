@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from math import atan2, cos, inf, pi, sin, sqrt
 
-from osimlite.simulation.kernels.cable_surfaces import CYLINDER, KIND, RADIUS, SPHERE, SQUARE, TORUS, TUBE, WEIGHTS
+from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, KIND, RADIUS, SQUARE, TORUS, TUBE, WEIGHTS
 from osimlite.simulation.kernels.closest_on_ellipsoid import closest_point
 from osimlite.simulation.kernels.pointers import Floats, at
 from osimlite.simulation.kernels.vectors import (
@@ -50,14 +50,17 @@ PIECES = 8
 """By so many pieces a length on an ellipsoid is measured at first."""
 
 
-def start(p: Floats, first: Vector, second: Vector) -> Start:
-    """Where a straight piece between two points begins to bend around what the numbers tell of."""
+def start(p: Floats, first: Vector, second: Vector, way: float) -> Start:
+    """Where a straight piece between two points begins to bend around what the numbers tell of.
+
+    On the other side of an ellipsoid than is meant if `way` is -1.
+    """
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == CYLINDER:
         return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, axis, side)
     if surface[KIND] == TORUS:
         return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side)
-    return around_ellipsoid(surface, first, second, axis, side)
+    return around_ellipsoid(surface, first, second, axis, side, way)
 
 
 def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
@@ -88,7 +91,7 @@ def around_cylinder(radius: float, half_length: float, first: Vector, second: Ve
     return turn, (radius * nx, radius * ny, z), (-way * ny, way * nx, slope), radius * turn * sqrt(1.0 + slope * slope)
 
 
-def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: float) -> Start:
+def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: float, how: float) -> Start:
     """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
 
     The circle is in the plane of the ends and the way from the middle of the chord straight out of the surface.
@@ -104,7 +107,7 @@ def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: 
     if not dot(middle, middle) < 1.0:
         return 0.0, first, way, 0.0
     out = middle
-    if p[KIND] != SPHERE:
+    if p[KIND] == ELLIPSOID:
         a, b, c = radii
         factor = 3.0 / (a + b + c)
         nearest = closest_point(times(factor, radii), times(factor, elementwise(radii, middle)))
@@ -116,7 +119,7 @@ def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: 
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
-    normal = unit(cross(out, way))
+    normal = times(how, unit(cross(out, way)))
     centre = times(dot(normal, one), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
     a1, a2 = touching(minus(one, centre), radius, normal, 1.0), touching(minus(two, centre), radius, normal, -1.0)
