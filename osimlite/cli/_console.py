@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
@@ -121,9 +121,9 @@ def add_row(table: Table, *cells: str) -> None:
 class Facts:
     """What came out: names, and what is said of each."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str = "", rows: Iterable[tuple[str, str]] = ()) -> None:
         self.title = title
-        self.rows: list[tuple[str, str]] = []
+        self.rows = [*rows]
 
     def add(self, name: str, words: str) -> None:
         """Say one thing more."""

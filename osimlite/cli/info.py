@@ -28,7 +28,7 @@ def info(
 
     Example: osimlite info gait2392.osim
     """
-    from osimlite.cli._console import say
+    from osimlite.cli._console import Facts, say
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
     from osimlite.lint.suffixes import is_table
@@ -47,7 +47,8 @@ def info(
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
     if not isinstance(model, Model):
         rows = [(model.tag, model.name), ("file", size), ("document version", str(document.version))]
-        _facts([*rows, *_files(model, file.parent), ("remarks of the reader", str(len(document.notes)))])
+        rows += [*_files(model, file.parent), ("remarks of the reader", str(len(document.notes)))]
+        Facts(rows=rows).show()
         _classes([*model.walk()], everything)
         return
     components = list(model.components())
@@ -56,7 +57,7 @@ def info(
     surfaces = sum(is_a(component, "WrapObject") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
 
-    _facts([
+    Facts(rows=[
         ("model", model.name),
         ("file", size),
         ("document version", str(document.version)),
@@ -75,7 +76,7 @@ def info(
         ("components in all", str(len(components))),
         ("remarks of the reader", str(len(document.notes))),
         ("simulation", _simulation(model, file.parent)),
-    ])  # fmt: skip
+    ]).show()  # fmt: skip
 
     if any(joint.coordinates for joint in model.components(Joint)):
         say()
@@ -93,19 +94,8 @@ def info(
     _classes(components, everything)
 
 
-def _facts(rows: Sequence[tuple[str, str]]) -> None:
-    """Print what is worth a line each."""
-    from osimlite.cli._console import add_row, plain_console, plain_table
-
-    facts = plain_table(show_header=False)
-    facts.add_column(style="bold")
-    facts.add_column(overflow="fold")
-    for name, value in rows:
-        add_row(facts, name, value)
-    plain_console().print(facts)
-
-
 def _table(file: Path, everything: bool) -> None:
+    from osimlite.cli._console import Facts
     from osimlite.files import read_file
     from osimlite.lint.table import Table
     from osimlite.tables import StorageHeader
@@ -117,20 +107,19 @@ def _table(file: Path, everything: bool) -> None:
     if isinstance(header, StorageHeader) and header.parts > 1:
         kind += f", each cell a {header.kind}"
     rows = len(table.rows.times)
-    facts = [
-        ("table", kind),
-        ("file", f"{file} ({len(table.data) / 1000:.0f} kB)"),
-        ("rows", str(rows)),
-        ("markers" if table.is_markers else "columns beside the time", str(len(table.columns))),
-    ]
+    facts = Facts()
+    facts.add("table", kind)
+    facts.add("file", f"{file} ({len(table.data) / 1000:.0f} kB)")
+    facts.add("rows", str(rows))
+    facts.add("markers" if table.is_markers else "columns beside the time", str(len(table.columns)))
     if table.span is not None:
         first, last = table.span
         # Times have few digits; their mean step has more.
         rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
-        facts.append(("time", f"{first:g} to {last:g} s{rate}"))
+        facts.add("time", f"{first:g} to {last:g} s{rate}")
     unit = "Units" if table.is_markers else "inDegrees"
-    facts.append((unit, said.get(unit, "not said")))
-    _facts(facts)
+    facts.add(unit, said.get(unit, "not said"))
+    facts.show()
     _listed("Markers" if table.is_markers else "Columns", table.columns, everything)
 
 

@@ -154,7 +154,7 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     """A table that fits a terminal: what is least and greatest, or the largest differences."""
     import numpy as np
 
-    from osimlite.cli._console import add_row, plain_console, plain_table
+    from osimlite.cli._console import add_row, plain_console, plain_table, say
 
     first = curves[0]
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
@@ -181,8 +181,6 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     plain_console().print(table)
     unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
     if unsettled:
-        from osimlite.cli._console import say
-
         say("'-' and gaps in the table: fibers and tendon have no equilibrium there")
 
 

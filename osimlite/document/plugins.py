@@ -261,7 +261,7 @@ class _Declarations:
         return rows
 
     def output(self, row: Any) -> str:
-        """An output as a word of :mod:`osimlite.lint.outputs`."""
+        """An output as a word of :mod:`osimlite.schema.outputs`."""
         self.mapping(row, _OF_AN_OUTPUT, "an output", "outputs")
         kind = row.get("type", "double")
         return f"{row.get('name')}{'[]' if row.get('list') else ''}{'' if kind == 'double' else f':{kind}'}"

@@ -79,7 +79,7 @@ class Object(BaseModel, metaclass=ObjectType):
     since: ClassVar[str] = ""
     """The version of OpenSim that has the class first, where 4.6 has it not."""
     declared_outputs: ClassVar[str] = ""
-    """The outputs that a class of a plug-in adds, as words of :mod:`osimlite.lint.outputs`."""
+    """The outputs that a class of a plug-in adds, as words of :mod:`osimlite.schema.outputs`."""
     name_reference: ClassVar[Reference | None] = None
     """The rule by which the object's own name names a component, for the few classes where it does."""
 
