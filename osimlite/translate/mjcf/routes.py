@@ -19,7 +19,7 @@ from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth
 from osimlite.translate.mjcf.surfaces import stand_ins, z_to
-from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
+from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured, measured_each
 from osimlite.translate.mjcf.wrapping import unit
 
 DIRECTIONS = 12
@@ -101,12 +101,12 @@ class Router:
     def _least(self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]) -> Tendon:
         """The option for a part of a tendon with which the whole has the least error."""
         head, tail = before[_last_spot(before) :], after[: len(after) - _last_spot(after[::-1])]
-        wrong = self.but_for((*before, *now, *after), (*head, *now, *tail))
-        errors = [
-            np.square(wrong(piece)).mean(0).sum() if _is_tendon(piece) else np.inf
-            for piece in ((*head, *option, *tail) for option in options)
-        ]
-        return options[int(np.argmin(errors))]
+        rest = self.residuals((*before, *now, *after)) - self._own((*head, *now, *tail))
+        sound = [option for option in options if _is_tendon((*head, *option, *tail))]
+        lengths, arms = measured_each([(*head, *option, *tail) for option in sound], self.poses, self.version)
+        errors = np.square(rest + np.concatenate((lengths[..., None], arms), axis=-1)).mean(1).sum(-1)
+        # Of those that do the same but for rounding the first, on every machine.
+        return sound[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
 
     def but_for(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
         """The residuals of a tendon, as a function of what stands in the place of a piece of it from site to site."""

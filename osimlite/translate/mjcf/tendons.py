@@ -5,8 +5,9 @@ A tendon runs from site to site, around a surface between two of them at most.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
@@ -86,29 +87,55 @@ def measured(tendon: Tendon, poses: Poses, version: int) -> tuple[Array, Array]:
         poses: P poses of m coordinates that move.
         version: of MuJoCo, 3 or 4.
     """
-    lengths, arms = np.zeros(len(poses.q)), np.zeros((len(poses.q), len(poses.moving)))
-    for first, around, second in sections(tendon):
-        one, two = (_placed(spot, poses) for spot in (first, second))
-        if around is None:
-            way, back = two - one, one - two
-        else:
-            rotation = poses.rotations[around.body] @ around.frame[:3, :3]
-            middle = poses.points(around.body, around.frame[:3, 3])
-            given = (one, two) if around.side is None else (one, two, _placed(around.side, poses))
-            first_end, second_end, *side = (np.einsum("pji,pj->pi", rotation, at - middle) for at in given)
-            found = bend(around.kind, around.radius, first_end, second_end, side[0] if side else None, version)
-            leaves, returns = (middle + np.einsum("pij,pj->pi", rotation, at) for at in (found.first, found.second))
-            way, back = leaves - one, returns - two
-            lengths += np.where(found.touches, found.length + norm(back), 0.0)
-            touched = found.touches[:, None]
-            arms -= _worked(around.body, leaves, np.where(touched, unit(way), 0.0), poses)
-            arms -= _worked(around.body, returns, np.where(touched, unit(back), 0.0), poses)
-        lengths += norm(way)
-        for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
-            arms += _worked(spot.body, place, pull, poses)
-            if spot.slides is not None:
-                arms += _slid(spot, pull, poses)
+    lengths, arms = measured_each((tendon,), poses, version)
+    return lengths[0], arms[0]
+
+
+def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tuple[Array, Array]:
+    """The same of T tendons, (T, P) and (T, P, m): what they do between the same two sites is computed at once."""
+    lengths = np.zeros((len(tendons), len(poses.q)))
+    arms = np.zeros((*lengths.shape, len(poses.moving)))
+    alike: dict[Any, list[tuple[int, Around | None]]] = {}
+    for place, tendon in enumerate(tendons):
+        for first, around, second in sections(tendon):
+            kind = None if around is None else (around.body, around.kind, around.side is None)
+            alike.setdefault((first, second, kind), []).append((place, around))
+    for (first, second, kind), uses in alike.items():
+        numbers = {around: k for k, around in enumerate(dict.fromkeys(around for _, around in uses))}
+        arounds = () if kind is None else [around for around in numbers if around is not None]
+        length, arm = _section(first, arounds, second, poses, version)
+        for place, around in uses:
+            lengths[place] += length[numbers[around]]
+            arms[place] += arm[numbers[around]]
     return lengths, arms
+
+
+def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses, version: int) -> tuple[Array, Array]:
+    """Lengths (k, P) and moment arms (k, P, m) from site to site: straight, or around each of k surfaces of a kind."""
+    one, two = (_placed(spot, poses)[None] for spot in (first, second))
+    lengths, arms, way, back = 0.0, 0.0, two - one, one - two
+    if arounds:
+        body = arounds[0].body
+        frames = np.stack([around.frame for around in arounds])
+        rotations = poses.rotations[body] @ frames[:, None, :3, :3]
+        middles = poses.origins[body] + np.einsum("pij,kj->kpi", poses.rotations[body], frames[:, :3, 3])
+        sides = [_placed(around.side, poses) for around in arounds if around.side is not None]
+        given = (one, two, np.stack(sides)) if sides else (one, two)
+        local = (np.einsum("kpji,kpj->kpi", rotations, at - middles).reshape(-1, 3) for at in given)
+        radii = np.repeat([around.radius for around in arounds], len(poses.q))
+        found = bend(arounds[0].kind, radii, *local, version=version)
+        ends = (np.einsum("kpij,kpj->kpi", rotations, at.reshape(middles.shape)) for at in (found.first, found.second))
+        leaves, returns = (middles + end for end in ends)
+        way, back = leaves - one, returns - two
+        touches = found.touches.reshape(middles.shape[:2])
+        lengths = np.where(touches, found.length.reshape(touches.shape) + norm(back), 0.0)
+        for place, pull in ((leaves, way), (returns, back)):
+            arms = arms - _worked(body, place, np.where(touches[..., None], unit(pull), 0.0), poses)
+    for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
+        arms = arms + _worked(spot.body, place, pull, poses)
+        if spot.slides is not None:
+            arms = arms + _slid(spot, pull, poses)
+    return lengths + norm(way), arms
 
 
 def sections(tendon: Tendon) -> Iterator[tuple[Spot, Around | None, Spot]]:
@@ -133,19 +160,17 @@ def _placed(spot: Spot, poses: Poses) -> Array:
 
 
 def _worked(body: int, places: Array, force: Array, poses: Poses) -> Array:
-    """What a force (P, 3) on a body at a place in ground (P, 3) does at the moving coordinates (P, m)."""
-    (x, y, z), (fx, fy, fz) = (places - poses.origins[body]).T, force.T
-    wrench = np.stack((y * fz - z * fy, z * fx - x * fz, x * fy - y * fx, fx, fy, fz), axis=1)
-    found: Array = (wrench[:, None] @ poses.jacobians[body])[:, 0]
+    """What forces (k, P, 3) on a body at places in ground do at the moving coordinates (k, P, m)."""
+    moments = np.cross(places - poses.origins[body], force)
+    found: Array = np.einsum("kpi,pij->kpj", np.concatenate((moments, force), axis=-1), poses.jacobians[body])
     return found
 
 
 def _slid(spot: Spot, force: Array, poses: Poses) -> Array:
-    """What a force (P, 3) on a site does at the moving coordinates (P, m) since the site moves in its body."""
+    """What forces (k, P, 3) on a site do at the moving coordinates (k, P, m) since the site moves in its body."""
     assert spot.slides is not None and spot.drive is not None
     value = poses.q[:, spot.coordinate]
     helper, rate = polyval(value, spot.drive), polyval(value, polyder(spot.drive))
-    rates = polyval(helper, polyder(spot.slides.T)) * rate
-    along = np.einsum("pi,pij,jp->p", force, poses.rotations[spot.body], rates)
-    found: Array = along[:, None] * poses.rates[:, spot.coordinate]
+    rates = np.einsum("pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate)
+    found: Array = np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]
     return found

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from osimlite.multibody.spatial import Array
 
 Mask = NDArray[np.bool_]
+Radius = float | Array
 
 TINY = 1e-15
 """MuJoCo's own least number."""
@@ -46,12 +47,12 @@ class Bend(NamedTuple):
     length: Array
 
 
-def bend(kind: str, radius: float, first: Array, second: Array, side: Array | None, version: int) -> Bend:
+def bend(kind: str, radius: Radius, first: Array, second: Array, side: Array | None = None, *, version: int) -> Bend:
     """How a tendon bends.
 
     Args:
         kind: ``"sphere"`` or ``"cylinder"``, this one about z.
-        radius: m.
+        radius: m, one for all or each.
         first: one end (P, 3) in the frame of the surface, m.
         second: the other end (P, 3).
         side: side site (P, 3) there.
@@ -87,7 +88,7 @@ def bend(kind: str, radius: float, first: Array, second: Array, side: Array | No
     return Bend(touches, np.where(hit, one, second), np.where(hit, two, first), np.where(touches, arc, 0.0))
 
 
-def _winding(p: Array, q: Array, side: Array | None, radius: float, version: int) -> Array:
+def _winding(p: Array, q: Array, side: Array | None, radius: Radius, version: int) -> Array:
     """The angle (P,) by which a tendon goes around the middle; 0 where it goes straight in 3.x."""
     between = _angle(p, q)
     if side is None:
@@ -111,7 +112,7 @@ def _winding(p: Array, q: Array, side: Array | None, radius: float, version: int
     return np.where(straight, 0.0, winding)
 
 
-def _through(p: Array, q: Array, radius: float) -> tuple[Mask, Array]:
+def _through(p: Array, q: Array, radius: Radius) -> tuple[Mask, Array]:
     """Whether the way through a circle is not straight (P,), and the point of the circle (P, 2) that it then has.
 
     Both lines to that point have the same angle with the radius there.
@@ -158,19 +159,19 @@ def _in(across: Array, points: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    found: Array = np.einsum("pi,pi->p", a, b)
+    found: Array = np.einsum("...i,...i->...", a, b)
     return found
 
 
 def norm(a: Array) -> Array:
-    """Lengths (P,) of vectors (P, 3)."""
+    """Lengths (...) of vectors (..., 3)."""
     found: Array = np.sqrt(_dot(a, a))
     return found
 
 
 def unit(a: Array) -> Array:
-    """Vectors (P, 3) of length 1; zero where they are."""
-    found: Array = a / np.maximum(norm(a), np.finfo(float).tiny)[:, None]
+    """Vectors (..., 3) of length 1; zero where they are."""
+    found: Array = a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
     return found
 
 
@@ -183,12 +184,12 @@ def _cross(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def _reach(p: Array, radius: float) -> Array:
+def _reach(p: Array, radius: Radius) -> Array:
     """The angle between a point and where a line from it touches the circle, as seen from the middle (P,)."""
     return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
 
 
-def _turned(p: Array, angle: Array, radius: float) -> Array:
+def _turned(p: Array, angle: Array, radius: Radius) -> Array:
     """On the circle, in the direction of a point turned by an angle (P, 2)."""
     direction = np.arctan2(p[:, 1], p[:, 0]) + angle
-    return radius * np.stack((np.cos(direction), np.sin(direction)), axis=1)
+    return np.expand_dims(radius, -1) * np.stack((np.cos(direction), np.sin(direction)), axis=1)

@@ -52,7 +52,7 @@ def test_as_mujoco(which, kind, distance, request):
 
     first, second = ends
     site = None if side is None else np.broadcast_to(side, first.shape)
-    found = bend(kind, RADIUS, first, second, site, int(version.partition(".")[0]))
+    found = bend(kind, RADIUS, first, second, site, version=int(version.partition(".")[0]))
     around = np.linalg.norm(found.first - first, axis=1) + found.length + np.linalg.norm(second - found.second, axis=1)
     whole = np.where(found.touches, around, np.linalg.norm(second - first, axis=1))
     assert 0.05 < found.touches.mean() < 0.95
