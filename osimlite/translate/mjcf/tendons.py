@@ -113,7 +113,8 @@ def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tupl
 def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses, version: int) -> tuple[Array, Array]:
     """Lengths (k, P) and moment arms (k, P, m) from site to site: straight, or around each of k surfaces of a kind."""
     one, two = (_placed(spot, poses)[None] for spot in (first, second))
-    lengths, arms, way, back = 0.0, 0.0, two - one, one - two
+    way, back = two - one, one - two
+    lengths, arms = np.zeros(()), np.zeros(())
     if arounds:
         body = arounds[0].body
         frames = np.stack([around.frame for around in arounds])

@@ -192,4 +192,5 @@ def _reach(p: Array, radius: Radius) -> Array:
 def _turned(p: Array, angle: Array, radius: Radius) -> Array:
     """On the circle, in the direction of a point turned by an angle (P, 2)."""
     direction = np.arctan2(p[:, 1], p[:, 0]) + angle
-    return np.expand_dims(radius, -1) * np.stack((np.cos(direction), np.sin(direction)), axis=1)
+    found: Array = np.expand_dims(radius, -1) * np.stack((np.cos(direction), np.sin(direction)), axis=1)
+    return found
