@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 NAME = ".osimlite_cache"
 Stamp = tuple[int, int] | None
-_PARTS = ("document", "forces", "lint", "measuring", "multibody", "schema", "simulation")
-"""Where the code is that findings come from."""
 
 
 class Cache:
@@ -167,12 +165,8 @@ def _stamp_since(file: str, moment: int) -> list[int] | None:
 def _code() -> str:
     """Which code this is. In a working copy the version stays the same while rules change: the files then tell."""
     package = Path(__file__).parents[1]
-    places = [
-        next(os.walk(package)),
-        *(place for part in _PARTS for place in os.walk(package / part)),
-    ]
-    files = (os.path.join(folder, file) for folder, _, names in places for file in names if file.endswith(".py"))
-    times = [os.stat(file).st_mtime_ns for file in files]
+    files = (os.path.join(folder, file) for folder, _, names in os.walk(package) for file in names)
+    times = [os.stat(file).st_mtime_ns for file in files if file.endswith(".py")]
     return f"{__version__} {max(times)} {len(times)}"
 
 

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import islice, pairwise
-from statistics import median
 from typing import ClassVar
 
 from osimlite.document.source import Position
@@ -128,6 +127,8 @@ class Table(Checked):
     @cached_property
     def step(self) -> float:
         """The usual step from one time to the next, s; 0 of fewer than two rows."""
+        from statistics import median
+
         times = self.rows.times
         return median(after - before for before, after in pairwise(times)) if len(times) > 1 else 0
 
