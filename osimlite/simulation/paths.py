@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED, SURFACE
 from osimlite.simulation.kernels.projection import REDUNDANT
 from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
+from osimlite.simulation.polylines import Polylines
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 
@@ -108,6 +110,24 @@ class Paths:
         NaN where OpenSim has the path wrap, finds no points for it, and goes straight through the surface.
         """
         return self._system.on_surfaces(self.mechanism.values(q), self.routes)
+
+    def polylines(self, q: Values) -> dict[str, Array]:
+        """Corners (k, 3) in ground (m) of each path through points, from end to end, round the surfaces that it wraps.
+
+        With OpenSim's wrapping these are a helix on a cylinder, a great circle on a sphere, the section of a
+        plane with an ellipsoid, a helix about the tube of a torus; corners there are 0.15 rad apart.
+        """
+        state = self.mechanism.at(self.mechanism.values(q))
+        corners = self._polylines.at(state.q, state.rotations[:-1], state.origins[:-1])
+        return dict(zip(self._through, corners, strict=True))
+
+    @cached_property
+    def _through(self) -> dict[str, ThroughPoints]:
+        return {name: route for name, route in self.routes.items() if isinstance(route, ThroughPoints)}
+
+    @cached_property
+    def _polylines(self) -> Polylines:
+        return Polylines(self.mechanism, list(self._through.values()))
 
     def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
         """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.

@@ -17,7 +17,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.view.collect import build_scene
-from osimlite.view.motion import Motion, at_times, in_mechanism_order
+from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order
 from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw
 from osimlite.view.pushes import Pushes
 from osimlite.view.scene import Bodies
@@ -128,6 +128,9 @@ class _Film:
         self.poses = [self.scene.at(row) for row in self.q]
         self.moving = _moving(self.poses)
         self.pushes = Pushes.of(self.scene, motion, self.times)
+        self.activity = {
+            path: np.interp(self.times, recorded, levels) for path, levels in activity(self.scene, motion).items()
+        }
         self.focus = self._focus()
         self.reach = self._reach()
 
@@ -165,7 +168,7 @@ class _Film:
 
     def _corners(self, number: int) -> Iterator[tuple[bool, Array]]:
         """Whether it moves, and points (k, 2), of everything that is drawn."""
-        for body, points in self.scene.extent(self.poses[number], self.q[number]):
+        for body, points in self.scene.extent(self.poses[number]):
             if len(points):
                 yield body < -1 or bool(self.moving[body]), self.flat(points)
 
@@ -203,7 +206,8 @@ class _Painter:
         pushes = film.pushes.at(number, pose)
         arrows = [Arrow(point, force * self.meters_per_newton) for _, point, force in pushes]
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
-        frame = draw(film.scene, film.q[number], camera, self.size, arrows, Style(loaded=loaded))
+        colors = {path: activity_color(float(levels[number])) for path, levels in film.activity.items()}
+        frame = draw(film.scene, film.q[number], camera, self.size, arrows, Style(None, loaded, colors))
         self._words(self.pen.Draw(frame), number)
         return frame
 

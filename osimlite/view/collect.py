@@ -14,7 +14,6 @@ from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.surface import Surface
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array, offset, rotation_about, transform
 from osimlite.robot.visuals import frame_of
 from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
@@ -23,9 +22,11 @@ from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame, TwoFrameLinker
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
-from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint
+from osimlite.schema.paths import GeometryPath
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.geometries.paths import geometry_path
 from osimlite.view import surfaces
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
 
@@ -64,7 +65,8 @@ def build_scene(model: Model, mechanism: Mechanism, folders: MeshFolders | None 
 class _Collector:
     def __init__(self, model: Model, mechanism: Mechanism, folders: MeshFolders) -> None:
         self.model, self.mechanism, self.folders = model, mechanism, folders
-        self.tree = model.tree()
+        self.builder = ElementBuilder(model, mechanism, Path())
+        self.tree = self.builder.tree
         self.surfaces: list[Surface] = []
         self.places: dict[int, int] = {}
         self.meshes: dict[Path, Surface] = {}
@@ -207,33 +209,11 @@ class _Collector:
         self._add(path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible)
 
     def _path(self, path: GeometryPath, name: str) -> None:
-        points = tuple(self._path_point(point) for point in path.path_point_set.objects)
-        if len(points) < 2:
-            raise ModelError("has fewer than two points")
-        look = path.appearance
         owner = self.tree.parent_of(path)
-        of = (self.tree.path_of(owner) if isinstance(owner, Force) else None) or name
-        visible = look.visible and getattr(owner, "appliesForce", True)
-        self.lines.append(Line(of, "paths", points, look.color, 0.0035, visible))
-
-    def _path_point(self, point: AbstractPathPoint) -> LinePoint:
-        body, placed = self._place(point, "socket_parent_frame")
-        turn, origin = placed[:3, :3], placed[:3, 3]
-        if isinstance(point, MovingPathPoint):
-            laws, places = [], []
-            for axis in "xyz":
-                function = getattr(point, f"{axis}_location")
-                if function is None:
-                    raise ModelError(f"has a point without {axis}_location")
-                laws.append(numeric(function, 1, f"{axis}_location of a point"))
-                places.append(self._coordinate(point, f"socket_{axis}_coordinate"))
-            return LinePoint(body, origin, turn, tuple(laws), tuple(places))
-        if not isinstance(point, PathPoint):
-            raise UnsupportedError(f"has a point of class {type(point).__name__}, which osimlite does not draw")
-        condition = None
-        if isinstance(point, ConditionalPathPoint):
-            condition = self._coordinate(point, "socket_coordinate"), *point.range
-        return LinePoint(body, turn @ np.array(point.location, dtype=float) + origin, condition=condition)
+        of = (self.tree.path_of(owner) if owner is not None else None) or name
+        visible = path.appearance.visible and getattr(owner, "appliesForce", True)
+        course = geometry_path.read(self.builder, owner)
+        self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible))
 
     def _force(self, force: Force, path: str) -> None:
         """The line of a force between two points, and where the force of a contact is shown."""

@@ -87,10 +87,10 @@ def _segments(
 
     Of a path that has fewer corners at a moment the last pieces have no length.
     """
-    for line in scene.lines:
+    for place, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
-            corners = [line.corners(q, bodies) for q, bodies in zip(rows, poses, strict=True)]
-            most = len(line.points)
+            corners = [pose.lines[place] for pose in poses]
+            most = max(map(len, corners))
             full = [found[np.minimum(np.arange(most), len(found) - 1)] for found in corners if len(found)]
             if len(full) == len(poses):
                 for k in range(most - 1):

@@ -136,7 +136,7 @@ def _place(tree: Tree, mechanism: Mechanism, scene: Scene, component: Component 
             return item.body, item.matrix[:3, 3]
         line = next((line for line in scene.lines if line.path == path), None)
         if line is not None:
-            return line.points[0].body, line.points[0].location
+            return line.start
         if path in mechanism.stations:
             return mechanism.stations[path]
         if path in mechanism.frames:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.view.scene import Color, Scene
 
 
 class Motion(Protocol):
@@ -33,6 +35,10 @@ class Motion(Protocol):
     @property
     def forces(self) -> Mapping[str, Array]:
         """Columns (n,) by OpenSim's labels, as ``RFootForce.RightShank.force.X``; in SI units."""
+
+    @property
+    def auxiliary(self) -> Mapping[str, Array]:
+        """Other states (n,) by their paths, as ``/forceset/soleus_r/activation``."""
 
 
 class ContactForce(NamedTuple):
@@ -61,6 +67,24 @@ def contact_forces(motion: Motion) -> list[ContactForce]:
 
 def _columns(motion: Motion, label: str) -> Array:
     return np.column_stack([np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"])
+
+
+def activity(scene: Scene, motion: Motion) -> dict[str, Array]:
+    """Activations (n,), from 0 to 1, of the muscles that have one on record, by the component paths of their lines.
+
+    Files of OpenSim 3 have them as ``soleus_r.activation``.
+    """
+    known = {}
+    for label, column in motion.auxiliary.items():
+        if found := re.fullmatch(r"(?:.*/)?(.+)[./]activation", label):
+            known[found[1]] = np.clip(np.nan_to_num(np.asarray(column, dtype=float)), 0.0, 1.0)
+    paths = [line.path for line in scene.lines if line.layer == "paths"]
+    return {path: known[name] for path in paths if (name := path.rpartition("/")[2]) in known}
+
+
+def activity_color(activation: float) -> Color:
+    """The colour of a muscle, as OpenSim has it: from blue to red."""
+    return activation, 0.0, 1.0 - activation
 
 
 def at_times(motion: Motion, columns: Array, times: Array) -> Array:

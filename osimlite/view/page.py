@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -20,14 +21,20 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import AxisMotion
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.paths import pull_path
+from osimlite.simulation.kernels.table import law_function
+from osimlite.simulation.polylines import Polylines
 from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
-from osimlite.view.motion import Motion, in_mechanism_order
+from osimlite.view.javascript import as_javascript
+from osimlite.view.motion import Motion, activity, in_mechanism_order
 from osimlite.view.pushes import Pushes
 from osimlite.view.scene import LAYERS, Scene
 
-SCRIPTS = ("laws.js", "mechanism.js", "stage.js", "panels.js", "viewer.js")
+SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "viewer.js")
 """The parts of the page's own program, in their order."""
 
 TRAVELS = 0.5
@@ -47,7 +54,7 @@ def page_text(data: Mapping[str, Any]) -> str:
         "@TITLE@": html.escape(str(data["name"]) or "osimlite"),
         "@STYLE@": read("page.css"),
         "@LIBRARY@": read("three.js"),
-        "@SCRIPT@": "".join(map(read, SCRIPTS)),
+        "@SCRIPT@": "".join((_kernels(data["routes"]), *map(read, SCRIPTS))),
         "@DATA@": words,
     }
     text = read("page.html")
@@ -120,6 +127,7 @@ def page_data(
 
 
 def _drawn(scene: Scene) -> dict[str, Any]:
+    routes = count()
     return {
         "surfaces": [_surface(surface) for surface in scene.surfaces],
         "items": [
@@ -142,31 +150,50 @@ def _drawn(scene: Scene) -> dict[str, Any]:
                 "color": list(line.color),
                 "radius": line.radius,
                 "visible": line.visible,
-                "points": [
-                    {
-                        "body": point.body,
-                        "at": point.location.tolist(),
-                        **({"condition": list(point.condition)} if point.condition else {}),
-                        **(
-                            {
-                                "turn": point.turn.tolist(),
-                                "laws": [_law(law) for law in point.laws],
-                                "coordinates": list(point.coordinates),
-                            }
-                            if point.laws
-                            else {}
-                        ),
-                    }
-                    for point in line.points
-                ],
+                **(
+                    {"route": next(routes), "most": scene.polylines.room}
+                    if isinstance(line.course, ThroughPoints)
+                    else {"points": [{"body": point.body, "at": point.location.tolist()} for point in line.course]}
+                ),
             }
             for line in scene.lines
         ],
+        "routes": _routes(scene.polylines),
         "axes": [
             {"path": axes.path, "body": axes.body, "matrix": _rows(axes.matrix), "length": axes.length}
             for axes in scene.axes
         ],
     }
+
+
+def _routes(paths: Polylines) -> dict[str, Any] | None:
+    """The paths as the kernels take them, and what the page must know of their layout."""
+    if not paths.items:
+        return None
+    return {
+        "structure": _base64(paths.structure.astype("<i4")),
+        "numbers": _base64(paths.numbers.astype("<f8")),
+        "laws": paths.laws[1:],
+        "items": paths.items,
+        "traces": paths.traces,
+        "room": paths.room,
+        "work": paths.work,
+        "layout": {
+            "link": layout.LINK_WORK,
+            "position": layout.POSITION,
+            "wrench": layout.WRENCH,
+            "law": layout.LAW,
+            "record": layout.RECORD,
+        },
+    }
+
+
+def _kernels(routes: Mapping[str, Any] | None) -> str:
+    """What the page computes paths with."""
+    if routes is None:
+        return "window.osimlite = {};\n"
+    kernels = as_javascript([law_function(name) for name in routes["laws"]], [pull_path])
+    return f"window.osimlite = {{ kernels: {kernels} }};\n"
 
 
 def _surface(surface: Surface) -> dict[str, str]:
@@ -258,6 +285,9 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
         "ends": np.column_stack((values.min(axis=0), values.max(axis=0))).tolist(),
         "travels": bool(np.linalg.norm(last - first) > TRAVELS * np.linalg.norm(high - low)),
         "forces": forces,
+        "activations": {
+            path: _base64(np.rint(255.0 * level).astype(np.uint8)) for path, level in activity(scene, motion).items()
+        },
     }
 
 

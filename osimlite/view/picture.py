@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -93,10 +93,11 @@ class Arrow(NamedTuple):
 
 @dataclass(frozen=True)
 class Style:
-    """What else is in a picture: a floor of square meshes, and surfaces (paths) shown as loaded."""
+    """What else is in a picture: the height of a floor, surfaces (paths) shown as loaded, colours of lines by path."""
 
     floor: float | None = None
     loaded: frozenset[str] = frozenset()
+    colors: Mapping[str, Color] = field(default_factory=dict)
 
 
 def draw(
@@ -127,12 +128,12 @@ def draw(
     width, height = _FINE * size[0], _FINE * size[1]
     canvas = Canvas(width, height, np.array(SKY))
     heap = _Heap(camera, width, height)
-    _fill(heap, scene, q, scene.at(q), arrows, style or Style())
+    _fill(heap, scene, scene.at(q), arrows, style or Style())
     heap.onto(canvas)
     return image.fromarray(canvas.pixels(_FINE))
 
 
-def _fill(heap: _Heap, scene: Scene, q: Array, bodies: Bodies, arrows: Iterable[Arrow], style: Style) -> None:
+def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], style: Style) -> None:
     if style.floor is not None:
         _lay_floor(heap, scene, style.floor)
     for item in scene.drawn():
@@ -141,13 +142,13 @@ def _fill(heap: _Heap, scene: Scene, q: Array, bodies: Bodies, arrows: Iterable[
         loaded = item.path in style.loaded
         color, opacity = (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
         heap.put(scene.surfaces[item.surface], bodies.matrix(item.body, item.matrix), color, opacity)
-    for line in scene.lines:
+    for line, corners in zip(scene.lines, bodies.lines, strict=True):
         if line.visible and line.layer in scene.shown:
-            corners = line.corners(q, bodies)
+            color = style.colors.get(line.path, line.color)
             for start, end in pairwise(corners):
-                heap.put(surfaces.tube(8), _between(start, end, line.radius), line.color)
+                heap.put(surfaces.tube(8), _between(start, end, line.radius), color)
             for corner in corners:
-                heap.put(surfaces.bead(), _sized(corner, line.radius), line.color)
+                heap.put(surfaces.bead(), _sized(corner, line.radius), color)
     if "frames" in scene.shown:
         for axes in scene.axes:
             placed = bodies.matrix(axes.body, axes.matrix)

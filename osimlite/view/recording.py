@@ -30,6 +30,7 @@ class Recording:
     values: Array
     speeds: Array
     forces: Mapping[str, Array] = field(default_factory=dict)
+    auxiliary: Mapping[str, Array] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
 
@@ -66,7 +67,8 @@ def read_recording(
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value
     _follow(mechanism, rows, set(recorded.missing))
-    speeds = _speeds(mechanism, read_sto(path))
+    table = read_sto(path)
+    speeds = _speeds(mechanism, table)
     remarks = []
     columns: Mapping[str, Array] = {}
     if forces is not None:
@@ -77,7 +79,8 @@ def read_recording(
         except OsimliteError as error:
             remarks.append(f"no forces are shown: {error.message}")
     still = np.zeros_like(rows) if speeds is None else speeds
-    return Recording(recorded.times, mechanism.coordinate_names, rows, still, columns, tuple(remarks))
+    states = {label: table[label] for label in table.columns if label.endswith("activation")}
+    return Recording(recorded.times, mechanism.coordinate_names, rows, still, columns, states, tuple(remarks))
 
 
 def _follow(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:

@@ -7,16 +7,17 @@ Bodies are numbered as in the mechanism, -1 is ground.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
 from osimlite.meshes.surface import Surface
-from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.polylines import Polylines
 
 Color = tuple[float, float, float]
 Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "frames"]
@@ -56,37 +57,11 @@ class Item:
     visible: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class LinePoint:
-    """A corner of a line.
-
-    Attributes:
-        body: that carries it.
-        location: (3,), in the body's frame, m; where the point moves there, the place of the frame it moves in.
-        turn: (3, 3), of that frame in the body's.
-        laws: functions of one coordinate each that give its x, y, z in that frame, or none.
-        coordinates: the places of their coordinates.
-        condition: a coordinate and the range of its values within which the corner is part of the line, or None.
-    """
+class LinePoint(NamedTuple):
+    """A corner of a line: the body that carries it, and where it is (3,) in the body's frame, m."""
 
     body: int
     location: Array
-    turn: Array = field(default_factory=lambda: np.eye(3))
-    laws: tuple[Function, ...] = ()
-    coordinates: tuple[int, ...] = ()
-    condition: tuple[int, float, float] | None = None
-
-    def is_there(self, q: Array) -> bool:
-        """Whether the line has this corner at coordinate values q (n,)."""
-        return self.condition is None or self.condition[1] <= q[self.condition[0]] <= self.condition[2]
-
-    def station(self, q: Array) -> Array:
-        """Where it is (3,) in the body's frame at coordinate values q (n,)."""
-        if not self.laws:
-            return self.location
-        values = [law.evaluate(q[[place]])[0] for law, place in zip(self.laws, self.coordinates, strict=True)]
-        found: Array = self.location + self.turn @ np.array(values)
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +71,7 @@ class Line:
     Attributes:
         path: absolute path of the component it shows.
         layer: what it belongs to.
-        points: two or more.
+        course: two or more corners that are fixed to bodies, or the path whose corners they are.
         color: red, green, blue, 0 to 1.
         radius: how thick to draw it, m.
         visible: whether the model wants it shown.
@@ -104,15 +79,24 @@ class Line:
 
     path: str
     layer: Layer
-    points: tuple[LinePoint, ...]
+    course: tuple[LinePoint, ...] | ThroughPoints
     color: Color
     radius: float = 0.004
     visible: bool = True
 
-    def corners(self, q: Array, bodies: Bodies) -> Array:
-        """The corners (k, 3) in ground at coordinate values q (n,)."""
-        there = [point for point in self.points if point.is_there(q)]
-        return np.array([bodies.points(p.body, p.station(q)[None, :])[0] for p in there]).reshape(-1, 3)
+    @property
+    def start(self) -> LinePoint:
+        """Its first point."""
+        if isinstance(self.course, ThroughPoints):
+            first = self.course.points[0]
+            return LinePoint(first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3])
+        return self.course[0]
+
+    @property
+    def body(self) -> int | None:
+        """The body that all of it is fixed to, if there is one."""
+        bodies = set() if isinstance(self.course, ThroughPoints) else {point.body for point in self.course}
+        return bodies.pop() if len(bodies) == 1 else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,11 +124,32 @@ class Pushed:
     surface: str = ""
 
 
-class Bodies(NamedTuple):
-    """Poses of all bodies: rotations (b + 1, 3, 3) and origins (b + 1, 3) in ground; the last is ground itself."""
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """A scene in a pose: where its bodies are, and its lines.
 
+    Attributes:
+        scene: that is posed.
+        q: coordinate values (n,).
+        rotations: of the bodies in ground, (b + 1, 3, 3); the last one is ground itself.
+        origins: of the bodies in ground, (b + 1, 3), m.
+    """
+
+    scene: Scene
+    q: Array
     rotations: Array
     origins: Array
+
+    @cached_property
+    def lines(self) -> list[Array]:
+        """Corners (k, 3) in ground of each line of the scene."""
+        paths = iter(self.scene.polylines.at(self.q, self.rotations[:-1], self.origins[:-1]))
+        return [
+            next(paths)
+            if isinstance(line.course, ThroughPoints)
+            else np.concatenate([self.points(point.body, point.location[None]) for point in line.course])
+            for line in self.scene.lines
+        ]
 
     def points(self, body: int, points: Array) -> Array:
         """Points (k, 3) of a body's frame, in ground."""
@@ -187,7 +192,12 @@ class Scene:
     def at(self, q: Array) -> Bodies:
         """Where all bodies are at coordinate values q (n,)."""
         state = self.mechanism.at(q)
-        return Bodies(state.rotations, state.origins)
+        return Bodies(self, state.q, state.rotations, state.origins)
+
+    @cached_property
+    def polylines(self) -> Polylines:
+        """The paths among the lines."""
+        return Polylines(self.mechanism, [line.course for line in self.lines if isinstance(line.course, ThroughPoints)])
 
     @cached_property
     def up(self) -> Array:
@@ -216,20 +226,19 @@ class Scene:
         placed: Array = points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
         return placed
 
-    def extent(self, bodies: Bodies, q: Array) -> Iterator[tuple[int, Array]]:
+    def extent(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
         """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
         for place, item in enumerate(self.items):
             if item.visible and item.layer in self.shown and place not in self.large:
                 yield item.body, bodies.points(item.body, self.corners(item))
-        for line in self.lines:
+        for line, corners in zip(self.lines, bodies.lines, strict=True):
             if line.visible and line.layer in self.shown:
-                single = {point.body for point in line.points}
-                yield (single.pop() if len(single) == 1 else -2), line.corners(q, bodies)
+                yield -2 if line.body is None else line.body, corners
 
     def box(self, q: Array) -> tuple[Array, Array]:
         """The least and greatest coordinates (3,), (3,) in ground of what is drawn and no scenery."""
         bodies = self.at(q)
-        found: list[Array] = [points for _, points in self.extent(bodies, q) if len(points)]
+        found: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
         points = np.concatenate(found or [bodies.origins])
         low, high = points.min(axis=0), points.max(axis=0)
         little = 0.05 * max(1.0, float(np.abs(points).max())) if float((high - low).max()) < 1e-6 else 0.0

@@ -20,12 +20,12 @@ from osimlite.schema.model import Model
 from osimlite.text import listed
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
-from osimlite.view.motion import Motion, at_times, in_mechanism_order
+from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order
 from osimlite.view.page import page_data, page_text
 from osimlite.view.picture import Arrow, Camera, Style, draw
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.recording import Recording, read_recording
-from osimlite.view.scene import Scene
+from osimlite.view.scene import Color, Scene
 from osimlite.view.server import PageServer
 
 HOME = (1.0, 0.35, 1.3)
@@ -122,15 +122,15 @@ class Shown:
             MissingDependency: pillow is not installed.
         """
         scene, up = self.scene, self.scene.up
-        q, arrows, loaded = self._moment(time)
+        q, arrows, loaded, colors = self._moment(time)
         bodies = scene.at(q)
-        seen = [*(p for _, p in scene.extent(bodies, q) if len(p)), *(a.point[None] for a in arrows)]
+        seen = [*(p for _, p in scene.extent(bodies) if len(p)), *(a.point[None] for a in arrows)]
         # Of a model without bodies there is ground to see.
         points = np.concatenate(seen or [np.array(scene.box(q))])
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
         camera = Camera.around(points, up, direction, size[0] / size[1])
-        picture = draw(scene, q, camera, size, arrows, Style(scene.floor(q), loaded))
+        picture = draw(scene, q, camera, size, arrows, Style(scene.floor(q), loaded, colors))
         out = io.BytesIO()
         try:
             picture.save(out, Path(path).suffix[1:].upper() or "PNG")
@@ -139,13 +139,13 @@ class Shown:
         write_atomically(path, out.getvalue())
         return Path(path)
 
-    def _moment(self, time: float | None) -> tuple[Array, list[Arrow], frozenset[str]]:
-        """Coordinate values (n,), arrows, and surfaces under load, at a time of the motion."""
+    def _moment(self, time: float | None) -> tuple[Array, list[Arrow], frozenset[str], dict[str, Color]]:
+        """Coordinate values (n,), arrows, surfaces under load, and colours of muscles, at a time of the motion."""
         motion = self.motion
         if motion is None:
             if time is not None:
                 raise OsimliteError("a moment belongs to a motion; name one after the model")
-            return self.q, [], frozenset()
+            return self.q, [], frozenset(), {}
         first, last = float(motion.times[0]), float(motion.times[-1])
         if time is not None and not first <= time <= last:
             raise OsimliteError(f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}")
@@ -157,4 +157,6 @@ class Shown:
         scale = LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
         pushes = Pushes.of(self.scene, motion, moment).at(0, self.scene.at(q))
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
-        return q, [Arrow(point, scale * force) for _, point, force in pushes], loaded
+        levels = activity(self.scene, motion).items()
+        colors = {path: activity_color(float(np.interp(moment[0], motion.times, level))) for path, level in levels}
+        return q, [Arrow(point, scale * force) for _, point, force in pushes], loaded, colors

@@ -15,7 +15,7 @@ from osimlite.simulation.elements.geometries.paths.geometry_path import LAWS
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
 
-SIZES = {kind.__name__.removeprefix("Wrap"): names for kind, (_, names) in LAWS.items()}
+SIZES = {kind.__name__.removeprefix("Wrap"): names for kind, (*_, names) in LAWS.items()}
 with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:
     SETUPS = {setup["name"]: setup for setup in json.load(file)}
 SETUPS = {name: setup for name, setup in SETUPS.items() if {item["kind"] for item in setup["objects"]} <= SIZES.keys()}

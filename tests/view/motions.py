@@ -18,6 +18,7 @@ class Recorded:
     values: Array
     speeds: Array
     forces: dict[str, Array] = field(default_factory=dict)
+    auxiliary: dict[str, Array] = field(default_factory=dict)
 
 
 def stroll(count: int = 51) -> Recorded:

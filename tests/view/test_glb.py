@@ -126,9 +126,9 @@ def test_paths_have_as_many_pieces_as_corners(corpus, tmp_path):
     rows[:, knee] = (0.0, -1.0, -2.0)
     motion = Recorded(np.array((0.0, 0.5, 1.0)), mechanism.coordinate_names, rows, 0.0 * rows)
     scene, read = written(model, tmp_path, motion)
-    for line in (line for line in scene.lines if line.layer == "paths"):
+    for place, line in ((k, line) for k, line in enumerate(scene.lines) if line.layer == "paths"):
         for moment, row in enumerate(rows):
-            corners = line.corners(row, scene.at(row))
+            corners = scene.at(row).lines[place]
             pieces = [read.placed(place, moment) for place in read.nodes(line.path)]
             ends = [
                 [piece @ (0.0, 0.0, z, 1.0) for z in (-0.5, 0.5)] for piece in pieces if np.abs(piece[:3, :3]).any()

@@ -118,7 +118,7 @@ def test_a_hidden_shape_is_kept_but_not_drawn():
 def test_a_line_is_a_line():
     scene, _ = with_shape(LineGeometry(start_point=(0.0, 0.0, 0.0), end_point=(1.0, 2.0, 3.0)))
     line = next(line for line in scene.lines if "Pelvis_geom" in line.path)
-    assert line.points[1].location.tolist() == [1.0, 2.0, 3.0]
+    assert line.course[1].location.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_contact_surfaces_are_where_the_forces_find_them():
@@ -163,7 +163,7 @@ def test_sticks_join_the_joints():
     scene, mechanism = scene_of(model)
     q = mechanism.values({})
     pose = scene.at(q)
-    lines = {line.path.rsplit("/", 1)[1]: line.corners(q, pose) for line in scene.lines}
+    lines = {line.path.rsplit("/", 1)[1]: corners for line, corners in zip(scene.lines, pose.lines, strict=True)}
     thigh, shank = lines["RightThigh"], lines["RightShank"]
     assert np.linalg.norm(thigh[1] - thigh[0]) == pytest.approx(0.4)
     # The last body of a limb ends at its mass centre.
@@ -180,5 +180,5 @@ def test_sticks_go_where_a_joint_moves_what_it_carries():
         carrier = body
     scene, mechanism = scene_of(model)
     q = mechanism.values({"femur": 0.5, "tibia": -0.4})
-    (femur,) = (line for line in scene.lines if line.path == "/bodyset/femur")
-    assert femur.corners(q, scene.at(q)) == pytest.approx(np.array([(0.5, 0.0, 0.0), (0.1, 0.0, 0.0)]))
+    (femur,) = (k for k, line in enumerate(scene.lines) if line.path == "/bodyset/femur")
+    assert scene.at(q).lines[femur] == pytest.approx(np.array([(0.5, 0.0, 0.0), (0.1, 0.0, 0.0)]))

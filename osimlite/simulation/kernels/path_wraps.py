@@ -47,6 +47,7 @@ from osimlite.simulation.kernels.wrapping import (
     INSIDE,
     MANDATORY,
     NONE,
+    ROOM,
     SECOND_END,
     SECOND_TANGENT,
     SURFACE_LENGTH,
@@ -64,9 +65,10 @@ ROUNDS, STILL = 8, 0.0005
 NOWHERE = -2
 """What becomes of a wrap if the path runs through no point of its range; OpenSim then leaves the path as it is."""
 
-POSE = ENDS
-"""The record of a surface: after the piece that is tried, its rotation by rows and its origin in ground."""
-SURFACE_WORK = ENDS + 12
+POSE, BEST = ENDS, ENDS + 12
+"""The record of a surface: after the piece that is tried, its rotation by rows and its origin in ground; what its law
+has found, from FIRST_TANGENT on, for the piece that is bent."""
+SURFACE_WORK = BEST + ROOM - FIRST_TANGENT
 
 
 def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -164,6 +166,8 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
             put(one, PLACE, r1)
             put(two, PLACE, r2)
             one[SURFACE], two[SURFACE] = 0.0, e[SURFACE_LENGTH]
+            for j in range(ROOM - FIRST_TANGENT):
+                e[BEST + j] = e[FIRST_TANGENT + j]
         if says == MANDATORY:
             break
     # A law has no points for a piece of which OpenSim has none.

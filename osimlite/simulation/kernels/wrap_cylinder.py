@@ -20,6 +20,7 @@ from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, on_side
 from osimlite.simulation.kernels.wrapping import (
     ALONE,
     AXIS,
+    CURVE,
     FIRST_END,
     FIRST_TANGENT,
     INSIDE,
@@ -98,7 +99,7 @@ def around_cylinder(
         z1, z2 = settled(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
     put(e, FIRST_TANGENT, (x1, y1, z1))
     put(e, SECOND_TANGENT, (x2, y2, z2))
-    e[SURFACE_LENGTH] = helix(radius * angle, z2 - z1)
+    e[SURFACE_LENGTH], e[CURVE] = helix(radius * angle, z2 - z1), turn
     return code
 
 

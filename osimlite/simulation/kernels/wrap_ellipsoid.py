@@ -35,6 +35,7 @@ from osimlite.simulation.kernels.wrap_sides import nowhere, on_side
 from osimlite.simulation.kernels.wrapping import (
     AXIAL,
     AXIS,
+    CURVE,
     FIRST_END,
     FIRST_TANGENT,
     INSIDE,
@@ -93,11 +94,14 @@ def wrap_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: in
     length = norm(minus(one, two)) / factor
     if isnan(length):
         return nowhere(e, MANDATORY)
+    put(e, CURVE, normal)
+    e[CURVE + 3], e[CURVE + 4] = offset, 0.0
     if length >= PIECE:
         pieces = int(min(length / PIECE, 1.0 * PIECES))
         length, next_one, next_two = curve(radii, one, two, normal, offset, pieces, False)
         if side != 0.0 and pieces > 1 and (bends_back(first, one, next_one) or bends_back(second, two, next_two)):
             length, _, _ = curve(radii, one, two, normal, offset, pieces, True)
+            e[CURVE + 4] = 1.0
         length /= factor
     put(e, FIRST_TANGENT, times(1.0 / factor, one))
     put(e, SECOND_TANGENT, times(1.0 / factor, two))
@@ -257,14 +261,8 @@ def curve(
         pieces: of which it is made.
         far: whether it goes the longer way around.
     """
-    axis = longest(normal)
-    across = component(normal, axis)
-    centre = replaced((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
+    centre, a, b, angle = around_axis(one, two, normal, offset)
     to_one, to_two = minus(one, centre), minus(two, centre)
-    a, b = unit(to_one), unit(to_two)
-    cosine = dot(a, b)
-    angle = acos(cosine) if abs(cosine) <= 1.0 else nan
-    b = cross(unit(cross(a, b)), a)
     # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the plane at m (c, s).
     scale = inverted(radii)
     u, v, w = elementwise(scale, a), elementwise(scale, b), elementwise(scale, centre)
@@ -285,6 +283,19 @@ def curve(
     next_two = along(along(centre, x, a), y, b)
     dx, dy = dot(to_two, a) - x, dot(to_two, b) - y
     return length + sqrt(dx * dx + dy * dy), next_one, next_two
+
+
+def around_axis(one: Vector, two: Vector, normal: Vector, offset: float) -> tuple[Vector, Vector, Vector, float]:
+    """Where a plane meets the axis to which it is most normal, and how two points of it lie about that.
+
+    By unit vectors from there to the first and, square to that, towards the second, and by the angle between them.
+    """
+    axis = longest(normal)
+    across = component(normal, axis)
+    centre = replaced((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
+    a, b = unit(minus(one, centre)), unit(minus(two, centre))
+    cosine = dot(a, b)
+    return centre, a, cross(unit(cross(a, b)), a), acos(cosine) if abs(cosine) <= 1.0 else nan
 
 
 def bends_back(end: Vector, tangent: Vector, next_point: Vector) -> bool:

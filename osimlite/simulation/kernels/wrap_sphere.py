@@ -25,6 +25,7 @@ from osimlite.simulation.kernels.vectors import (
 from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, nowhere, on_side, tangents
 from osimlite.simulation.kernels.wrapping import (
     AXIS,
+    CURVE,
     FIRST_END,
     FIRST_TANGENT,
     INSIDE,
@@ -74,7 +75,8 @@ def wrap_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
     angle = atan2(norm(cross(one, two)), dot(one, two))
     put(e, FIRST_TANGENT, one)
     put(e, SECOND_TANGENT, two)
-    e[SURFACE_LENGTH] = radius * (angle - 2.0 * pi if far else angle)
+    e[CURVE] = angle - 2.0 * pi if far else angle
+    e[SURFACE_LENGTH] = radius * e[CURVE]
     return code
 
 

@@ -27,6 +27,7 @@ from osimlite.simulation.kernels.wrap_sides import nowhere, on_side
 from osimlite.simulation.kernels.wrapping import (
     ALONE,
     AXIS,
+    CURVE,
     FIRST_END,
     FIRST_TANGENT,
     NONE,
@@ -63,21 +64,30 @@ def wrap_torus(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     distance = sqrt(rx * rx + ry * ry)
     if not distance > 0.0:
         return nowhere(e, WRAPPED)
-    centre = (rx * ring / distance, ry * ring / distance, 0.0)
-    inwards = times(-1.0 / ring, centre)
-    tangent = cross(inwards, DOWN)
-    a, b = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
+    outwards = (rx / distance, ry / distance, 0.0)
+    a, b = in_cylinder(first, outwards, ring), in_cylinder(second, outwards, ring)
     if around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
         return nowhere(e, WRAPPED)
     for place in (FIRST_TANGENT, SECOND_TANGENT):
-        ax, ay, az = vector(e, place)
-        put(e, place, along(along(along(centre, ax, inwards), ay, DOWN), az, tangent))
+        put(e, place, out_of_cylinder(vector(e, place), outwards, ring))
+    e[CURVE + 1], e[CURVE + 2], _ = outwards
     return WRAPPED
 
 
-def seen(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
-    """A point along the axes of the cylinder."""
-    return dot(inwards, point), dot(DOWN, point), dot(tangent, point)
+def in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
+    """A point in the frame of the cylinder that is in the place of the ring where a direction meets it.
+
+    Its x axis points to the middle of the torus, its y axis down, its z axis along the ring.
+    """
+    away, inwards = along(point, -ring, outwards), times(-1.0, outwards)
+    return dot(inwards, away), dot(DOWN, away), dot(cross(inwards, DOWN), away)
+
+
+def out_of_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
+    """A point of the frame of the cylinder in that of the torus."""
+    x, y, z = point
+    inwards = times(-1.0, outwards)
+    return along(along(along(times(ring, outwards), x, inwards), y, DOWN), z, cross(inwards, DOWN))
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:

@@ -54,5 +54,5 @@
   // The function that data describes; that of null is its first argument.
   const law = (data) => data === null ? (x) => x[0] : LAWS[data.type](data);
 
-  window.osimlite = { law };
+  Object.assign(window.osimlite, { law });
 })();

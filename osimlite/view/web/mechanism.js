@@ -2,7 +2,7 @@
 // Where bodies are: each is carried by another (or ground, -1) through fixed transforms and motions along or about axes.
 // Matrices are arrays of 12 numbers, three rows of four, from the body's frame to ground.
 (() => {
-  const { law } = window.osimlite;
+  const { law, Routes } = window.osimlite;
 
   const times = (a, b) => {
     const c = new Array(12);
@@ -35,7 +35,8 @@
         chain: body.chain.map((part) => Array.isArray(part) ? part : { ...part, amount: law(part.law) }),
       }));
       this.couplers = data.couplers.map((coupler) => ({ ...coupler, value: law(coupler.law) }));
-      this.lines = data.lines.map((line) => line.points.map((p) => ({ ...p, laws: (p.laws || []).map(law) })));
+      this.lines = data.lines;
+      this.routes = data.routes && new Routes(data.routes, data.coordinates.length);
     }
 
     // Coordinate values with those of dependent coordinates made to fit; couplers may depend on each other.
@@ -73,17 +74,11 @@
 
     // Corners in ground of line number k.
     corners(k, q, poses) {
-      const found = [];
-      for (const p of this.lines[k]) {
-        if (p.condition && !(p.condition[1] <= q[p.condition[0]] && q[p.condition[0]] <= p.condition[2])) continue;
-        let at = p.at;
-        if (p.laws.length) {
-          const x = p.laws.map((f, axis) => f([q[p.coordinates[axis]]]));
-          at = at.map((start, row) => start + p.turn[row][0] * x[0] + p.turn[row][1] * x[1] + p.turn[row][2] * x[2]);
-        }
-        found.push(point(poses[p.body < 0 ? poses.length - 1 : p.body], at));
-      }
-      return found;
+      const { route, points } = this.lines[k];
+      if (points) return points.map((p) => point(poses[p.body < 0 ? poses.length - 1 : p.body], p.at));
+      if (this.routed !== poses) this.routes.pose(q, poses);
+      this.routed = poses;
+      return this.routes.corners(route);
     }
   }
 

@@ -1,12 +1,11 @@
 "use strict";
 // The three-dimensional picture: surfaces on bodies, lines, frames, arrows, ground, light, camera.
 (() => {
-  const { point } = window.osimlite;
+  const { bytes, point } = window.osimlite;
   const T = window.THREE;
   const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
 
   const floats = (text) => new Float32Array(bytes(text).buffer);
-  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const toned = ([r, g, b]) => new T.Color().setRGB(r, g, b, T.SRGBColorSpace);
   const matrix4 = (m, target = new T.Matrix4()) =>
     target.set(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11], 0, 0, 0, 1);
@@ -26,6 +25,7 @@
       this.camera.up.copy(this.up);
       this.controls = new T.OrbitControls(this.camera, canvas);
       this.controls.addEventListener("change", () => this.wanted());
+      this.glows = {};
       this.layers = {};
       for (const name of [...data.layers, "forces", "ground"]) {
         this.layers[name] = new T.Group();
@@ -122,22 +122,21 @@
       }
     }
 
-    // All lines of a layer as cylinders and balls of two instanced meshes.
+    // All lines of a layer as cylinders and balls of two instanced meshes, one of each for every corner.
     tubes(layer) {
-      const rows = [];
-      this.data.lines.forEach((line, k) => {
-        if (line.layer === layer) for (let s = 0; s < line.points.length; s++) rows.push({ line, k, s });
-      });
-      if (!rows.length) return;
+      const lines = [...this.data.lines.entries()].filter(([, line]) => line.layer === layer && line.visible);
+      if (!lines.length) return;
+      const room = lines.reduce((sum, [, line]) => sum + (line.points ? line.points.length : line.most), 0);
       const rod = new T.CylinderGeometry(1, 1, 1, 10, 1, true), ball = new T.SphereGeometry(1, 10, 8);
       const material = new T.MeshStandardMaterial({ roughness: 0.6 });
       const group = new T.Group();
-      group.userData = { rows };
+      // Which line each of the instances belongs to.
+      group.userData = { lines, owners: [] };
       for (const geometry of [rod, ball]) {
-        const mesh = new T.InstancedMesh(geometry, material, rows.length);
+        const mesh = new T.InstancedMesh(geometry, material, room);
+        mesh.count = 0;
         mesh.frustumCulled = false;
-        mesh.userData = { rows, layer };
-        rows.forEach((row, i) => mesh.setColorAt(i, toned(row.line.color)));
+        mesh.userData = { owners: group.userData.owners };
         group.add(mesh);
       }
       this.layers[layer].add(group);
@@ -200,32 +199,52 @@
         matrix4(poses[k], group.matrix);
         group.matrixWorldNeedsUpdate = true;
       });
-      const start = new T.Vector3(), end = new T.Vector3(), up = new T.Vector3(0, 1, 0);
-      const turn = new T.Quaternion(), middle = new T.Vector3(), size = new T.Vector3(), m = new T.Matrix4();
-      const cache = {};
-      for (const group of this.rods || []) {
-        const [rods, balls] = group.children;
-        group.userData.rows.forEach(({ line, k, s }, i) => {
-          const corners = cache[k] ||= this.mechanism.corners(k, q, poses);
-          const r = line.visible ? line.radius : 0;
-          if (s < corners.length) start.set(...corners[s]);
-          m.makeScale(...(s < corners.length ? [r, r, r] : [0, 0, 0])).setPosition(start);
-          balls.setMatrixAt(i, m);
-          if (s + 1 < corners.length && r > 0) {
-            end.set(...corners[s + 1]);
-            const way = end.clone().sub(start), length = way.length();
-            turn.setFromUnitVectors(up, length > 0 ? way.divideScalar(length) : up);
-            m.compose(middle.addVectors(start, end).multiplyScalar(0.5), turn, size.set(r, length, r));
-          } else m.makeScale(0, 0, 0);
-          rods.setMatrixAt(i, m);
-        });
-        for (const mesh of [rods, balls]) {
-          mesh.instanceMatrix.needsUpdate = true;
-          mesh.boundingSphere = null;
-        }
-      }
+      this.row = row;
+      (this.rods || []).forEach((group) => this.lay(group));
       this.push(row);
       this.wanted();
+    }
+
+    // Put the rods and balls of lines where their corners are.
+    lay(group) {
+      const [rods, balls] = group.children, { lines, owners } = group.userData;
+      const start = new T.Vector3(), end = new T.Vector3(), up = new T.Vector3(0, 1, 0);
+      const turn = new T.Quaternion(), middle = new T.Vector3(), size = new T.Vector3(), m = new T.Matrix4();
+      let i = 0;
+      for (const [k, line] of lines) {
+        const corners = this.mechanism.corners(k, this.q, this.poses), r = line.radius;
+        corners.forEach((corner, s) => {
+          start.set(...corner);
+          balls.setMatrixAt(i, m.makeScale(r, r, r).setPosition(start));
+          end.set(...(corners[s + 1] || corner));
+          const way = middle.copy(end).sub(start), length = way.length();
+          turn.setFromUnitVectors(up, length > 0 ? way.divideScalar(length) : up);
+          rods.setMatrixAt(i, m.compose(start.add(end).multiplyScalar(0.5), turn, size.set(r, length, r)));
+          owners[i++] = k;
+        });
+      }
+      for (const mesh of group.children) {
+        mesh.count = i;
+        mesh.instanceMatrix.needsUpdate = true;
+        mesh.boundingSphere = null;
+      }
+      this.color(group);
+    }
+
+    // Colour lines: what is selected, what something was found at, muscles by their activation, as OpenSim does.
+    color(group) {
+      const { lines, owners } = group.userData, colors = {};
+      for (const [k, line] of lines) {
+        const [glow, strength] = this.glow(line.path), levels = this.data.motion?.activations[line.path];
+        if (levels && this.row >= 0 && glow !== SELECTED) {
+          const a = levels[this.row] / 255;
+          colors[k] = toned([a, 0, 1 - a]);
+        } else colors[k] = strength ? new T.Color(glow) : toned(line.color);
+      }
+      for (const mesh of group.children) {
+        for (let i = 0; i < mesh.count; i++) mesh.setColorAt(i, colors[owners[i]]);
+        if (mesh.count) mesh.instanceColor.needsUpdate = true;
+      }
     }
 
     push(row) {
@@ -257,35 +276,29 @@
       }
     }
 
-    // Colours: what is selected, and what the validator found something at.
+    // How something glows: what is selected, and what the validator found something at.
+    glow(path) {
+      return this.glows[path] ||= this.glowOf(path);
+    }
+
+    glowOf(path) {
+      const within = (above) => path === above || (above !== "/" && path.startsWith(above + "/"));
+      if (this.selected && within(this.selected)) return [SELECTED, 0.55];
+      let worst = null;
+      for (const [component, severity] of this.hideMarks ? [] : Object.entries(this.marks)) {
+        if (component && within(component) && (worst === null || severity === "error")) worst = severity;
+      }
+      return worst && worst !== "info" ? [MARKS[worst], 0.4] : [0, 0];
+    }
+
     paint() {
-      const within = (path, above) => path === above || (above !== "/" && path.startsWith(above + "/"));
-      const marked = (path) => {
-        let worst = null;
-        for (const [component, severity] of Object.entries(this.marks)) {
-          if (component && within(path, component) && (worst === null || severity === "error")) worst = severity;
-        }
-        return this.hideMarks || worst === "info" ? null : worst;
-      };
-      const glow = (path) => {
-        if (this.selected && within(path, this.selected)) return [SELECTED, 0.55];
-        const mark = marked(path);
-        return mark ? [MARKS[mark], 0.4] : [0, 0];
-      };
+      this.glows = {};
       for (const mesh of this.shapes) {
-        const [color, strength] = glow(mesh.userData.path);
+        const [color, strength] = this.glow(mesh.userData.path);
         mesh.material.emissive.setHex(color);
         mesh.material.emissiveIntensity = strength;
       }
-      for (const group of this.rods || []) {
-        for (const mesh of group.children) {
-          group.userData.rows.forEach(({ line }, i) => {
-            const [color, strength] = glow(line.path);
-            mesh.setColorAt(i, strength ? new T.Color(color) : toned(line.color));
-          });
-          mesh.instanceColor.needsUpdate = true;
-        }
-      }
+      (this.rods || []).forEach((group) => this.color(group));
       this.wanted();
     }
 
@@ -346,7 +359,7 @@
       // What shines through gives way to what is behind it.
       const hit = hits.find((h) => !(h.object.material.opacity < 0.45)) || hits[0];
       if (!hit) return null;
-      return hit.instanceId === undefined ? hit.object.userData.path : hit.object.userData.rows[hit.instanceId].line.path;
+      return hit.instanceId === undefined ? hit.object.userData.path : this.data.lines[hit.object.userData.owners[hit.instanceId]].path;
     }
 
     // Where a point of a body is on the page, or null behind the camera.
@@ -378,5 +391,5 @@
     }
   }
 
-  Object.assign(window.osimlite, { Stage, bytes });
+  Object.assign(window.osimlite, { Stage });
 })();

@@ -30,6 +30,7 @@
       if (!motion) return;
       motion.times = new Float64Array(bytes(motion.times).buffer);
       motion.values = new Float64Array(bytes(motion.values).buffer);
+      for (const path in motion.activations) motion.activations[path] = bytes(motion.activations[path]);
       motion.largest = 0;
       for (const force of motion.forces) {
         force.values = new Float32Array(bytes(force.values).buffer);

@@ -82,6 +82,7 @@ class Surface:
         number: tells it from other surfaces of the path.
         tangent: a node at its middle, with its axes.
         law: name of the law of the surface; empty if the surface is not active.
+        curve: name of the law that traces a path on it, which is no geodesic.
         numbers: what the law is given, or those of :mod:`osimlite.simulation.kernels.geodesic_starts`.
         first: number of the first point between which and the last one the path may wrap.
         last: number of the last one.
@@ -90,6 +91,7 @@ class Surface:
     number: int
     tangent: Node
     law: str
+    curve: str
     numbers: tuple[float, ...]
     first: int
     last: int
@@ -112,6 +114,11 @@ class ThroughPoints:
     geodesic: bool = False
 
     coupled: ClassVar[bool] = True
+
+    @property
+    def trace(self) -> str:
+        """Name of the law that traces it."""
+        return "trace_geodesics" if self.geodesic and self.surfaces else "trace_path"
 
     def items(self, places: Places) -> list[Item]:
         """What pulls, the surfaces, and the path."""
@@ -178,7 +185,7 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
 
 
 def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int) -> Surface:
-    law, fields = LAWS[type(surface)]
+    law, curve, fields = LAWS[type(surface)]
     sizes = [float(size) for name in fields for size in np.atleast_1d(getattr(surface, name))]
     builder.check(surface, (*sizes, *surface.translation, *surface.xyz_body_rotation))
     side, method = SIDES.get(surface.quadrant.lower()), METHODS.get(wrap.method.lower())
@@ -201,7 +208,8 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
     if builder.geodesic:
         numbers = (*side, *_geodesic(surface))
     is_none = not surface.active or (builder.geodesic and min(sizes) == 0.0)
-    return Surface(number, tangent, "" if is_none else law, numbers, first, last)
+    law, curve = ("", "") if is_none else (law, curve)
+    return Surface(number, tangent, law, curve, numbers, first, last)
 
 
 def _geodesic(surface: WrapObject) -> tuple[float, ...]:
@@ -244,13 +252,13 @@ READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array
     MovingPathPoint: _moving,
 }
 
-LAWS: dict[type[WrapObject], tuple[str, tuple[str, ...]]] = {
-    WrapCylinder: ("wrap_cylinder", ("radius", "length")),
-    WrapSphere: ("wrap_sphere", ("radius",)),
-    WrapEllipsoid: ("wrap_ellipsoid", ("dimensions",)),
-    WrapTorus: ("wrap_torus", ("inner_radius", "outer_radius")),
+LAWS: dict[type[WrapObject], tuple[str, str, tuple[str, ...]]] = {
+    WrapCylinder: ("wrap_cylinder", "trace_cylinder", ("radius", "length")),
+    WrapSphere: ("wrap_sphere", "trace_sphere", ("radius",)),
+    WrapEllipsoid: ("wrap_ellipsoid", "trace_ellipsoid", ("dimensions",)),
+    WrapTorus: ("wrap_torus", "trace_torus", ("inner_radius", "outer_radius")),
 }
-"""The law of each surface, and the properties that are its sizes."""
+"""The law of each surface, that which traces a path on it, and the properties that are its sizes."""
 
 SIGNS = {"": 1.0, "+": 1.0, "-": -1.0}
 SIDES = {sign + name: (float(axis), side) for axis, name in enumerate("xyz") for sign, side in SIGNS.items()}
