@@ -38,6 +38,24 @@ class Pose(NamedTuple):
         return f"at '{self.coordinate}' = {value}"
 
 
+class Wrapping(NamedTuple):
+    """A path around surfaces in OpenSim's way, beside the same along geodesics.
+
+    Attributes:
+        owner: path of what has it.
+        surfaces: names of the surfaces.
+        default: by how much it is longer in the default pose, m; NaN if there is no geodesic.
+        worst: where that is most, m.
+        pose: there.
+    """
+
+    owner: str
+    surfaces: tuple[str, ...]
+    default: float
+    worst: float
+    pose: Pose
+
+
 class Jump(NamedTuple):
     """A length of a path that jumps: by how much (m), where, and which points or surfaces come or go there."""
 
@@ -114,6 +132,7 @@ class Measures(NamedTuple):
     """What is measured of a model; paths are looked at in `poses` poses."""
 
     poses: int
+    wrappings: list[Wrapping]
     jumps: list[Jump]
     on_surfaces: list[LengthOnSurface]
     moving_points: list[MovingPoint]

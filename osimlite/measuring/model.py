@@ -12,6 +12,7 @@ from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
 from osimlite.measuring.points import moving_points
 from osimlite.measuring.sweeps import Sweep, lengths, sweeps
+from osimlite.measuring.wrapping import wrappings
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.paths import Paths
@@ -39,6 +40,7 @@ def measured(model: Model) -> Measures:
         reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
     return Measures(
         1 + sum(len(sweep.poses) for sweep in looked_at),
+        [*wrappings(model, paths, start, looked_at)],
         [jump for sweep in looked_at for jump in jumps(sweep)],
         [*_on_surfaces(paths, start, looked_at)],
         [*moving_points(paths)],

@@ -1,4 +1,4 @@
-"""OSIM632 to OSIM634: lengths of paths, measured over the ranges of the coordinates."""
+"""OSIM631 to OSIM634: lengths of paths, measured over the ranges of the coordinates."""
 
 from __future__ import annotations
 
@@ -10,6 +10,101 @@ from osimlite.lint.measures import MEASURES, Jump, MovingPoint, measures_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.text import listed
+
+OFF = Threshold("wrapping-error", 0.001, "m", "so far may OpenSim's length of a path be from that along geodesics")
+
+
+@rule("OSIM631", "wrong-wrapping", severity=WARNING, thresholds=(OFF,), about=MEASURES)
+def wrong_wrapping(subject: Subject, found: Found) -> None:
+    """OpenSim computes a path around surfaces wrongly.
+
+    ## What it does
+    Reports paths whose length in OpenSim is a millimetre or more off that along geodesics, the shortest ways on the
+    surfaces, in the default pose or at one of nine values of each coordinate over its range, the others as in the
+    default pose. A negative number is how much too short OpenSim has the path. Paths of OSIM633 are left out.
+
+    ## Why is this bad
+    Around several surfaces OpenSim looks for the way in rounds, but measures straight pieces between tangent points of
+    an earlier round: paths are shorter than they can be, and their forces have a moment that nothing bears. Around one
+    surface it goes another way than the shortest on an ellipsoid and a torus, and along a cylinder. The moment arm is
+    not the derivative of the length then, so that the muscle's work is not what its force and its length say.
+    `osimlite muscles` and `osimlite simulate` compute the right lengths with `--wrapping geodesic`.
+
+    ## Example
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+            <WrapObjectSet name="wrapobjectset">
+                <objects>
+                    <WrapCylinder name="high"> <translation>-0.01 -0.12 0</translation> <radius>0.04</radius>
+                        <length>0.2</length> </WrapCylinder>
+                    <WrapCylinder name="low"> <translation>-0.01 -0.28 0</translation> <radius>0.04</radius>
+                        <length>0.2</length> </WrapCylinder>
+                </objects>
+            </WrapObjectSet>
+        </Body>
+        <PathSpring name="spring">
+            <GeometryPath name="path">
+                <PathPointSet>
+                    <objects>
+                        <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                        <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                            <location>0 -0.4 0</location> </PathPoint>
+                    </objects>
+                </PathPointSet>
+                <PathWrapSet>
+                    <objects>
+                        <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
+                        <PathWrap name="around_low"> <wrap_object>low</wrap_object> </PathWrap>
+                    </objects>
+                </PathWrapSet>
+            </GeometryPath>
+            <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+        </PathSpring>
+    ```
+
+    ## Use instead
+    ```xml
+    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+            <WrapObjectSet name="wrapobjectset">
+                <objects>
+                    <WrapCylinder name="high"> <translation>-0.01 -0.12 0</translation> <radius>0.04</radius>
+                        <length>0.2</length> </WrapCylinder>
+                </objects>
+            </WrapObjectSet>
+        </Body>
+        <PathSpring name="spring">
+            <GeometryPath name="path">
+                <PathPointSet>
+                    <objects>
+                        <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                        <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                            <location>0 -0.4 0</location> </PathPoint>
+                    </objects>
+                </PathPointSet>
+                <PathWrapSet>
+                    <objects>
+                        <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
+                    </objects>
+                </PathWrapSet>
+            </GeometryPath>
+            <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+        </PathSpring>
+    ```
+    """
+    most, measures = subject.config.value_of(OFF), measures_of(subject)
+    told = {item.owner for item in measures.on_surfaces}
+    for wrapping in measures.wrappings:
+        if abs(wrapping.worst) >= most and wrapping.owner not in told:
+            owner, surfaces = subject.tree.at(wrapping.owner), listed([f"'{name}'" for name in wrapping.surfaces])
+            default = (
+                f"{1000.0 * wrapping.default:.3g} mm in the default pose and by " if wrapping.pose.coordinate else ""
+            )
+            found(
+                f"OpenSim's length of the path of {called(owner)} around {surfaces} is off by {default}"
+                f"{1000.0 * wrapping.worst:.3g} mm {wrapping.pose}",
+                owner,
+            )
+
 
 JUMP = Threshold("path-jump", 0.001, "m", "so far may a path jump; less than 0.0005 is not looked for")
 
