@@ -7,8 +7,9 @@ The stages are those of Simbody: where the links are (position), how they move (
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.link_motion import Moments, moving
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import NoSolution
 
@@ -64,10 +66,7 @@ class System:
         self, mechanism: Mechanism, forces: Forces, chain: Chain | None = None, code: Code | None = None
     ) -> None:
         packed = pack(mechanism, forces, chain)
-        self.mechanism, self.forces = mechanism, forces
-        self.structure, self.numbers, self.placements = packed.structure, packed.numbers, packed.placements
-        self.order = packed.order
-        self.state = StateLayout(mechanism, self.order, forces.elements)
+        self.structure, self.placements, self.order = packed.structure, packed.placements, packed.order
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
         self.columns = tuple(label for element in forces.elements for label in element.columns)
@@ -75,14 +74,31 @@ class System:
         self.program = Program(packed, best() if code is None else code, self.entries)
         self._items, self._owners = packed.items, packed.owners
         places = {owner: place for place, owner in packed.owners.items()}
-        probes = [(item, places.get(k, 0)) for k, item in enumerate(forces.elements) if isinstance(item, DeclaredProbe)]
-        self.probes, self._probe_places = tuple(probe for probe, _ in probes), [place for _, place in probes]
+        probes = (k for k, item in enumerate(forces.elements) if isinstance(item, DeclaredProbe))
+        self._probe_places = [places.get(k, 0) for k in probes]
         self._w = np.zeros(self.structure[layout.WORK_SIZE])
         self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
         self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
-        self._y, self._f = np.zeros(self.state.size), np.zeros(self.state.size)
-        self._bind()
+        size = int(self.structure[layout.STATE_SIZE])
+        self._y, self._f = np.zeros(size), np.zeros(size)
+        self._take(mechanism, forces, packed.numbers)
+
+    def _take(self, mechanism: Mechanism, forces: Forces, numbers: Floats) -> None:
+        self.mechanism, self.forces, self.numbers = mechanism, forces, numbers
+        self.state = StateLayout(mechanism, self.order, forces.elements)
+        self.probes = tuple(item for item in forces.elements if isinstance(item, DeclaredProbe))
         self._controls = forces.controls
+        self._bind()
+
+    def renumbered(self, mechanism: Mechanism, forces: Forces, numbers: Floats) -> Self:
+        """The system of a model of which only numbers are others; it works in the same arrays as this one."""
+        # Copying by its own ways makes an engine from the beginning.
+        other = object.__new__(type(self))
+        other.__dict__ |= self.__dict__
+        other.program = copy(self.program)
+        other.__dict__.pop("masses_in_ground", None)
+        other._take(mechanism, forces, numbers)
+        return other
 
     def _bind(self) -> None:
         self._equilibrate: Callable[[int], int] | None = None
@@ -253,66 +269,42 @@ class System:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
         self.applied(t, y)
         kinetic, gravity = self._mechanical()
-        gravity -= sum(float(mass * self.mechanism.gravity @ center) for mass, center in self._masses_in_ground)
+        gravity -= sum(float(mass * self.mechanism.gravity @ center) for mass, center in self.masses_in_ground)
         return kinetic, gravity, float(sum(element.energy(records) for element, records in self._records()))
 
     def _mechanical(self) -> tuple[float, float]:
         """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
-        w, inertia = self._links, self._inertia
-        centers, v = self._moving(w, inertia[:, 1:4])
-        rotations, turning = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 3]
+        w, inertia = self._links, self.inertia
+        motion = moving(w, inertia[:, 1:4])
+        rotations, turning, v = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 3], motion[:, 3:]
         own = (turning[:, None, :] @ rotations)[:, 0]
         moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
         spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
         kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
-        return kinetic, -float(inertia[:, 0] @ centers @ self.mechanism.gravity)
+        return kinetic, -float(inertia[:, 0] @ motion[:, :3] @ self.mechanism.gravity)
 
     @property
-    def _inertia(self) -> Floats:
+    def inertia(self) -> Floats:
         """Mass, mass centre and inertia of all links (l, 10)."""
-        links = len(self._links)
-        return self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + 10 * links].reshape(links, 10)
+        count = 10 * len(self._links)
+        return self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + count].reshape(-1, 10)
 
     @cached_property
-    def _masses_in_ground(self) -> list[tuple[float, Floats]]:
+    def masses_in_ground(self) -> list[tuple[float, Floats]]:
         """Masses and mass centres of the bodies that are fixed to ground."""
         pairs = zip(self.placements, self.mechanism.bodies, strict=True)
         fixed = [(frame, body.mass_properties) for (link, frame), body in pairs if link == GROUND]
         return [(own.mass, frame[:3, :3] @ own.center + frame[:3, 3]) for frame, own in fixed]
 
-    @staticmethod
-    def _moving(links: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Places and velocities in ground (k, 3) of points (k, 3) of links, after an evaluation."""
-        velocity, origin = links[:, layout.VELOCITY :], links[:, layout.ORIGIN : layout.ORIGIN + 3]
-        arms = links[:, layout.POSITION : layout.POSITION + 3] - origin
-        arms = arms + (links[:, :9].reshape(-1, 3, 3) @ points[:, :, None])[:, :, 0]
-        return arms + origin, velocity[:, 3:6] + np.cross(velocity[:, :3], arms)
-
-    def _moved(self, t: float, y: Sequence[float]) -> None:
-        """Evaluate positions and velocities."""
-        status = self.realize(t, y, layout.VELOCITY_STAGE)
-        if status != layout.OK:
-            raise self.refusal(status, t, y)
-
-    def center_of_mass(self, t: float, y: Sequence[float]) -> Floats:
-        """Place (m) and velocity (m/s) in ground (6,) of the mass centre of all bodies at a state."""
-        self._moved(t, y)
-        masses, fixed = self._inertia[:, 0], self._masses_in_ground
-        total = masses @ np.hstack(self._moving(self._links, self._inertia[:, 1:4]))
-        total[:3] += sum((mass * center for mass, center in fixed), np.zeros(3))
-        found: Floats = total / (masses.sum() + sum(mass for mass, _ in fixed) or 1.0)
+    def links_at(self, moments: Moments) -> Floats:
+        """What the kernels find of the motion of all links at some moments (k, l, n)."""
+        found = np.empty((len(moments), *self._links.shape))
+        for row, (t, y) in zip(found, moments, strict=True):
+            status = self.realize(t, y, layout.VELOCITY_STAGE)
+            if status != layout.OK:
+                raise self.refusal(status, t, y)
+            row[:] = self._links
         return found
-
-    def station(self, t: float, y: Sequence[float], body: int, location: Floats) -> Floats:
-        """Place (m) and velocity (m/s) in ground (6,) of a point of a body, -1 for ground, at a state."""
-        self._moved(t, y)
-        link, frame = self.placements[body] if body != GROUND else (GROUND, np.eye(4))
-        point = frame[:3, :3] @ location + frame[:3, 3]
-        return (
-            np.append(point, np.zeros(3))
-            if link == GROUND
-            else np.hstack(self._moving(self._links[[link]], point[None]))[0]
-        )
 
     def _records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
         """Each element with the records of its items, after an evaluation."""

@@ -28,12 +28,10 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SettingError
+from osimlite.simulation.link_motion import Moments, centers_of_mass, stations
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.sweep.variables import Floats
 from osimlite.text import did_you_mean
-
-Moments = Sequence[tuple[float, Sequence[float]]]
-"""Times (s), and the states then."""
 
 Quantity = Callable[[Any, Moments], Any]
 """Numbers at all moments (k,) for an engine."""
@@ -142,8 +140,8 @@ def quantities(engine: Any) -> Mapping[str, Quantity]:
     found: dict[str, Quantity] = {"time": lambda engine, moments: np.array([t for t, _ in moments])}
     places = {place: number for number, place in enumerate(engine.order)}
     for place, info in enumerate(mechanism.coordinates):
-        value = partial(_state, places[place]) if place in places else partial(_still, info.default_value)
-        speed = partial(_state, count + places[place]) if place in places else partial(_still, 0.0)
+        value = partial(_state, places[place]) if place in places else partial(_still, place)
+        speed = partial(_state, count + places[place]) if place in places else partial(_still, None)
         for name in (info.name, info.path):
             found |= {name: value, f"{name}/value": value, f"{name}/speed": speed}
     more: list[tuple[str, Quantity]] = []
@@ -153,13 +151,10 @@ def quantities(engine: Any) -> Mapping[str, Quantity]:
     for number, path in enumerate(engine.forces.controls.names):
         control = partial(_control, number)
         more += [(f"{path}/control", control), (f"{path.rpartition('/')[2]}/control", control)]
-    centers = {body.name: (k, body.mass_properties.center) for k, body in enumerate(mechanism.bodies)}
-    stations = {path.rpartition("/")[2]: station for path, station in mechanism.stations.items()}
-    points: list[tuple[str, Callable[..., Floats]]] = [
-        ("center_of_mass", _center),
-        *((name, partial(_point, *at)) for name, at in (stations | centers).items()),
-    ]
-    for name, motion in points:
+    points: dict[str, Callable[[Any, Moments], Floats]] = {"center_of_mass": centers_of_mass}
+    points |= {path.rpartition("/")[2]: partial(_marker, path) for path in mechanism.stations}
+    points |= {body.name: partial(_body, number) for number, body in enumerate(mechanism.bodies)}
+    for name, motion in points.items():
         for axis, letter in enumerate("XYZ"):
             more += [(f"{name}_{letter}", partial(_axis, motion, axis))]
             more += [(f"{name}_{letter}/speed", partial(_axis, motion, 3 + axis))]
@@ -172,8 +167,8 @@ def _state(place: int, engine: Any, moments: Moments) -> Floats:
     return np.array([y[place] for _, y in moments])
 
 
-def _still(value: float, engine: Any, moments: Moments) -> Floats:
-    return np.full(len(moments), value)
+def _still(place: int | None, engine: Any, moments: Moments) -> Floats:
+    return np.full(len(moments), 0.0 if place is None else engine.mechanism.coordinates[place].default_value)
 
 
 def _control(place: int, engine: Any, moments: Moments) -> Floats:
@@ -192,15 +187,13 @@ def _probe(place: int, engine: Any, moments: Moments) -> Floats:
     return np.array(list(probe_rows(engine, moments, moments)))[:, place]
 
 
-def _axis(motion: Callable[..., Floats], axis: int, engine: Any, moments: Moments) -> Floats:
-    return np.array([motion(engine, t, y)[axis] for t, y in moments])
+def _marker(path: str, engine: Any, moments: Moments) -> Floats:
+    return stations(engine, moments, *engine.mechanism.stations[path])
 
 
-def _center(engine: Any, t: float, y: Sequence[float]) -> Floats:
-    found: Floats = engine.center_of_mass(t, y)
-    return found
+def _body(number: int, engine: Any, moments: Moments) -> Floats:
+    return stations(engine, moments, number, engine.mechanism.bodies[number].mass_properties.center)
 
 
-def _point(body: int, location: Floats, engine: Any, t: float, y: Sequence[float]) -> Floats:
-    found: Floats = engine.station(t, y, body, location)
-    return found
+def _axis(motion: Callable[[Any, Moments], Floats], axis: int, engine: Any, moments: Moments) -> Floats:
+    return motion(engine, moments)[:, axis]

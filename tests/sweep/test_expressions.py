@@ -42,22 +42,25 @@ def test_they_are_of_the_columns_of_a_simulation():
 
 def test_places_of_bodies_and_the_mass_center(walker):
     """Numbers of the model that are varied count."""
-    names = ["center_of_mass_X", "center_of_mass_Y/speed", "LeftShank_Y", "Pelvis_X/speed"]
+    names = ["center_of_mass_X", "center_of_mass_Y/speed", "LeftShank_Y", "Pelvis_X/speed", "platform_rz"]
     vary = {"Pelvis_ty/speed": (0.0, 1.0), "LHip_rz": (0.0, 1.0), "LHip_rz/speed": (0.0, 3.0), "Pelvis/mass": (1, 5)}
-    row = (0.5, 0.3, 2.0, 4.0)
+    vary |= {"LeftShank/mass_center/1": (-0.2, 0.2), "platform_rz": (-0.1, 0.0)}
+    row = (0.5, 0.3, 2.0, 4.0, 0.15, -0.05)
     made = plan(walker, vary, measures=tuple(f"end({name})" for name in names), to=0.1)
     found = [value[0] for value in Runner(made).run(np.array([row])).measures.values()]
     walker.tree().by_path["/bodyset/Pelvis"].mass = 4.0
+    walker.tree().by_path["/bodyset/LeftShank"].mass_center = shank = (0.0, 0.15, 0.0)
+    walker.tree().by_path["/jointset/PlatformToGround/platform_rz"].default_value = -0.05
     with Simulation(walker, "compiled") as simulation:
         speeds = {"Pelvis_ty": 0.5, "LHip_rz": 2.0}
         run = simulation.run(0.1, initial={"LHip_rz": 0.3}, initial_speeds=speeds)
     mechanism, q, u = run.mechanism, run.values[-1], run.speeds[-1]
-    shank = walker.tree().by_path["/bodyset/LeftShank"].mass_center
     wanted = [
         mechanism.center_of_mass(q)[0],
         mechanism.center_of_mass_velocity(q, u)[1],
         (mechanism.body_transforms(q)["LeftShank"] @ [*shank, 1.0])[1],
         mechanism.station_velocity("Pelvis", walker.tree().by_path["/bodyset/Pelvis"].mass_center, q, u)[0],
+        -0.05,
     ]
     assert found == pytest.approx(wanted, rel=1e-12)
 

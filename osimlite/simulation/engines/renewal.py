@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,11 +37,11 @@ class Renumbered:
     mechanism: Mechanism
     forces: Forces
     numbers: Floats
-    make: Callable[[Mechanism, Forces], CompiledEngine]
+    given: CompiledEngine
 
     def engine(self) -> CompiledEngine:
         """The engine of this very model."""
-        return self.make(self.mechanism, self.forces)
+        return self.given.renumbered(self.mechanism, self.forces, self.numbers)
 
 
 class NumbersOnly:
@@ -102,7 +102,7 @@ class NumbersOnly:
         if mechanism is None:
             return None
         numbers = self._with_forces(made, forces.controls) if only_forces else self._packed(mechanism, forces)
-        return None if numbers is None else Renumbered(mechanism, forces, numbers, type(self._engine))
+        return None if numbers is None else Renumbered(mechanism, forces, numbers, self._engine)
 
     def _with_forces(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
         """The given numbers with those of some elements, and of the controls, in their places."""
