@@ -39,6 +39,14 @@ def optimize(
         typer.Option(help="How far from where it begins the method looks at first, as a fraction of the ranges."),
     ] = 0.25,
     seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Begin at what another search found, of variables that have the same names.",
+            show_default="where the model is",
+        ),
+    ] = None,
     maximize: Annotated[
         bool | None, typer.Option("--maximize/--minimize", help="What is better.", show_default="see --objective")
     ] = None,
@@ -78,7 +86,7 @@ def optimize(
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
     """
     from osimlite.cli._progress import progress_bar
-    from osimlite.sweep.optimize import Objective
+    from osimlite.sweep.optimize import Objective, found_by
     from osimlite.sweep.optimize import optimize as search
 
     plan = sweeping.make_plan(
@@ -90,7 +98,7 @@ def optimize(
         found = search(
             plan, Objective(objective, maximize), output, method=method, budget=budget, popsize=popsize, seed=seed,
             sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, force=force,
-            workers=workers, cluster=cluster, progress=progress,
+            start=found_by(start) if start else None, workers=workers, cluster=cluster, progress=progress,
         )  # fmt: skip
     _told(objective, found).show()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -14,7 +14,7 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.document.printer import write
-from osimlite.errors import SettingError, SimulationError
+from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
@@ -88,7 +88,7 @@ def optimize(
     sigma: float = 0.25,
     tolerance: float | None = None,
     is_bounded: bool = True,
-    start: Sequence[float] | None = None,
+    start: Sequence[float] | Mapping[str, float] | None = None,
     resume: bool = False,
     force: bool = False,
     workers: int | None = None,
@@ -109,7 +109,8 @@ def optimize(
             looked all over them before.
         tolerance: of the cost and of the points (as fractions of the ranges), at which the search ends.
         is_bounded: whether the ranges are bounds, or say only where to begin.
-        start: values to begin at; by default those of the model where they are within the ranges, else the middle.
+        start: values to begin at, of all variables or by name; for others those of the model where they are within the
+            ranges, else the middle.
         resume: go on with an interrupted search, or with a finished one and a larger budget.
         force: replace what another search has left in the folder.
         workers: as of a sweep.
@@ -162,23 +163,42 @@ def optimize(
 
 
 def _start(
-    plan: Plan, variants: Variants, free: Sequence[int], start: Sequence[float] | None, is_bounded: bool
+    plan: Plan,
+    variants: Variants,
+    free: Sequence[int],
+    start: Sequence[float] | Mapping[str, float] | None,
+    is_bounded: bool,
 ) -> Floats:
-    given: Sequence[float | None] = variants.present() if start is None else start
-    if len(given) != len(plan.variables):
-        raise SettingError(
-            f"the start has one number for each of the {len(plan.variables)} variables, not {len(given)}"
-        )
-    found = []
+    if not isinstance(start, Mapping):
+        if start is not None and len(start) != len(plan.variables):
+            raise SettingError(
+                f"the start has one number for each of the {len(plan.variables)} variables, not {len(start)}"
+            )
+        start = dict(zip((item.name for item in plan.variables), start or (), strict=False))
+    found, present = [], variants.present()
     for place in free:
-        item, value = plan.variables[place], given[place]
+        item = plan.variables[place]
+        value = start.get(item.name, present[place])
         within = value is not None and (item.low <= value <= item.high or not is_bounded)
-        if start is not None and not within:
+        if item.name in start and not within:
             raise SettingError(f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}")
         if value is not None and item.is_log and value <= 0.0:
             within = False
         found.append(item.fraction(value) if value is not None and within else 0.5)
     return np.array(found)
+
+
+def found_by(folder: str | Path) -> dict[str, float]:
+    """The best values that another search has left in its folder, by the names of its variables.
+
+    Raises:
+        OsimliteError: there are none.
+    """
+    path = Path(folder) / SUMMARY
+    try:
+        return {name: float(value) for name, value in json.loads(path.read_text(encoding="utf-8"))["values"].items()}
+    except (OSError, ValueError, LookupError, AttributeError, TypeError):
+        raise OsimliteError(f"'{path}' is not the summary of a search; name the folder of one") from None
 
 
 def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations) -> Partial:

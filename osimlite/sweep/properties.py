@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import TypeVar
 
 from osimlite.errors import SettingError
+from osimlite.multibody.parts import CoordinateInfo
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value
 from osimlite.schema.model import Model
+
+N = TypeVar("N", Component, CoordinateInfo)
 
 Step = str | int
 """Name of a property, or place in the list that the step before led to."""
@@ -82,13 +86,13 @@ class Setter:
         return float(found if self.entry is None else found[self.entry])
 
 
-def named(pattern: str, components: Iterable[Component]) -> list[Component]:
+def named(pattern: str, components: Iterable[N]) -> list[N]:
     """Components by name or path, or by several with commas; ``*``, ``?`` and ``[lr]`` stand for parts of a name.
 
     None if one of several means nothing.
     """
     known = list(components)
-    found: dict[int, Component] = {}
+    found: dict[int, N] = {}
     for part in pattern.split(","):
         own = [item for item in known if _is_meant(part, item.path if part.startswith("/") else item.name)]
         if not own:

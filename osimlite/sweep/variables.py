@@ -1,7 +1,7 @@
 """What a sweep varies: how it is written, and what of a model or its start it means.
 
 ======================================  ==========================================================
-``RHip_rz``                             value at the start, by the name or the path of a coordinate
+``RHip_rz``, ``?Hip_rz``                value at the start, by the name or the path of a coordinate, or of several
 ``RHip_rz/speed``                       generalized speed at the start
 ``/bodyset/Pelvis/mass``                any number of the model, by the path of a component or its name
 ``/forceset/*Foot*/.../stiffness``      several numbers that are the same in each run
@@ -46,10 +46,15 @@ Range = float | str | Sequence[Any]
 
 @dataclass(frozen=True)
 class Start:
-    """A coordinate's value or speed at the start."""
+    """Value or speed at the start of coordinates, by their paths."""
 
-    coordinate: str
+    coordinates: tuple[str, ...]
     is_speed: bool
+
+    @property
+    def parts(self) -> tuple[Start, ...]:
+        """The same of each coordinate."""
+        return tuple(Start((path,), self.is_speed) for path in self.coordinates)
 
 
 @dataclass(frozen=True)
@@ -200,11 +205,10 @@ def refuse_counts(found: Sequence[Variable]) -> None:
 
 def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> tuple[Target, str]:
     """What a name means, and in what unit."""
-    infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     front, _, last = name.rpartition("/")
-    key, is_speed = (front, last == "speed") if last in ("value", "speed") and front in infos else (name, False)
-    if key in infos:
-        return _coordinate(name, infos[key], is_speed, model)
+    for key, is_speed in ((name, False), (front, last == "speed")):
+        if (key == name or last in ("value", "speed")) and (meant := named(key, mechanism.coordinates)):
+            return _coordinates(name, meant, is_speed, model)
     if name in parameters:
         default = parameters[name]
         return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
@@ -215,8 +219,8 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         return made, made.unit
     if word in ("", SCALE) and (found := places(model, route)):
         unit = found[0].unit
-        if unit.startswith("rad | m") and found[0].component in infos:
-            unit = _unit_of(infos[found[0].component])
+        if unit.startswith("rad | m") and (own := named(found[0].component, mechanism.coordinates)):
+            unit = _unit_of(own[0])
         return Property(found, bool(word)), "" if word else unit
     if name == "slope":
         return Slope(), "rad"
@@ -224,7 +228,8 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         raise SettingError(
             f"'{name}' is an actuator: vary its control, as '{route}/control', or a property by its path"
         )
-    known = [*infos, *(f"{info}/speed" for info in infos), *parameters, "slope"]
+    known = [f"{info.name}{what}" for info in mechanism.coordinates for what in ("", "/speed")] + [*parameters, "slope"]
+    known += [f"{info.path}{what}" for info in mechanism.coordinates for what in ("", "/speed")]
     known += [f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)]
     known += spellings(model) if "/" in name else []
     raise SettingError(
@@ -232,12 +237,17 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
     )
 
 
-def _coordinate(name: str, info: CoordinateInfo, is_speed: bool, model: Model) -> tuple[Target, str]:
-    if not info.locked:
-        return Start(info.path, is_speed), _unit_of(info)
-    if is_speed:
-        raise SettingError(f"the coordinate of '{name}' is locked, so that it has no speed; unlock it in the model")
-    return Property(places(model, f"{info.path}/default_value")), _unit_of(info)
+def _coordinates(name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model) -> tuple[Target, str]:
+    unit, locked = _unit_of(infos[0]), [info for info in infos if info.locked]
+    if locked and is_speed:
+        raise SettingError(
+            f"the coordinate '{locked[0].name}' is locked, so that it has no speed; unlock it in the model"
+        )
+    if not locked:
+        return Start(tuple(info.path for info in infos), is_speed), unit
+    if len(locked) < len(infos):
+        raise SettingError(f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one")
+    return Property(places(model, ",".join(info.path for info in infos) + "/default_value")), unit
 
 
 def _unit_of(info: CoordinateInfo) -> str:
@@ -288,8 +298,8 @@ def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
     """Whether an angle of the start was written as a number of degrees."""
     assert isinstance(made.target, Start)
     ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
-    info = mechanism.coordinates[mechanism.coordinate_index(made.target.coordinate)]
-    odd = (suspect_value(info, made.name, end) for end in ends)
+    infos = [mechanism.coordinates[mechanism.coordinate_index(path)] for path in made.target.coordinates]
+    odd = (suspect_value(info, made.name, end) for info in infos for end in ends)
     return next((words for words in odd if words), "")
 
 

@@ -83,7 +83,8 @@ class Variants:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         targets = [item.target for item in plan.variables]
-        self._starts = [(k, t) for k, t in enumerate(targets) if isinstance(t, Start)]
+        starts = [(k, part) for k, target in enumerate(targets) if isinstance(target, Start) for part in target.parts]
+        self._starts = [(k, part.coordinates[0], part.is_speed) for k, part in starts]
         self._changes = [k for k, target in enumerate(targets) if not isinstance(target, Start)]
         self._parameters = [k for k, target in enumerate(targets) if isinstance(target, Parameter)]
         self._adopt(plan.model())
@@ -134,16 +135,16 @@ class Variants:
         if simulation is not None and simulation.constraints:
             # The rest follows from what is set.
             chosen: tuple[dict[str, float], dict[str, float]] = {}, {}
-            for place, target in self._starts:
-                chosen[target.is_speed][target.coordinate] = float(values[place])
+            for place, path, is_speed in self._starts:
+                chosen[is_speed][path] = float(values[place])
             row = np.array(simulation.initial_state(*chosen))
         else:
-            for place, target in self._starts:
-                coordinate = engine.mechanism.coordinate_index(target.coordinate)
+            for place, path, is_speed in self._starts:
+                coordinate = engine.mechanism.coordinate_index(path)
                 if coordinate not in engine.order:
-                    raise SettingError(f"'{target.coordinate}' is locked in this model, so that it has no start")
+                    raise SettingError(f"'{path}' is locked in this model, so that it has no start")
                 number = engine.order.index(coordinate)
-                row[number + (len(engine.order) if target.is_speed else 0)] = values[place]
+                row[number + (len(engine.order) if is_speed else 0)] = values[place]
         started: Floats = self.started(engine, [variant], row[None])[0]
         return started
 
@@ -196,7 +197,7 @@ class Variants:
         setters = dict(self._setters)
         for place, item in enumerate(self._plan.variables):
             if isinstance(item.target, Start):
-                info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinate)]
+                info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinates[0])]
                 found.append(info.default_speed if item.target.is_speed else info.default_value)
             elif isinstance(item.target, Property):
                 found.append(1.0 if item.target.is_scaled else setters[place][0].get())
@@ -209,9 +210,8 @@ class Variants:
     def set_start(self, values: Sequence[float]) -> None:
         """Make the initial state of a sample the default state of `model`."""
         coordinates: Any = self.model.tree().by_path
-        for place, target in self._starts:
-            name = "default_speed_value" if target.is_speed else "default_value"
-            setattr(coordinates[target.coordinate], name, float(values[place]))
+        for place, path, is_speed in self._starts:
+            setattr(coordinates[path], "default_speed_value" if is_speed else "default_value", float(values[place]))
         if self._plan.is_planted:
             variant = self.variant(values)
             engine = variant.engine

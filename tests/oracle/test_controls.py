@@ -22,6 +22,8 @@ from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.system import System
+from osimlite.sweep.plan import plan
+from osimlite.sweep.variants import Variants
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
@@ -53,6 +55,24 @@ def compare_controls(path, times, tolerance=1e-12) -> None:
 
 
 TIMES = [-1.0, -0.1, 0.0, 0.013, 0.2, 0.3, 0.37, 0.5, 0.61, 0.99, 1.0, 1.7]
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "steps", "cubic"])
+def test_controls_that_a_search_writes(tmp_path, interpolation):
+    """Nodes, switches at one time, a factor and a number are the same to OpenSim, but exactly at steps."""
+    model = carrier(next(iter(JOINTS.values())))
+    first, second = (info.name for info in build_mechanism(model).coordinates[:2])
+    motors(model, first, second)
+    vary = {
+        f"on_{first}/control@0:1.05:4": "-1:1", f"on_{first}/control@scale": "0:2", "on_*/control@switch1": "0:1",
+        f"on_{second}/control@switch2": "0:1", f"on_{second}/control@switch3": "0:1", "on_*/control": "-1:1",
+    }  # fmt: skip
+    table = (np.array([0.1, 0.4, 0.9]), np.array([0.3, -0.2, 0.8]))
+    made = plan(model, vary, controls={f"on_{first}": table}, interpolation=interpolation, to=1.0)
+    variants = Variants(made)
+    variants.put([0.3, -0.8, 0.5, 0.1, 1.7, 0.38, 0.38, 0.25, 0.45])
+    osimlite.write(variants.model, tmp_path / "m.osim")
+    compare_controls(tmp_path / "m.osim", TIMES)
 
 
 def motors(model, *names) -> None:

@@ -19,6 +19,7 @@ from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.run import sweep
 from osimlite.sweep.sampling import samples
+from tests.sweep.test_controls import pulled
 
 pytest.importorskip("distributed", reason="needs dask.distributed (extra 'sweep')")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
@@ -170,11 +171,12 @@ def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_search_finds_the_same_there(cluster, walker, tmp_path):
+def test_a_search_finds_the_same_there(cluster, tmp_path):
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
-    made = plan(walker, {"RHip_rz": (0.3, 0.7), "LHip_rz": (-0.5, 0.0)}, to=0.5)
+    vary = {"m*/control@0:0.03:3": (0.0, 1.0), "mu/max_isometric_force@scale": (0.5, 2.0)}
+    made = plan(pulled(), vary, to=0.03, equilibrate=True)
     for name, where in (("there", {"cluster": cluster.address}), ("here", {})):
-        optimize(made, Objective("distance"), tmp_path / name, budget=24, popsize=8, **where)
+        optimize(made, Objective("max(x) + integral(mu/control^2)"), tmp_path / name, budget=24, popsize=8, **where)
     for name in (HISTORY, BEST, SUMMARY):
         assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 

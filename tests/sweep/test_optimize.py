@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import SettingError, SimulationError
+from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
-from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
+from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, found_by, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.search import METHODS, BudgetExhausted, Search
@@ -74,6 +74,16 @@ def test_it_begins_where_the_model_is(made, tmp_path):
     found = optimize(made, DISTANCE, tmp_path, method="cma", budget=20, popsize=20, sigma=1e-9)
     start = {"RHip_rz": np.radians(30.0), "Pelvis_tx/speed": 0.0, "/bodyset/Pelvis/mass": 1.0}
     assert found.values == pytest.approx(start, abs=1e-6)
+
+
+def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
+    first = optimize(made, DISTANCE, tmp_path / "first", budget=16, popsize=8)
+    other = plan(walker, {**VARY, "LHip_rz": (-0.4, 0.0)}, to=0.5)
+    choices = {"start": found_by(tmp_path / "first"), "method": "cma", "budget": 4, "popsize": 4, "sigma": 1e-9}
+    again = optimize(other, DISTANCE, tmp_path / "again", **choices)
+    assert again.values == pytest.approx({**first.values, "LHip_rz": np.radians(-10.0)}, abs=1e-6)
+    with pytest.raises(OsimliteError, match=r"'none.summary.json' is not the summary of a search"):
+        found_by("none")
 
 
 def test_it_looks_around_from_where_the_model_is(made, tmp_path):

@@ -17,7 +17,7 @@ qmc = pytest.importorskip("scipy.stats.qmc", reason="needs scipy (extra 'sweep')
 
 
 def variable(name, low=0.0, high=1.0, count=None, is_log=False):
-    return Variable(name, Start(name, False), low, high, count, is_log)
+    return Variable(name, Start((name,), False), low, high, count, is_log)
 
 
 THREE = (variable("a", -1.0, 2.0, 4), variable("b", 1e3, 1e6, 3, is_log=True), variable("c", 5.0, 5.0, 1))

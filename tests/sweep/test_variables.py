@@ -27,11 +27,12 @@ def one(name, given="0:1", parameters=None):
 
 
 def test_names():
-    assert one("RHip_rz").target == Start(HIP, False)
-    assert one(HIP).target == Start(HIP, False)
-    assert one("RHip_rz/value").target == Start(HIP, False)
-    assert one("RHip_rz/speed").target == Start(HIP, True)
-    assert one(f"{HIP}/speed").target == Start(HIP, True)
+    assert one("RHip_rz").target == Start((HIP,), False)
+    assert one(HIP).target == Start((HIP,), False)
+    assert one("RHip_rz/value").target == Start((HIP,), False)
+    assert one("RHip_rz/speed").target == Start((HIP,), True)
+    assert one(f"{HIP}/speed").target == Start((HIP,), True)
+    assert one("?Hip_rz/speed").target == Start((HIP, "/jointset/LeftThighToPelvis/LHip_rz"), True)
     assert one("slope").target == Slope()
     assert one("slope", parameters={"slope": 10.0}).target == Parameter("slope", 10.0)
     (place,) = one("/bodyset/Pelvis/mass_center/1").target.places
