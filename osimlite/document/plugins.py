@@ -277,9 +277,9 @@ class _Declarations:
         """A value that must be an object of JSON with keys that are known."""
         if not isinstance(value, dict):
             raise self.error(f"{what} must be an object of JSON, in braces", *words)
-        for key in value if known is not None else ():
-            if key not in cast("tuple[str, ...]", known):
-                raise self.error(f"{what} has no '{key}'{or_known(key, known or ())}", *words, key)
+        for key in value:
+            if known is not None and key not in known:
+                raise self.error(f"{what} has no '{key}'{or_known(key, known)}", *words, key)
         return value
 
     def error(self, message: str, *words: str) -> OsimliteError:

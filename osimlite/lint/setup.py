@@ -214,16 +214,6 @@ class Setup(Subject):
                     found.append(Use(item, owner, spec, value))
         return found
 
-    @property
-    def tool_folder(self) -> str:
-        """The folder of the setup of the tool."""
-        return os.path.dirname(self.tool[0]) if self.tool is not None else ""
-
-    def beside_tool(self, name: str) -> Object | None:
-        """The top of a document that the tool names."""
-        path = self._place_by_tool(name)
-        return None if path is None else top_at(path)
-
     def table_of_tool(self, name: str) -> Table | None:
         """A table that the tool names."""
         path = self._place_by_tool(name) if is_table(name) else None
@@ -231,9 +221,9 @@ class Setup(Subject):
 
     def _place_by_tool(self, name: str) -> str | None:
         """Where a file is that the tool names, if it names one."""
-        if not is_given(name):
+        if not is_given(name) or self.tool is None:
             return None
-        path = os.path.join(self.tool_folder, name.strip())
+        path = os.path.join(os.path.dirname(self.tool[0]), name.strip())
         self._looked_at[path] = None
         return path
 
@@ -260,8 +250,8 @@ class Setup(Subject):
         top = self.tool[1]
         names = [*getattr(top, "force_set_files", ()), getattr(top, "marker_set_file", "")]
         names.append(getattr(getattr(top, "generic_model_maker", None), "marker_set_file", ""))
-        found = ((os.path.join(self.tool_folder, name.strip()), self.beside_tool(name)) for name in names)
-        return [(file, added) for file, added in found if added is not None]
+        files = filter(None, map(self._place_by_tool, names))
+        return [(file, added) for file in files if (added := top_at(file)) is not None]
 
     def is_written(self, path: str) -> bool:
         """Whether another setup of the project writes a file: it need not be there yet."""

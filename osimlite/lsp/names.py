@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.lint.beside import beginning, folders_in, table_at
+from osimlite.lint.beside import beginning, folders_in
 from osimlite.lint.setup import Setup
-from osimlite.lint.suffixes import TABLES
 from osimlite.lsp.analysis import Analysis
 from osimlite.lsp.cursor import Cursor, Element
 from osimlite.schema.base import Component
@@ -117,7 +116,7 @@ def measured(setup: Setup) -> tuple[str, list[str]] | None:
     """The file of the markers that the tool is given, and their labels; None if there is none."""
     for item in setup.tool[1].walk() if setup.tool is not None else ():
         name = str(getattr(item, "marker_file", "")).strip()
-        table = table_at(os.path.join(setup.tool_folder, name)) if name.lower().endswith(TABLES) else None
+        table = setup.table_of_tool(name)
         if table is not None:
             return name, table.columns
     return None

@@ -142,7 +142,6 @@ def nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> 
 
 
 PATH_RULES = frozenset(("socket", "owner-path", "model-path"))
-
 """The rules by which an absolute path leads to the same component from everywhere."""
 
 EVERYWHERE = frozenset(f"{kind}-name" for kind in ("coordinate", "body", "joint", "actuator", "muscle", "wrap-object"))
