@@ -164,7 +164,7 @@ def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
     for slope, radius in ((2.7, 0.1), (3.1, 0.17)):
         given = {"slope": slope, "foot_radius": radius}
         made = plan(lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given)
-        found.append(CycleSearch(made).candidates(8192, 0))
+        found.append(CycleSearch(made).candidates(2048, 0))
     assert len(found[0]) > 3
     assert [each.miss for each in found[0]] == [each.miss for each in found[1]]
     for one, other in zip(*found, strict=True):
