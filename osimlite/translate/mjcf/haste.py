@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGeneralizedForce
-from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.items import ForceElement
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Draft, text
@@ -43,9 +44,11 @@ NUDGE = 1e-7
 
 def choose_step(draft: Draft) -> None:
     """Take smaller steps where springs are stiff, and tell of muscles that are torn."""
-    rate = 0.0
-    with suppress(OsimliteError):
+    try:
         rate = _fastest(draft)
+    except OsimliteError as error:
+        rate, cannot = 0.0, "springs that may be too stiff: how stiff they are cannot be computed"
+        draft.fidelity.add("stiff", "/", cannot, f"steps of {STEP:g} s, be they too long or not", error.message)
     if rate * STEP > 2.0:
         step = float(f"{1.0 / rate:.0e}")
         next(draft.root.iter("option")).set("timestep", text(step))
@@ -75,10 +78,10 @@ def _fastest(draft: Draft) -> float:
     mass = free.T @ mechanism.mass_matrix(q) @ free
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0
-    elements = force_elements(draft.model, mechanism, skip_unsupported=True, folder=draft.folder).elements
-    owners = [draft.tree.by_path[item.path] for item in elements]
-    springs = [item for item, owner in zip(elements, owners, strict=True) if isinstance(owner, SPRINGS)]
-    bushings = [item for item, owner in zip(elements, owners, strict=True) if isinstance(owner, BushingForce)]
+    builder = ElementBuilder(draft.model, mechanism, draft.folder or Path())
+    owners = [force for force in builder.forces() if isinstance(force, SPRINGS)]
+    springs = [builder.element(force) for force in owners]
+    bushings = [spring for force, spring in zip(owners, springs, strict=True) if isinstance(force, BushingForce)]
     zero = np.zeros_like(free)
     stiffness = _slopes(draft, springs, mechanism.rate_matrix(q) @ free, zero)
     damping = _slopes(draft, bushings, zero, free)

@@ -89,5 +89,14 @@ def test_torn_muscles_are_told(fiber, told):
 
 def test_a_muscle_that_has_no_tension_hinders_nobody():
     impossible = muscle(0.08)
-    impossible.minimum_activation = -1.0
-    assert "overstretched" not in {record.kind for record in to_mjcf(sled(impossible)).fidelity}
+    impossible.name, impossible.minimum_activation = "impossible", -1.0
+    mjcf = to_mjcf(sled(impossible, spring(2.0 * 8000.0**2)))
+    assert "overstretched" not in {record.kind for record in mjcf.fidelity}
+    assert Compiled(mjcf).model.opt.timestep == 1e-4
+
+
+def test_springs_that_cannot_be_looked_at_are_told():
+    loose = spring(1.0)
+    loose.socket_body2 = "/bodyset/nobody"
+    (record,) = (record for record in to_mjcf(sled(loose)).fidelity if record.kind == "stiff")
+    assert "nobody" in record.detail
