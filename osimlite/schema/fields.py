@@ -104,9 +104,9 @@ class Reference(Kind):
 
     `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim class that the
     named component must be; OpenSim insists on one if it is `required`. In Python the component itself may be given;
-    the printer turns it into the right text. In a setup `words` may stand there besides names, of some properties in
-    `any_case`, and `fate` says what OpenSim does with a name that leads to nothing: refuse it, leave it out, or ignore
-    the property anyway.
+    the printer turns it into the right text. `words` may stand there besides names, of some properties in `any_case`;
+    in a setup `fate` says what OpenSim does with a name that leads to nothing: refuse it, leave it out, or ignore the
+    property anyway.
     """
 
     rule: str

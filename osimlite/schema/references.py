@@ -50,8 +50,8 @@ ContactGeometryNames = Annotated[
     Names, Reference("contactgeometry-path-or-name", "ContactGeometry", "list", required=False)
 ]
 WrapObjectName = Annotated[Named, Reference("wrap-object-name", "WrapObject")]
-ActuatorNames = Annotated[Names, Reference("actuator-name", "Actuator", "list", required=False)]
-JointNames = Annotated[Names, Reference("joint-name", "Joint", "list", required=False)]
+ActuatorNames = Annotated[Names, Reference("actuator-name", "Actuator", "list", False, words=("all",), any_case=True)]
+JointNames = Annotated[Names, Reference("joint-name", "Joint", "list", False, words=("all",), any_case=True)]
 PathActuatorPath = Annotated[Named, Reference("owner-path", "PathActuator")]
 SetMemberNames = Annotated[Names, Reference("set-member", "Object", "list", required=False, legacy=True)]
 

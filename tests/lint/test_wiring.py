@@ -140,6 +140,12 @@ def test_names_in_constraints_and_probes_are_followed(fragment, code):
     assert code in codes(fragment.format("no_such"))
 
 
+@pytest.mark.parametrize(("words", "found"), [("ALL", False), ("no_such all", True)])
+def test_a_probe_takes_all_for_its_first_word(words, found):
+    probe = f'<JointInternalPowerProbe name="p"><joint_names>{words}</joint_names></JointInternalPowerProbe>'
+    assert ("OSIM301" in codes(probe)) is found
+
+
 def test_constraints_of_one_name_are_renamed():
     weld = '<WeldConstraint name="{}"><socket_frame1>/ground</socket_frame1><socket_frame2>/bodyset/{}</socket_frame2>'
     weld += "</WeldConstraint>"

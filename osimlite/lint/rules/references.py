@@ -254,7 +254,7 @@ def _find(subject: Subject) -> Iterator[Broken]:
             # Often OpenSim makes such a coordinate up, of which another rule speaks.
             if axes_refused(cast("CustomJoint", use.owner)):
                 yield _explained(subject, use, text, resolution)
-        elif not _undecided(subject, use, text) and not _special(use, text):
+        elif not _undecided(subject, use, text) and not (use.position == 0 and use.reference.takes(text)):
             yield _explained(subject, use, text, resolution)
 
 
@@ -380,11 +380,6 @@ def _undecided(subject: Subject, use: Use, text: str) -> bool:
         if isinstance(tree.by_path.get(path), Unknown):
             return True
     return False
-
-
-def _special(use: Use, text: str) -> bool:
-    """Words that stand for every component: ``all`` in the lists of a probe, ``ALL`` of an old controller."""
-    return use.position == 0 and text.lower() == "all" and use.reference.rule in ("actuator-name", "joint-name")
 
 
 def _has_ignored_parts(subject: Subject, owner: Component) -> bool:
