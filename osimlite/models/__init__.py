@@ -7,5 +7,6 @@ BUILT_IN = {
     "furthest-walker": "osimlite.models.walkers:furthest_walker",
     "steady-walker": "osimlite.models.walkers:steady_walker",
     "human-walker": "osimlite.models.walkers:human_walker",
+    "jumper": "osimlite.models.jumper:jumper",
 }
 """Name on the command line, and where the function is that makes the model."""

@@ -1,0 +1,233 @@
+"""A human who jumps by the muscles of both legs, in the sagittal plane.
+
+In the style of the Dynamic Jumper that comes with OpenSim, and made anew. Masses, mass centers and radii of gyration
+are near those that D. A. Winter gives for a human of 75 kg and 1.78 m (Biomechanics and Motor Control of Human
+Movement), strengths and fiber lengths near those of OpenSim's Gait10dof18musc. Each tendon is as long as it must be for
+the fibers to be at their optimal length in a pose from the middle of the muscle's range.
+
+The frame of the torso stands between the hips, those of femur, tibia and foot in hip, knee and ankle.
+"""
+
+from __future__ import annotations
+
+from math import pi, radians
+from pathlib import Path
+from typing import NamedTuple
+
+from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.fields import Vec3
+from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
+from osimlite.schema.frames import Body, PhysicalOffsetFrame
+from osimlite.schema.functions import FunctionSet, PiecewiseLinearFunction
+from osimlite.schema.geometry import Ellipsoid, Geometry, Sphere
+from osimlite.schema.joints import PinJoint, PlanarJoint
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.schema.paths import GeometryPath, PathPoint, PathPointSet, PathWrap, PathWrapSet
+from osimlite.schema.wrapping import WrapCylinder
+from osimlite.simulation.files.table_stream import TableStream
+
+CONTROLS = Path(__file__).with_name("jumper_controls.sto")
+"""The excitations of the jump; ``docs/jumping.md`` tells how they were found."""
+SIDES = (("r", 0.09), ("l", -0.09))
+"""Name and place (m) to the right of each leg."""
+THIGH, SHANK, ANKLE = 0.43, 0.43, 0.075
+"""Lengths of thigh and shank, and height of the ankle above the sole (m)."""
+
+SQUAT = {"hip_flexion": 100.0, "knee_angle": -90.0, "ankle_angle": 29.99202}
+"""Angles of each leg at the start (deg), with which the soles stand on the ground."""
+PELVIS_TILT, PELVIS_HEIGHT = -40.0, 0.6599952
+"""Of the torso at the start (deg, m)."""
+
+
+class Muscle(NamedTuple):
+    """A muscle of each leg.
+
+    Attributes:
+        force: maximum isometric (N).
+        fiber: optimal length (m).
+        tendon: slack length (m).
+        pennation: at optimal fiber length (deg).
+        path: body, forward and up (m) of each point.
+        wrap: the cylinder that the path bends around.
+        activation: with which all are in balance in the squat.
+        length: of the fibers there (m).
+    """
+
+    force: float
+    fiber: float
+    tendon: float
+    pennation: float
+    path: tuple[tuple[str, float, float], ...]
+    wrap: str
+    activation: float
+    length: float
+
+
+MUSCLES = {
+    "glut_max": Muscle(
+        2500.0, 0.15, 0.283, 0.0, (("torso", -0.09, 0.03), ("femur", -0.02, -0.32)), "hip_back", 0.252, 0.178267
+    ),
+    "hamstrings": Muscle(
+        2700.0, 0.11, 0.348, 0.0, (("torso", -0.06, -0.06), ("tibia", -0.02, -0.045)), "", 0.0766, 0.127993
+    ),
+    "iliopsoas": Muscle(
+        2200.0, 0.10, 0.191, 8.0, (("torso", -0.03, 0.22), ("femur", 0.0, -0.07)), "hip_front", 0.01, 0.04441
+    ),
+    "rect_fem": Muscle(
+        1200.0, 0.10, 0.446, 5.0, (("torso", 0.04, 0.03), ("tibia", 0.04, -0.07)), "knee", 0.01826, 0.075119
+    ),
+    "vasti": Muscle(
+        5500.0, 0.10, 0.228, 5.0, (("femur", 0.035, -0.22), ("tibia", 0.04, -0.07)), "knee", 0.29943, 0.113474
+    ),
+    "gastroc": Muscle(
+        2300.0, 0.06, 0.395, 15.0, (("femur", -0.02, -0.42), ("foot", -0.055, -0.02)), "", 0.01218, 0.061574
+    ),
+    "soleus": Muscle(
+        4000.0, 0.05, 0.262, 20.0, (("tibia", -0.02, -0.15), ("foot", -0.055, -0.02)), "", 0.04179, 0.062816
+    ),
+    "tib_ant": Muscle(
+        1700.0, 0.09, 0.252, 5.0, (("tibia", 0.015, -0.16), ("tibia", 0.03, -0.38), ("foot", 0.09, -0.045)),
+        "", 0.01, 0.051784,
+    ),
+}  # fmt: skip
+
+
+def jumper(driven: bool = True) -> Model:
+    """Build the human who squats and jumps by the muscles of the legs.
+
+    Args:
+        driven: whether the controller is there that makes it jump; without it, the muscles are there to be driven.
+    """
+    model = Model(name="Jumper", gravity=(0.0, -9.80665, 0.0))
+    model.model_visual_preferences.model_display_hints.show_wrap_geometry = False
+    torso = _body(model, "torso", 50.8, (0.0, 0.32, 0.0), 3.3)
+    _draw(model, torso, "trunk", (0.0, 0.26, 0.0), Ellipsoid(radii=(0.10, 0.31, 0.16)))
+    _draw(model, torso, "head", (0.02, 0.69, 0.0), Sphere(radius=0.105))
+    turn = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT))
+    forward = Coordinate(name="pelvis_tx", range=(-5.0, 5.0))
+    up = Coordinate(name="pelvis_ty", range=(-1.0, 3.0), default_value=PELVIS_HEIGHT)
+    model.add(PlanarJoint(name="ground_pelvis", coordinates=[turn, forward, up]).between(model.ground, torso))
+    floor = model.add(ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2)))
+    for side, z in SIDES:
+        _add_leg(model, torso, side, z, floor)
+    if driven:
+        _drive(model)
+    return model
+
+
+def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfSpace) -> None:
+    """Add a leg with its contacts, limits and muscles."""
+    femur = _body(model, f"femur_{side}", 7.5, (0.0, -0.186, 0.0), 0.145)
+    tibia = _body(model, f"tibia_{side}", 3.5, (0.0, -0.186, 0.0), 0.059)
+    foot = _body(model, f"foot_{side}", 1.1, (0.05, -0.04, 0.0), 0.005)
+    _draw(model, femur, f"thigh_{side}", (0.0, -THIGH / 2, 0.0), Ellipsoid(radii=(0.07, THIGH / 2 + 0.03, 0.065)))
+    _draw(model, tibia, f"shank_{side}", (0.0, -SHANK / 2, 0.0), Ellipsoid(radii=(0.05, SHANK / 2 + 0.03, 0.045)))
+    _draw(model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.03, 0.04)))
+    for name, coordinate, parent, child, at, low, high in (
+        ("hip", "hip_flexion", torso, femur, (0.0, 0.0, z), -15.0, 120.0),
+        ("knee", "knee_angle", femur, tibia, (0.0, -THIGH, 0.0), -140.0, 0.0),
+        ("ankle", "ankle_angle", tibia, foot, (0.0, -SHANK, 0.0), -45.0, 35.0),
+    ):
+        angle = Coordinate(
+            name=f"{coordinate}_{side}", range=(radians(low), radians(high)), default_value=radians(SQUAT[coordinate])
+        )
+        model.add(PinJoint(name=f"{name}_{side}", coordinates=[angle]).between(parent, child, at=at))
+        model.add(
+            CoordinateLimitForce(
+                name=f"{name}_limit_{side}",
+                coordinate=angle,
+                upper_stiffness=20.0,
+                upper_limit=high,
+                lower_stiffness=20.0,
+                lower_limit=low,
+                damping=0.25,
+                transition=10.0,
+            )
+        )
+    for name, x, radius in (("heel", -0.05, 0.03), ("ball", 0.15, 0.025)):
+        place = (x, radius - ANKLE, 0.0)
+        _add_contact(
+            model, ContactSphere(name=f"{name}_{side}", socket_frame=foot, location=place, radius=radius), floor
+        )
+    for body, name, at, radius, quadrant in (
+        (femur, "hip_back", (0.0, 0.0, 0.0), 0.06, "-x"),
+        (torso, "hip_front", (0.0, 0.0, z), 0.035, "+x"),
+        (femur, "knee", (0.0, -THIGH, 0.0), 0.042, "+x"),
+    ):
+        body.wrap_object_set.objects.append(
+            WrapCylinder(name=f"{name}_{side}", translation=at, radius=radius, length=0.2, quadrant=quadrant)
+        )
+    places = {"torso": (torso, z), "femur": (femur, 0.0), "tibia": (tibia, 0.0), "foot": (foot, 0.0)}
+    for name, muscle in MUSCLES.items():
+        _add_muscle(model, f"{name}_{side}", muscle, places, side)
+
+
+def _add_muscle(model: Model, name: str, muscle: Muscle, places: dict[str, tuple[Body, float]], side: str) -> None:
+    points = [
+        PathPoint(name=f"{name}-P{number}", socket_parent_frame=places[body][0], location=(x, y, places[body][1]))
+        for number, (body, x, y) in enumerate(muscle.path, 1)
+    ]
+    wraps = [PathWrap(name="pathwrap", wrap_object=f"{muscle.wrap}_{side}")] if muscle.wrap else []
+    model.add(
+        Millard2012EquilibriumMuscle(
+            name=name,
+            geometry_path=GeometryPath(
+                name="path", path_point_set=PathPointSet(objects=points), path_wrap_set=PathWrapSet(objects=wraps)
+            ),
+            max_isometric_force=muscle.force,
+            optimal_fiber_length=muscle.fiber,
+            tendon_slack_length=muscle.tendon,
+            pennation_angle_at_optimal=radians(muscle.pennation),
+            default_activation=muscle.activation,
+            default_fiber_length=muscle.length,
+        )
+    )
+
+
+def _body(model: Model, name: str, mass: float, center: Vec3, inertia: float) -> Body:
+    """Add a body; only the inertia across the plane does something."""
+    body = Body(name=name, mass=mass, mass_center=center, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0))
+    return model.add(body)
+
+
+def _draw(model: Model, body: Body, name: str, at: Vec3, shape: Geometry) -> None:
+    model.add(PhysicalOffsetFrame(name=name, socket_parent=body, translation=at)).attach(shape)
+
+
+def _add_contact(model: Model, sphere: ContactSphere, floor: ContactHalfSpace) -> None:
+    material = HuntCrossleyForce.ContactParameters(
+        geometry=(sphere, floor),
+        stiffness=2e7,
+        dissipation=1.0,
+        static_friction=0.9,
+        dynamic_friction=0.9,
+        viscous_friction=0.0,
+    )
+    model.add(sphere)
+    model.add(
+        HuntCrossleyForce(
+            name=f"{sphere.name}_force",
+            contact_parameters=HuntCrossleyForce.ContactParametersSet(objects=[material]),
+            transition_velocity=0.3,
+        )
+    )
+
+
+def _drive(model: Model) -> None:
+    """Add the controller that gives each muscle the excitation of the table."""
+    with TableStream(CONTROLS) as table:
+        times, rows = zip(*table, strict=True)
+    lines = [
+        PiecewiseLinearFunction(name=label, x=times, y=values)
+        for label, values in zip(table.columns, zip(*rows, strict=True), strict=True)
+    ]
+    model.add(
+        PrescribedController(
+            name="jump",
+            socket_actuators=tuple(f"/forceset/{label}" for label in table.columns),
+            ControlFunctions=FunctionSet(name="ControlFunctions", objects=lines),
+        )
+    )

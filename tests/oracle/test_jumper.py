@@ -1,0 +1,27 @@
+"""OpenSim 4.6 itself jumps as high with the jumper that is shipped."""
+
+from __future__ import annotations
+
+import pytest
+
+import osimlite
+from osimlite.models.jumper import jumper
+from osimlite.simulation import Simulation
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+from tests.oracle.opensim_runs import simulated
+
+pytestmark = pytest.mark.oracle
+
+
+def test_opensim_rises_alike(tmp_path):
+    """Up to where the mass center is highest, all muscles and contacts at work; 1e-5 m is less than a step's error."""
+    osimlite.write(jumper(), tmp_path / "jumper.osim")
+    theirs = simulated(tmp_path / "jumper.osim", 0.53, 1e-5)
+    with Simulation(jumper(), "compiled") as simulation:
+        motion = simulation.run(0.53, accuracy=1e-8)
+    last = dict(zip(theirs.columns, theirs.rows[-1], strict=True))
+    ours = dict(zip(motion.coordinates, motion.values[-1], strict=True))
+    found = {path.split("/")[-2]: value for path, value in last.items() if path.endswith("/value")}
+    assert found == pytest.approx(ours, abs=1e-5)
