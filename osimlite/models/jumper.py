@@ -20,12 +20,12 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Vec3
 from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
 from osimlite.schema.frames import Body, PhysicalOffsetFrame
-from osimlite.schema.functions import FunctionSet, PiecewiseLinearFunction
+from osimlite.schema.functions import Function, FunctionSet, PiecewiseLinearFunction
 from osimlite.schema.geometry import Ellipsoid, Geometry, Sphere
 from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
-from osimlite.schema.paths import GeometryPath, PathPoint, PathPointSet, PathWrap, PathWrapSet
+from osimlite.schema.paths import AbstractPathPoint, GeometryPath, PathPoint, PathPointSet, PathWrap, PathWrapSet
 from osimlite.schema.wrapping import WrapCylinder
 from osimlite.simulation.files.table_stream import TableStream
 
@@ -166,7 +166,7 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
 
 
 def _add_muscle(model: Model, name: str, muscle: Muscle, places: dict[str, tuple[Body, float]], side: str) -> None:
-    points = [
+    points: list[AbstractPathPoint] = [
         PathPoint(name=f"{name}-P{number}", socket_parent_frame=places[body][0], location=(x, y, places[body][1]))
         for number, (body, x, y) in enumerate(muscle.path, 1)
     ]
@@ -220,7 +220,7 @@ def _drive(model: Model) -> None:
     """Add the controller that gives each muscle the excitation of the table."""
     with TableStream(CONTROLS) as table:
         times, rows = zip(*table, strict=True)
-    lines = [
+    lines: list[Function] = [
         PiecewiseLinearFunction(name=label, x=times, y=values)
         for label, values in zip(table.columns, zip(*rows, strict=True), strict=True)
     ]
