@@ -22,7 +22,7 @@ def optimize(
         typer.Option(
             metavar="NAME",
             help="What is wanted: distance, steps, progress, time_to_fall (the more, the better), largest_force, "
-            "scuffs, energy, an expression such as 'max(center_of_mass_Y)', or module:function (the less, the better).",
+            "scuffs, energy, an expression such as 'max(pelvis_Y)', or module:function (the less, the better).",
             show_default=False,
         ),
     ],

@@ -36,7 +36,7 @@ def sweep(
             "--measure",
             metavar="NAME",
             help="What to keep of a run: distance, energy, largest_force, steps, scuffs, progress, time_to_fall, "
-            "COORDINATE/value, COORDINATE/speed, an expression such as 'max(center_of_mass_Y)', or module:function.",
+            "COORDINATE/value, COORDINATE/speed, an expression such as 'max(pelvis_Y)', or module:function.",
             show_default="distance and largest_force",
         ),
     ] = None,

@@ -9,6 +9,7 @@ import osimlite
 from osimlite.errors import SettingError
 from osimlite.multibody import build_mechanism
 from osimlite.schema.actuators import CoordinateActuator
+from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.examples import ToyReflexController
 from osimlite.schema.functions import GCVSpline, PiecewiseConstantFunction
 from osimlite.simulation import Simulation
@@ -115,6 +116,23 @@ def test_muscles_and_reflexes_have_numbers_too():
         own.tree().by_path["/jointset/slide/x"].default_speed_value = speed
         assert ours == ends(own)
     assert found[0][2] > 1.01 * found[1][2]
+
+
+def test_files_of_other_controllers_are_read_once(tmp_path):
+    table = tmp_path / "given.sto"
+    table.write_text("given\nendheader\ntime\tmotor\n0\t0.1\n1\t0.5\n")
+    model = pulled()
+    model.add(PrescribedController(name="file", controls_file="given.sto"))
+    made = plan(
+        model, {"motor/control@0:0.03:2": (0.0, 1.0)}, measures=ENDS, to=TO, accuracy=1e-7, folder=str(tmp_path)
+    )
+    runner = Runner(made)
+    runner.run(np.array([[0.1, 0.2]]))
+    table.unlink()
+    found = runner.run(np.array([[0.3, 0.6]]))
+    assert found.status == ["done"], found.reasons
+    wanted = ends(pulled(), motor=((0.0, 0.03), (0.4, 0.712)))
+    assert [found.measures[name][0] for name in ENDS] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_the_model_that_is_written_does_what_was_found(tmp_path):

@@ -40,13 +40,14 @@ def test_they_are_of_the_columns_of_a_simulation():
     assert found == pytest.approx(wanted, rel=1e-12, abs=1e-300)
 
 
-def test_places_of_bodies_and_the_mass_center(walker):
+@pytest.mark.parametrize("engine", ["compiled", "bullet"])
+def test_places_of_bodies_and_the_mass_center(walker, engine):
     """Numbers of the model that are varied count."""
     names = ["center_of_mass_X", "center_of_mass_Y/speed", "LeftShank_Y", "Pelvis_X/speed", "platform_rz"]
     vary = {"Pelvis_ty/speed": (0.0, 1.0), "LHip_rz": (0.0, 1.0), "LHip_rz/speed": (0.0, 3.0), "Pelvis/mass": (1, 5)}
     vary |= {"LeftShank/mass_center/1": (-0.2, 0.2), "platform_rz": (-0.1, 0.0)}
     row = (0.5, 0.3, 2.0, 4.0, 0.15, -0.05)
-    made = plan(walker, vary, measures=tuple(f"end({name})" for name in names), to=0.1)
+    made = plan(walker, vary, measures=tuple(f"end({name})" for name in names), to=0.1, engine=engine)
     found = [value[0] for value in Runner(made).run(np.array([row])).measures.values()]
     walker.tree().by_path["/bodyset/Pelvis"].mass = 4.0
     walker.tree().by_path["/bodyset/LeftShank"].mass_center = shank = (0.0, 0.15, 0.0)
@@ -62,7 +63,7 @@ def test_places_of_bodies_and_the_mass_center(walker):
         mechanism.station_velocity("Pelvis", walker.tree().by_path["/bodyset/Pelvis"].mass_center, q, u)[0],
         -0.05,
     ]
-    assert found == pytest.approx(wanted, rel=1e-12)
+    assert found == pytest.approx(wanted, rel=1e-12 if engine == "compiled" else 1e-7)
 
 
 @pytest.mark.parametrize(

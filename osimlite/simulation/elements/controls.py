@@ -163,8 +163,10 @@ def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
             continue
         module = f"{__package__}.controllers.{module_name(type(controller))}"
         if find_spec(module) is not None:
-            drives = import_module(module).drives(builder, controller)
-            yield from ((controller, drive) for drive in drives)
+            path = builder.path(controller)
+            if path not in builder.drives:
+                builder.drives[path] = list(import_module(module).drives(builder, controller))
+            yield from ((controller, drive) for drive in builder.drives[path])
             continue
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"
         if isinstance(controller, TrackingController):

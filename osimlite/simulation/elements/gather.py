@@ -19,7 +19,7 @@ from osimlite.multibody.schema_functions import numeric
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.controls import NO_CONTROLS, Controls, ModelControls
+from osimlite.simulation.elements.controls import NO_CONTROLS, Controls, Drive, ModelControls
 from osimlite.text import listed, or_known
 
 if TYPE_CHECKING:
@@ -119,6 +119,7 @@ class ElementBuilder:
         tree: of the model.
         mechanism: of the model.
         folder: of the model's file.
+        drives: what controllers do, by their paths, of those that have been asked.
         early_return: whether Simbody's defect in contact is reproduced.
         own_times: whether OpenSim's defect in activation is not.
         geodesic: whether paths bend around surfaces along geodesics.
@@ -142,6 +143,7 @@ class ElementBuilder:
         self.tree = model.tree()
         self.mechanism = mechanism
         self.folder = folder
+        self.drives: dict[str, list[Drive]] = {}
         self.early_return, self.own_times, self.geodesic = early_return, own_times, wrapping == GEODESIC
 
     @property

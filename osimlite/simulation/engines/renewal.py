@@ -78,7 +78,11 @@ class NumbersOnly:
         """
         made: dict[str, Any] = {}
         owners, controls = list(owners), self._forces.controls
-        if any(isinstance(owner, Controller) for owner in owners):
+        controllers = [self._builder.path(owner) for owner in owners if isinstance(owner, Controller)]
+        if controllers:
+            for path in controllers:
+                # Others may have files that are read no more.
+                self._builder.drives.pop(path, None)
             self._builder.controls = ModelControls(self._builder)
             controls = self._builder.controls.controls
             # The gain of a reflex is a number of the muscle.
