@@ -101,13 +101,11 @@ class Start(NamedTuple):
         owner: its path.
         lengths: of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none.
         tensions: of the tendon, in max_isometric_force.
-        velocity: of the fibers at the start, in optimal fiber lengths per second.
     """
 
     owner: str
     lengths: tuple[float, float]
     tensions: tuple[float, float]
-    velocity: float
 
 
 class Reach(NamedTuple):

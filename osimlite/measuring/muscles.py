@@ -19,6 +19,8 @@ from osimlite.simulation.elements.kind import Kind, kind_of_class
 from osimlite.simulation.elements.parameters import Fields, Number, Numbers
 
 ROUNDING = 1e-9
+REST = 0.01
+"""The activation of a muscle at rest: none of Thelen's or Millard's has less by default."""
 
 
 class Fibers(NamedTuple):
@@ -56,7 +58,7 @@ class Fibers(NamedTuple):
     def at(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
         known = dict(zip(self.kind.outputs, map(float, self._asked(self.kind.law, length, states)), strict=False))
-        known["tension"] /= self.component.max_isometric_force
+        known["tension"] /= self.component.max_isometric_force or nan
         known["fiber_length"] /= self.component.optimal_fiber_length
         return known
 
@@ -94,14 +96,13 @@ def start_of(fibers: Fibers, length: float) -> Start | None:
         return None
     states = fibers.starts()
     one, two = fibers.at(length, states), fibers.at(length, fibers.settled(length, states))
-    velocity = one["fiber_velocity"] / fibers.component.optimal_fiber_length
     lengths, tensions = ((one[name], two[name]) for name in ("fiber_length", "tension"))
-    return Start(fibers.path, lengths, tensions, velocity)
+    return Start(fibers.path, lengths, tensions)
 
 
 def reach_of(fibers: Fibers, length: float, is_active: bool, pose: Pose) -> Reach:
     """Fibers in equilibrium at a length of the path, m."""
-    known = fibers.at(length, fibers.settled(length, fibers.starts() | {"activation": float(is_active)}))
+    known = fibers.at(length, fibers.settled(length, fibers.starts() | {"activation": 1.0 if is_active else REST}))
     numbers = fibers.values[0]
     least = getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0)) / fibers.component.optimal_fiber_length
     is_limit = known["fiber_length"] <= least * (1.0 + ROUNDING) or known["cos_pennation"] <= 0.0

@@ -92,9 +92,9 @@ def fiber_limit(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports muscles whose fibers in equilibrium, fully active, are as short as pennation (`maximum_pennation_angle`) or
-    the curve of active force lets them be where the path is shortest; and those whose fibers at rest are longer than 2
-    optimal lengths where it is longest. The poses are the default one and nine values of each coordinate over its
-    range, the others as in the default pose.
+    the curve of active force lets them be where the path is shortest; those whose fibers at rest are longer than 2
+    optimal lengths where it is longest; and muscles that have no equilibrium in one of these poses. The poses are the
+    default one and nine values of each coordinate over its range, the others as in the default pose.
 
     ## Why is this bad
     A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its activation; its fibers
@@ -142,7 +142,9 @@ def fiber_limit(subject: Subject, found: Found) -> None:
     for reach in measures_of(subject).reaches:
         muscle = subject.tree.at(reach.owner)
         lengths = f"{reach.length:.3g} optimal lengths"
-        if reach.is_active and reach.is_limit:
+        if reach.length != reach.length:
+            found(f"{called(muscle)} has no equilibrium {reach.pose}", muscle)
+        elif reach.is_active and reach.is_limit:
             found(
                 f"fully active, the fibers of {called(muscle)} are as short as they can be, {lengths}, {reach.pose}",
                 muscle,

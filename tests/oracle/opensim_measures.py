@@ -1,0 +1,159 @@
+"""What the linter measures of paths and muscles, beside what OpenSim gives for the same; also as a script over files.
+
+python -m tests.oracle.opensim_measures FILE...
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import opensim
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.lint.measures import Measures, Pose
+from osimlite.measuring import measured
+from osimlite.measuring.jumps import ASIDE
+from osimlite.measuring.muscles import REST
+from tests.oracle.opensim_runs import put
+
+BEYOND = 0.05
+"""Outside a range, rad or m."""
+
+
+class Beside:
+    """A model in both programs."""
+
+    def __init__(self, file: Path) -> None:
+        opensim.Logger.setLevelString("off")
+        self.model = osimlite.read(file)
+        self.measures: Measures = measured(self.model)
+        self.theirs = opensim.Model(str(file))
+        self.state = self.theirs.initSystem()
+        self.paths, self.right = osimlite.paths(self.model), osimlite.paths(self.model, "geodesic")
+        self.default = self.paths.mechanism.default_state()[0]
+        infos = self.paths.mechanism.coordinates
+        self.coordinates = [opensim.Coordinate.safeDownCast(self.theirs.getComponent(info.path)) for info in infos]
+
+    def at(self, pose: Pose, aside: float = 0.0) -> np.ndarray:
+        """Take both to a pose; returns the values of the coordinates."""
+        q = self.default.copy()
+        if pose.coordinate:
+            place = self.paths.mechanism.coordinate_index(pose.coordinate)
+            q[place] = pose.value + aside
+            q = self.paths.mechanism.assemble(q, kept=(place,))
+        put(self.coordinates, self.state, q, np.zeros(len(q)))
+        self.theirs.realizeVelocity(self.state)
+        return q
+
+    def length(self, owner: str) -> float:
+        """OpenSim's length of a path where it is, m."""
+        tree = self.model.tree()
+        path = self.theirs.getComponent(tree.path_of(tree.by_path[owner].geometry_path))
+        return float(opensim.AbstractGeometryPath.safeDownCast(path).getLength(self.state))
+
+    def findings(self) -> Iterator[tuple[str, str, float, float]]:
+        """Code, owner, what is told, and what OpenSim gives for it."""
+        yield from self._of_paths()
+        yield from self._of_points()
+        yield from self._of_muscles()
+
+    def _of_paths(self) -> Iterator[tuple[str, str, float, float]]:
+        for wrapping in self.measures.wrappings:
+            q = self.at(wrapping.pose)
+            yield (
+                "OSIM631",
+                wrapping.owner,
+                wrapping.worst,
+                self.length(wrapping.owner) - self.right.lengths(q)[wrapping.owner],
+            )
+        for jump in self.measures.jumps:
+            lengths = []
+            for aside in (-ASIDE, ASIDE):
+                self.at(jump.pose, aside)
+                lengths.append(self.length(jump.owner))
+            yield "OSIM632", jump.owner, jump.size, abs(lengths[1] - lengths[0])
+        for item in self.measures.on_surfaces:
+            q = self.at(item.pose)
+            yield "OSIM633", item.owner, self.paths.lengths(q)[item.owner], self.length(item.owner)
+
+    def _of_points(self) -> Iterator[tuple[str, str, float, float]]:
+        tree = self.model.tree()
+        for point in self.measures.moving_points:
+            points = tree.by_path[point.owner].geometry_path.path_point_set.objects
+            (own,) = (item for item in points if item.name == point.point)
+            theirs = opensim.MovingPathPoint.safeDownCast(self.theirs.getComponent(tree.path_of(own)))
+            value, places = point.pose.value, []
+            inward = 1.0 if value == min(self._range(point.pose)) else -1.0
+            for aside in (0.0, inward * point.beyond, -inward * BEYOND):
+                self.at(point.pose, aside)
+                places.append(theirs.getLocation(self.state).to_numpy())
+            self.at(point.pose)
+            rate = np.linalg.norm(theirs.getdPointdQ(self.state).to_numpy())
+            yield "OSIM634", point.owner, point.moved, float(np.linalg.norm(places[0] - places[1]))
+            yield "OSIM634", point.owner, point.rate, float(rate)
+            yield "OSIM634", point.owner, 0.0, float(np.linalg.norm(places[2] - places[0]))
+
+    def _range(self, pose: Pose) -> tuple[float, float]:
+        mechanism = self.paths.mechanism
+        return mechanism.coordinates[mechanism.coordinate_index(pose.coordinate)].range
+
+    def _of_muscles(self) -> Iterator[tuple[str, str, float, float]]:
+        for start in self.measures.starts:
+            self.state = self.theirs.initSystem()
+            self.at(Pose())
+            muscle = self._muscle(start.owner)
+            for length, tension in zip(start.lengths, start.tensions, strict=True):
+                if length == length:
+                    yield "OSIM635", start.owner, length, self._fibers(muscle)
+                    found = muscle.getActuation(self.state) / muscle.getMaxIsometricForce()
+                    yield "OSIM635", start.owner, tension, found
+                try:
+                    muscle.computeEquilibrium(self.state)
+                except RuntimeError:
+                    break
+        for reach in self.measures.reaches:
+            self.state = self.theirs.initSystem()
+            muscle = self._muscle(reach.owner)
+            self.at(reach.pose)
+            if not muscle.get_ignore_activation_dynamics():
+                muscle.setActivation(self.state, 1.0 if reach.is_active else REST)
+            try:
+                muscle.computeEquilibrium(self.state)
+            except RuntimeError:
+                continue
+            yield "OSIM636", reach.owner, reach.length, self._fibers(muscle)
+
+    def _muscle(self, path: str) -> Any:
+        return opensim.Muscle.safeDownCast(self.theirs.getComponent(path))
+
+    def _fibers(self, muscle: Any) -> float:
+        self.theirs.realizeDynamics(self.state)
+        return float(muscle.getFiberLength(self.state) / muscle.getOptimalFiberLength())
+
+
+def main(files: list[str]) -> None:
+    """Print for each code how many numbers were compared, and the greatest differences."""
+    counts: Counter[str] = Counter()
+    worst: dict[str, list[tuple[float, str]]] = {}
+    for file in files:
+        try:
+            for code, owner, told, found in Beside(Path(file)).findings():
+                counts[code] += 1
+                off = abs(told - found) / max(1.0, abs(told))
+                worst.setdefault(code, []).append((off, f"{Path(file).name} {owner}: {told:.9g} {found:.9g}"))
+        except (OsimliteError, RuntimeError) as error:
+            print(file, str(error)[:100])
+    for code, rows in sorted(worst.items()):
+        print(code, counts[code], "compared, within 1e-6:", sum(off < 1e-6 for off, _ in rows))
+        for off, words in sorted(rows, reverse=True)[:6]:
+            print(f"    {off:.2g} {words}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
