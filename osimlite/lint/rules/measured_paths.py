@@ -324,7 +324,8 @@ def moving_point_range(subject: Subject, found: Found) -> None:
     ```
     """
     made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)
-    kept = {force.coordinate for force in subject.named("CoordinateLimitForce")}
+    limits = subject.named("CoordinateLimitForce")
+    kept = {item.name for force in limits if (item := subject.target_of(force, "coordinate")) is not None}
     worst: dict[tuple[str, str], MovingPoint] = {}
     for point in measures_of(subject).moving_points:
         if point.moved >= made_up or (point.rate >= rate and point.pose.coordinate not in kept):
