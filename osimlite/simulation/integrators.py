@@ -4,6 +4,14 @@ from __future__ import annotations
 
 from math import inf, isfinite
 
+from osimlite.errors import SettingError
+from osimlite.text import or_known
+
+MERSON = "merson"
+INTEGRATORS = {MERSON: "RungeKuttaMerson", "bdf": "BDF", "rosenbrock": "Rosenbrock"}
+"""The integrators with error control by the names that users give, with their own names: that of OpenSim, and two for
+stiff motion, whose kernels have the names that users give."""
+
 DEFAULT_ACCURACY = 1e-3
 """What OpenSim's Manager uses where no accuracy was set."""
 
@@ -13,6 +21,12 @@ INITIAL_STEP = 0.01
 
 PATIENCE = 10_000
 """Steps that may be tried before a motion that gets nowhere is given up."""
+
+
+def check_integrator(name: str) -> None:
+    """SettingError if there is no such integrator."""
+    if name not in INTEGRATORS:
+        raise SettingError(f"there is no integrator '{name}'{or_known(name, INTEGRATORS)}")
 
 
 def shortest_step(t: float, tried: float) -> float:

@@ -23,7 +23,7 @@ from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.protocol import Engine
-from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
 from osimlite.simulation.runs import Floats, Ints, Runs, Watch
 
 __all__ = ["ENDINGS", "BatchEngine", "BatchOptions", "Renewal", "Renewed", "Runs", "Watch", "run_many"]
@@ -42,6 +42,7 @@ class BatchOptions:
     Attributes:
         to: when they end unless a watch stops them, s.
         accuracy: of the integrator.
+        integrator: see :class:`osimlite.simulation.Options`.
         report_times: at which states are kept, increasing, s.
         watches: what else is an event, besides contacts that begin and end.
         most_events: room for the events of a run; those beyond it are lost.
@@ -52,6 +53,7 @@ class BatchOptions:
 
     to: float = 2.0
     accuracy: float = DEFAULT_ACCURACY
+    integrator: str = MERSON
     report_times: Sequence[float] = ()
     watches: Sequence[Watch] = ()
     most_events: int = 0
@@ -63,6 +65,7 @@ class BatchOptions:
         """SettingError for what has no meaning; machine code might go on with it forever."""
         if not 0.0 < self.accuracy < 1.0:
             raise SettingError(f"the accuracy must lie between 0 and 1; {self.accuracy} does not")
+        check_integrator(self.integrator)
         if not self.to >= 0.0:
             raise SettingError(f"the runs end at a time that is not negative, not at {self.to} s")
         if not all(one <= other for one, other in pairwise([0.0, *self.report_times])):

@@ -10,12 +10,13 @@ from typing import Any
 from osimlite.errors import SettingError
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON
 from osimlite.simulation.stepper import Progress
 from osimlite.text import or_known
 
 PER_RUN = (
     "accuracy",
+    "integrator",
     "fixed_step",
     "report_interval",
     "initial",
@@ -35,6 +36,8 @@ class Options:
 
     Attributes:
         accuracy: of the integrator, with the meaning it has in OpenSim.
+        integrator: "merson", whose steps are OpenSim's; "bdf" for stiff motion, as of models with many muscles; or
+            "rosenbrock" for stiff motion at loose accuracy.
         fixed_step: take the engine's own steps of this length (s) instead of controlling the error.
         report_interval: time between the recorded moments, s; the last one is the end in any case.
         initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
@@ -69,6 +72,7 @@ class Options:
     """
 
     accuracy: float = DEFAULT_ACCURACY
+    integrator: str = MERSON
     fixed_step: float | None = None
     report_interval: float = 0.01
     initial: Mapping[str, float | str] | str | Path | None = None

@@ -24,6 +24,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
+from osimlite.simulation.integrators import check_integrator
 from osimlite.simulation.options import Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
@@ -47,7 +48,7 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
         model: what moves.
         to: how long, s.
         engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
-        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `fixed_step`, `report_interval`,
+        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`, `fixed_step`, `report_interval`,
             `initial`, `initial_speeds`, `skip_unsupported` and the others.
 
     Raises:
@@ -144,6 +145,7 @@ class Simulation:
         times = report_times(to, chosen.report_interval)
         if fixed_step is not None:
             _check_step(fixed_step, to)
+        check_integrator(chosen.integrator)
         if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
@@ -168,7 +170,7 @@ class Simulation:
         self.engine.drive(controls)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
-        settings = Settings(accuracy=chosen.accuracy, fixed_step=fixed_step, route=self.engine.route, show=chosen.show)
+        settings = Settings(chosen.accuracy, chosen.integrator, fixed_step, self.engine.route, chosen.show)
         recorder, stepper, states = self._moved(y, settings, times, chosen.progress)
         times = times[: len(states)]
         if times[-1] < stepper.time:
@@ -179,7 +181,7 @@ class Simulation:
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
-            **({"accuracy": chosen.accuracy} if fixed_step is None else {"fixed_step": fixed_step}),
+            **({"accuracy": chosen.accuracy, "integrator": chosen.integrator} if fixed_step is None else {"fixed_step": fixed_step}),
             "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,

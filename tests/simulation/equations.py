@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.engines.runge_kutta_merson import RungeKuttaMerson
+from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.table import LAW_NUMBERS
@@ -63,7 +63,7 @@ class Equations:
         structure[[layout.FREEDOMS, layout.STATE_SIZE, layout.WORK_STATE]] = n, size, first
         structure[layout.WORK_SIZE] = first + merson.STATES * size
         kernels = {layout.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
-        packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, (), [], [])
+        packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, {}, (), [], [])
         self.program = Program(packed, code, ("run_several",))
         self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n
         self.counted = (n, n) if counted is None else counted
@@ -81,4 +81,4 @@ class Equations:
 def runge_kutta_merson(f, t: float, y: Any, n: int, *, observe: Any = None, accuracy: float = 1e-3, **options: Any):
     """Runge-Kutta-Merson on any equations."""
     engine: Any = Equations(f, len(y), n, **options)
-    return RungeKuttaMerson(engine, t, y, accuracy, observe)
+    return ControlledSteps(engine, t, y, accuracy, observe)

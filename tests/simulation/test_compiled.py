@@ -311,7 +311,7 @@ def test_kernels_are_what_they_mean_in_python(fast, fixtures):
 
 def test_log_in_pieces(fast, monkeypatch):
     whole = fast.run(2.0, accuracy=1e-5)
-    monkeypatch.setattr("osimlite.simulation.engines.runge_kutta_merson.LOGGED_STEPS", 7)
+    monkeypatch.setattr("osimlite.simulation.engines.controlled_steps.LOGGED_STEPS", 7)
     seen = []
     pieces = fast.run(2.0, accuracy=1e-5, progress=lambda t, step: seen.append(t))
     assert len(seen) >= whole.summary["steps"] / 7 and seen == sorted(set(seen)) and seen[-1] == 2.0

@@ -20,6 +20,16 @@ class Placement(NamedTuple):
     frame: Array
 
 
+class Response(NamedTuple):
+    """How a force along one displacement changes with that: the kernel that finds its derivatives, the place among the
+    item's integers of the first of those that say where its states are, their count, and -1 if it pulls, else 1."""
+
+    kernel: str
+    first_state: int
+    states: int
+    sense: int
+
+
 CONTROLS = ""
 
 
@@ -38,6 +48,7 @@ class Item:
         looks_at: which of its integers are places in the record of another element, which comes before, and the path of
             that; or CONTROLS for the record of the controls.
         equilibrium: name of the kernel that brings its states into equilibrium, if they have one.
+        response: of a force along one displacement.
         python: what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays.
     """
 
@@ -50,6 +61,7 @@ class Item:
     states: tuple[int, ...] = ()
     looks_at: tuple[tuple[int, str], ...] = ()
     equilibrium: str = ""
+    response: Response | None = None
     python: Callable[..., None] | None = None
 
 

@@ -9,7 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from osimlite.simulation.kernels import layout, pointers
-from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF
+from osimlite.simulation.kernels.condensation import WIDTH
+from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.kind import Kind, State
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
 SOLVED = "solved"
 """The output that tells whether the law has a solution; without it, it always has one."""
 
-NAMES = "NUMBERS", "RECORD", "OWN", "FREEDOMS", "TIME", "WORK_CONTROL", "OK", "UNSOLVED"
+NAMES = "NUMBERS", "RECORD", "OWN", "FREEDOMS", "TIME", "SCRATCH", "WORK_CONTROL", "OK", "UNSOLVED"
 """What the code of kernels uses of the layout."""
+
+SMALL_CHANGE = 1e-7
+"""Of lengths (m), angles, speeds and states, to find derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +56,45 @@ class KernelText:
             if state.name in kind.settled:
                 lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
         return self._function(EQUILIBRIUM, kind.equilibrium, lines)
+
+    @cached_property
+    def response_kernel(self) -> Callable[..., int]:
+        """The function that applies 1 of a force along a displacement, and leaves its derivatives in SCRATCH.
+
+        A row for the force and for the rate of each state, see :mod:`osimlite.simulation.kernels.condensation`.
+        """
+        kind, outputs = self.kind, self.kind.outputs
+        force, _ = kind.geometry.along
+        # A rate may have the name of an output of another meaning, such as that of a state.
+        lines = [f"{', '.join(f'{name}_0' for name in outputs)} = law({', '.join(self._arguments)})"]
+        changed = self._changed
+        for column, place in changed.items():
+            arguments = self._arguments
+            arguments[place] += f" + {SMALL_CHANGE}"
+            results = ", ".join(f"{name}_{column + 1}" for name in outputs)
+            lines.append(f"{results} = law({', '.join(arguments)})")
+        lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, SCRATCH)"]
+        for row, name in enumerate((force, *(state.rate for state in kind.states))):
+            for column in range(WIDTH):
+                difference = f"({name}_{column + 1} - {name}_0) / {SMALL_CHANGE}" if column in changed else "0.0"
+                lines.append(f"change[{WIDTH * row + column}] = {difference}")
+        return self._function(RESPONSE, kind.law, lines)
+
+    @property
+    def _changed(self) -> dict[int, int]:
+        """By column of the derivatives the place of the argument that is changed."""
+        kind = self.kind
+        inputs = list(kind.geometry.inputs if kind.inputs is None else kind.inputs)
+        found = {column: inputs.index(name) for column, name in enumerate(kind.geometry.inputs) if name in inputs}
+        given = [column for column, state in enumerate(kind.states) if state.given]
+        first = len(inputs) + kind.controlled
+        return found | {2 + column: first + number for number, column in enumerate(given)}
+
+    @property
+    def responds(self) -> bool:
+        """Whether its forces have derivatives along one displacement."""
+        kind = self.kind
+        return kind.law is not None and kind.geometry.along[0] in kind.outputs and bool(self._changed)
 
     def _function(self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]) -> Callable[..., int]:
         kind, name = self.kind, self.kind.name + form

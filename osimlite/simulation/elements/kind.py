@@ -24,11 +24,11 @@ from typing import Any, ClassVar
 from osimlite.schema.actuators import Actuator
 from osimlite.simulation.elements.gather import ElementBuilder, module_name
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item, Places, Response
 from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF
+from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE
 from osimlite.simulation.states import StateVariable
 
 ENERGY = "energy"
@@ -171,6 +171,8 @@ class Kind:
         at_states = tuple(len(heads) + k for k, state in enumerate(force.optional_states) if state is not None)
         all_ints = (*heads, *[-1] * len(self.states), *ints, *tail.ints)
         there = {state.name for state, own in zip(self.states, force.optional_states, strict=True) if own is not None}
+        sense = self.geometry.along[1]
+        responds = self.text.responds and not force.form
         item = Item(
             self.name + force.form,
             all_ints,
@@ -178,6 +180,7 @@ class Kind:
             room=tail.room,
             states=at_states,
             equilibrium=self.name + EQUILIBRIUM if there & set(self.settled) and not force.form else "",
+            response=Response(self.name + RESPONSE, len(heads), len(self.states), sense) if responds else None,
         )
         return [*parts, item]
 

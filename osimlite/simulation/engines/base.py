@@ -7,7 +7,7 @@ from math import inf
 from typing import Self
 
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.engines.runge_kutta_merson import RungeKuttaMerson
+from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.stepper import Observer, Stepper
@@ -53,7 +53,7 @@ class KernelEngine(System):
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
-        """What integrates from a state on: Runge-Kutta-Merson, or fixed steps of semi-implicit Euler."""
+        """What integrates from a state on: steps whose error is controlled, or fixed steps of semi-implicit Euler."""
         if settings.fixed_step is not None:
             rates = None if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies) else self._rates
             return SemiImplicitEuler(
@@ -67,7 +67,7 @@ class KernelEngine(System):
                 names=self.state.names,
                 projected=self.projected,
             )
-        return RungeKuttaMerson(self, t, y, settings.accuracy, observe)
+        return ControlledSteps(self, t, y, settings.accuracy, observe, settings.integrator)
 
     def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
         """The state (y,) nearest to one where the constraints hold to a tolerance; None if none is near."""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.simulation.integrators import INITIAL_STEP
+from osimlite.simulation import kernels
+from osimlite.simulation.integrators import INITIAL_STEP, MERSON
 from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels.condensation import condensation_room
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.many import BatchOptions
 
@@ -79,22 +82,32 @@ class Batch:
             len(kinds),
             most_logged,
         )
+        s = engine.structure
+        self._room = int(s[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
         self._sizes[merson.START_HOLDS] = start_holds
+        if options.integrator != MERSON:
+            method = import_module(f"{kernels.__name__}.{options.integrator}")
+            self._sizes[merson.METHOD :] = engine.program.method(options.integrator), self._room
+            self._room += method.HEAD + method.STATES * size
+            self._room += condensation_room(int(s[layout.FREEDOMS]), int(s[layout.RESPONSES]))
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
         self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
         self.reports = np.full((count, len(self._times), size), np.nan)
         self.events, self.peaks = np.zeros((count, options.most_events, event)), np.zeros((count, pairs, 2))
         self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
-        self._room = int(engine.structure[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
 
     def allow(self, steps: int) -> None:
         """Let the next call end after so many steps, or when the log is full."""
         self._sizes[merson.MOST_LOGGED] = min(steps, len(self.log))
 
-    def run(self, first: int = 0, last: int | None = None) -> None:
-        """Compute the runs from `first` up to `last`; other threads may compute others meanwhile."""
-        vectors, room = self._vectors, np.zeros(self._room)
+    def room(self) -> Floats:
+        """What a call of `run` works on; an implicit method goes on from what it has left there."""
+        return np.zeros(self._room)
+
+    def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
+        """Compute the runs from `first` up to `last`; other threads may compute others meanwhile, in rooms of theirs."""
+        vectors = self._vectors
         size = self.states.shape[1]
         first_error = int(self._engine.structure[layout.WORK_STATE]) + merson.ERRORS * size
         self.errors = room[first_error : first_error + size]

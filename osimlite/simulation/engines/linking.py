@@ -168,7 +168,7 @@ class Program:
     def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
         self.code = code
-        self._equilibria = packed.equilibria
+        self._equilibria, self._responses = packed.equilibria, packed.responses
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
         kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
@@ -196,6 +196,14 @@ class Program:
         sizes = len(self.ints), self._count, int(self.ints[layout.WORK_SIZE]), size, size
         self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
         self._kept.append(kept)
+
+    def method(self, name: str) -> int:
+        """Address of an implicit method, which not everybody asks for, with all that it needs made ready."""
+        self.code.make_ready((name, *dict.fromkeys(self._responses.values())))
+        for place, kernel in self._responses.items():
+            if not self.ints[place]:
+                self._link(place, kernel)
+        return self.code.address(name)
 
     def link_equilibria(self) -> None:
         """Make ready what brings states into equilibrium, which not everybody asks for."""

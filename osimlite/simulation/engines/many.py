@@ -40,7 +40,7 @@ def run_many(engine: CompiledEngine, states: ArrayLike, options: BatchOptions, n
     batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels)
 
     def work(first: int) -> None:
-        batch.run(first, min(first + AT_ONCE, count))
+        batch.run(batch.room(), first, min(first + AT_ONCE, count))
 
     with ThreadPoolExecutor(options.threads or os.cpu_count()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))

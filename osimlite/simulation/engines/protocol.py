@@ -14,7 +14,7 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe import DeclaredProbe
-from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
@@ -29,6 +29,7 @@ class Settings:
 
     Attributes:
         accuracy: as OpenSim understands it.
+        integrator: with error control, see :class:`osimlite.simulation.Options`.
         fixed_step: s; the engine's own steps of this length instead of error control.
         route: the way to the accelerations, in the engine's words; "auto" lets it choose.
         show: whether to show the motion in a window while it is computed.
@@ -36,6 +37,7 @@ class Settings:
     """
 
     accuracy: float = DEFAULT_ACCURACY
+    integrator: str = MERSON
     fixed_step: float | None = None
     route: str = "auto"
     show: bool = False

@@ -43,7 +43,12 @@ place of its item."""
 EQUILIBRIUM_INTS = 2
 CHAIN = 25
 """Place of the record of the joints of another program that gives the mass matrix and the bias, 0 if there is none."""
-LAWS = 26
+RESPONSES, RESPONSE_AT = 26, 27
+"""Count and place of the forces that push along one displacement: for each the address of the kernel that finds their
+derivatives, the place of its item, the place among the item's integers of the first of those that say where its states
+are, their count, and -1 if it pulls against the displacement, else 1."""
+RESPONSE_INTS = 5
+LAWS = 28
 """From here on the addresses of the laws, by their number."""
 
 LINK_INTS = 5

@@ -5,10 +5,22 @@ The rules are those of Simbody's RungeKuttaMersonIntegrator and AbstractIntegrat
 
 from __future__ import annotations
 
-from math import inf, isfinite, sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
-from osimlite.simulation.integrators import next_step_size, shortest_step, weight
+from osimlite.simulation.integrators import next_step_size, shortest_step
+from osimlite.simulation.kernels.error_control import error_norm, projected, projected_error
+from osimlite.simulation.kernels.implicit import (
+    ACCEPTED,
+    COUNTED_Q,
+    COUNTED_U,
+    EVALUATED,
+    HAS_DERIVATIVE,
+    LAST_TIME,
+    MEMORY,
+    NEXT_STEP,
+    REACHED,
+)
 from osimlite.simulation.kernels.layout import (
     ACCELERATION_STAGE,
     CONSTRAINED,
@@ -19,8 +31,6 @@ from osimlite.simulation.kernels.layout import (
     LAWS,
     OK,
     POSITION_STAGE,
-    PROJECT,
-    SCRATCH,
     STATE_SIZE,
     TIME,
     WORK_CONTACT,
@@ -52,8 +62,9 @@ LIMIT, ACCURACY = 0, 1
 COUNT_Q, COUNT_U, MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5, 6, 7
 """Places of the sizes: what the sums of the squared errors of values and of speeds are divided by, steps that may be
 tried, how many rows there are and how long the row of an event is."""
-START_HOLDS, SIZES = 8, 9
-"""Place of whether the constraints hold at the start, and the count of the sizes."""
+START_HOLDS, METHOD, METHOD_AT, SIZES = 8, 9, 10, 11
+"""Places of whether the constraints hold at the start, of the address of an implicit method (0 for Merson's) and its
+place in the work vector; the count of the sizes."""
 
 
 class Motion(NamedTuple):
@@ -155,13 +166,6 @@ def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
     return call(m.s[LAWS], m.s, m.x, m.w, y, f, stage)
 
 
-def projected(m: Motion, t: float, y: Floats, off: Floats, has_errors: int, limit: float) -> bool:
-    """Move a state to where the constraints hold, and tell whether they do; see `projection.project`."""
-    s, w = m.s, m.w
-    w[TIME], w[SCRATCH], w[SCRATCH + 1] = t, m.settings[ACCURACY] / 10.0, limit
-    return call(s[LAWS + s[s[CONSTRAINED] + PROJECT]], s, m.x, w, y, off, has_errors) == OK
-
-
 def run(m: Motion, y: Floats) -> int:
     """Go on from the state y, which is changed, until something ends the run."""
     s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
@@ -171,12 +175,16 @@ def run(m: Motion, y: Floats) -> int:
     before = at(room, STATES * size)
     after = at(before, s[CONTACTS] + sizes[WATCHES])
     limit = m.settings[LIMIT]
-    if s[CONSTRAINED] > 0 and sizes[START_HOLDS] == 0 and not projected(m, clock[0], y, f0, 0, inf):
+    tolerance = m.settings[ACCURACY] / 10.0
+    is_kept = s[CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
+    if not is_kept and not projected(s, m.x, m.w, clock[0], y, f0, 0, tolerance, inf):
         return FAILED
     copy(size, y, y0)
     status = evaluated(m, clock[0], y0, f0, ACCELERATION_STAGE)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
         counts[EVALUATIONS] = 1
+        if sizes[METHOD] > 0:
+            m.w[sizes[METHOD_AT] + MEMORY] = 0.0
     if status != OK or not is_finite(size, f0):
         return FAILED
     levels_at(m, y0, before)
@@ -188,11 +196,10 @@ def run(m: Motion, y: Floats) -> int:
         if sizes[MOST_LOGGED] > 0 and sizes[MOST_LOGGED] == counts[LOGGED]:
             return FULL
         t0 = clock[0]
-        t1 = step(m, t0, y0, f0, y1)
+        t1 = step(m, t0, y0, f0, y1) if sizes[METHOD] == 0 else implicit_step(m, t0, y0, y1)
         if t1 <= t0:
             return FAILED if t1 < t0 else TOO_MANY
-        counts[EVALUATIONS] += 1
-        if evaluated(m, t1, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
+        if not is_evaluated(m, t1, y1, f1):
             # Simbody ends here; smaller steps lead nearer to where the motion ends.
             if t1 - t0 <= shortest_step(t0, counts[ATTEMPTED]):
                 return FAILED
@@ -230,6 +237,33 @@ def run(m: Motion, y: Floats) -> int:
     return DONE
 
 
+def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
+    """Whether the end of a step has a derivative, which an implicit method has found where no forces are looked at."""
+    if m.sizes[METHOD] > 0 and m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
+        if m.s[CONTACTS] + m.sizes[WATCHES] == 0:
+            return is_finite(m.s[STATE_SIZE], f1)
+    m.counts[EVALUATIONS] += 1
+    return evaluated(m, t1, y1, f1, ACCELERATION_STAGE) == OK and is_finite(m.s[STATE_SIZE], f1)
+
+
+def implicit_step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
+    """The same as `step` with a method that chooses its steps by itself, see :mod:`.implicit`."""
+    counts, clock, settings, sizes = m.counts, m.clock, m.settings, m.sizes
+    h, smallest = at(m.w, sizes[METHOD_AT]), shortest_step(t0, counts[ATTEMPTED])
+    h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED] = t0, settings[LIMIT], clock[1], settings[ACCURACY]
+    h[COUNTED_Q], h[COUNTED_U] = sizes[COUNT_Q], sizes[COUNT_U]
+    while counts[ATTEMPTED] < sizes[MOST_TRIES]:
+        counts[ATTEMPTED] += 1
+        call(sizes[METHOD], m.s, m.x, m.w, y0, y1, sizes[METHOD_AT])
+        counts[EVALUATIONS] += int(h[EVALUATED])
+        clock[1] = h[NEXT_STEP]
+        if h[REACHED] > t0:
+            return float(h[REACHED])
+        if h[NEXT_STEP] <= smallest:
+            return t0 - 1.0
+    return t0
+
+
 def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
     counts, clock, settings, sizes, size = m.counts, m.clock, m.settings, m.sizes, m.s[STATE_SIZE]
@@ -244,26 +278,18 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         cut = limit < t0 + 0.95 * h
         counts[ATTEMPTED] += 1
         counts[EVALUATIONS] += 4
-        error = norm(m, y0, errors) if merson(m, t0, t1, y0, f0, y1, errors) == OK else inf
+        error, count_q, count_u = inf, sizes[COUNT_Q], sizes[COUNT_U]
+        if merson(m, t0, t1, y0, f0, y1, errors) == OK:
+            error = error_norm(m.s, y0, errors, count_q, count_u)
         # As in Simbody: what half a step would not mend, neither does the projection.
         if m.s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(m, t1, y0, y1, errors)
+            error = projected_error(m.s, m.x, m.w, t1, y0, y1, errors, accuracy, count_q, count_u)
         clock[1] = next_step_size(h, error, accuracy, cut)
         if error <= accuracy:
             return t1
         if h <= smallest:
             return t0 - 1.0
         clock[1] = max(clock[1], smallest)
-
-
-def projected_error(m: Motion, t1: float, y0: Floats, y1: Floats, errors: Floats) -> float:
-    """Move the end of a step to where the constraints hold; the norm of the error there."""
-    tolerance = m.settings[ACCURACY] / 10.0
-    for k in range(m.s[STATE_SIZE]):
-        errors[k] = abs(errors[k])
-    if not projected(m, t1, y1, errors, 1, max(2.0 * tolerance, sqrt(tolerance))):
-        return inf
-    return norm(m, y0, errors)
 
 
 def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats, ya: Floats) -> int:
@@ -303,31 +329,13 @@ def merson(m: Motion, t0: float, t1: float, y0: Floats, f0: Floats, y1: Floats, 
     return OK
 
 
-def norm(m: Motion, y0: Floats, errors: Floats) -> float:
-    """Largest of three root mean squares: errors of q as they are, of u and z relative to y0 where |y0| > 1."""
-    n, size = m.s[FREEDOMS], m.s[STATE_SIZE]
-    of_q = of_u = of_z = 0.0
-    for k in range(n):
-        of_q += errors[k] * errors[k]
-    for k in range(n, 2 * n):
-        weighted = weight(y0[k]) * errors[k]
-        of_u += weighted * weighted
-    for k in range(2 * n, size):
-        weighted = weight(y0[k]) * errors[k]
-        of_z += weighted * weighted
-    of_q /= max(m.sizes[COUNT_Q], 1)
-    of_u /= max(m.sizes[COUNT_U], 1)
-    of_z /= max(size - 2 * n, 1)
-    return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf
-
-
 def inside(
     m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
 ) -> None:
     """State y at a time within a step, where the constraints hold if it can be moved there."""
     cubic(m.s[STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
     if m.s[CONSTRAINED] > 0:
-        projected(m, t, y, y, 0, inf)
+        projected(m.s, m.x, m.w, t, y, y, 0, m.settings[ACCURACY] / 10.0, inf)
 
 
 def note_peaks(m: Motion, t: float) -> None:

@@ -17,7 +17,7 @@ from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyAcceler
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places
+from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places, Response
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.merson import STATES
@@ -47,6 +47,7 @@ class Packed:
         laws: names of the engine's own functions that must be there.
         kernels: by place in the structure what computes an item: a name, or a function of Python.
         equilibria: by place in the structure the name of what brings an item into equilibrium.
+        responses: by place in the structure the name of what finds the derivatives of an item.
         owners: by place in the structure of an item the number of its force element.
         order: place in the mechanism of the coordinate of each degree of freedom.
         placements: of every body its link (-1 for ground) and its frame in that.
@@ -58,6 +59,7 @@ class Packed:
     laws: tuple[str, ...]
     kernels: dict[int, str | Callable[..., None]]
     equilibria: dict[int, str]
+    responses: dict[int, str]
     owners: dict[int, int]
     order: tuple[int, ...]
     placements: list[Placement]
@@ -232,6 +234,7 @@ class Packer:
         self.laws: list[str] = ["evaluate"]
         self.kernels: dict[int, str | Callable[..., None]] = {}
         self.equilibria: dict[int, str] = {}
+        self.responses: dict[int, str] = {}
         self.owners: dict[int, int] = {}
 
     def packed(self, order: tuple[int, ...]) -> Packed:
@@ -263,8 +266,8 @@ class Packer:
         ints[at.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
-        kernels, equilibria, owners = self.kernels, self.equilibria, self.owners
-        return Packed(structure, numbers, laws, kernels, equilibria, owners, order, self.places.placements, found)
+        asked = self.kernels, self.equilibria, self.responses, self.owners
+        return Packed(structure, numbers, laws, *asked, order, self.places.placements, found)
 
     def room(self, count: int) -> int:
         """Place of some more numbers in the work vector."""
@@ -384,6 +387,7 @@ class Packer:
         records: list[int] = []
         pairs: list[int] = []
         settling: dict[int, str] = {}
+        responding: dict[int, Response] = {}
         found: list[list[tuple[int, int]]] = []
         places = {CONTROLS: self.ints[at.WORK_CONTROL]}
         for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
@@ -400,6 +404,8 @@ class Packer:
                 self.owners[len(self.ints)] = owner
                 if item.equilibrium:
                     settling[len(self.ints)] = item.equilibrium
+                if item.response is not None:
+                    responding[len(self.ints)] = item.response
                 own = list(item.ints)
                 for number, at_state in enumerate(item.states):
                     own[at_state] = self.state.first_of(element) + number
@@ -416,6 +422,10 @@ class Packer:
         for place, kernel in settling.items():
             self.equilibria[len(self.ints)] = kernel
             self.ints += [0, place]
+        self.ints[at.RESPONSES], self.ints[at.RESPONSE_AT] = len(responding), len(self.ints)
+        for place, response in responding.items():
+            self.responses[len(self.ints)] = response.kernel
+            self.ints += [0, place, at.OWN + response.first_state, response.states, response.sense]
         return found
 
     def control_record(self) -> None:

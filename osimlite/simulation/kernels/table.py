@@ -2,7 +2,8 @@
 
 Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; the kernel of
 a kind of force is written from its declaration, and has the name of the module that declares it; so are the one that
-brings such a force into equilibrium, with EQUILIBRIUM behind the name, and that of a force that is off, with OFF.
+brings such a force into equilibrium, with EQUILIBRIUM behind the name, that of a force that is off, with OFF, and the
+one that finds its derivatives, with RESPONSE.
 Kernels of probes are written likewise.
 """
 
@@ -16,6 +17,8 @@ LAW_MODULES = {
     "evaluate": "dynamics",
     "equilibrate": "dynamics",
     "run_several": "merson",
+    "bdf": "bdf",
+    "rosenbrock": "rosenbrock",
     "set_controls": "controls",
     "contact_places": "places",
     "place_ball": "ball_joint",
@@ -64,7 +67,7 @@ LAW_MODULES = {
 }
 """The module of each of the engine's own."""
 
-EQUILIBRIUM, OFF = "_equilibrium", "_off"
+EQUILIBRIUM, OFF, RESPONSE = "_equilibrium", "_off", "_response"
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Place of a law's address after `layout.LAWS`."""
@@ -78,8 +81,8 @@ def law_function(name: str) -> Callable[..., Any]:
     elif name.endswith("_probe"):
         function = import_module(f"osimlite.simulation.elements.probes.{name}").PROBE.kernel
     else:
-        module = name.removesuffix(EQUILIBRIUM).removesuffix(OFF)
+        module = name.removesuffix(EQUILIBRIUM).removesuffix(OFF).removesuffix(RESPONSE)
         kind = import_module(f"osimlite.simulation.elements.kinds.{module}").KIND
-        forms = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel"}
+        forms = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel"}
         function = getattr(kind.text, forms.get(name.removeprefix(module), "kernel"))
     return function

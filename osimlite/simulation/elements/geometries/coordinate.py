@@ -32,6 +32,7 @@ class OnCoordinate(Geometry):
 
     inputs = ("q", "u")
     speed = "u"
+    along = "force", 1
     before = ("q, u = coordinate(s, y, g, gp)",)
     after = ("if g[0] >= 0:", "    f[s[FREEDOMS] + g[0]] += force")
     calls = (coordinate,)

@@ -19,6 +19,8 @@ class Geometry:
         inputs: what it computes for a law, in the code before the law is called.
         before: that code.
         speed: name of the input with which an actuator's force, or its negative, makes a power.
+        along: the output that pushes along one displacement, which is the first input, its speed the second; and 1 if
+            it does so, -1 if it pulls. Empty if there is no such thing.
         after: the code that applies the outputs of the law.
         calls: the functions that both call.
     """
@@ -26,6 +28,7 @@ class Geometry:
     inputs: ClassVar[tuple[str, ...]] = ()
     speed: ClassVar[str] = ""
     before: ClassVar[tuple[str, ...]] = ()
+    along: ClassVar[tuple[str, int]] = ("", 0)
     after: ClassVar[tuple[str, ...]] = ()
     calls: ClassVar[tuple[Callable[..., Any], ...]] = ()
 

@@ -1,4 +1,4 @@
-"""Runge-Kutta-Merson with Simbody's error control, the usual way to follow a motion."""
+"""Steps whose error is controlled, the usual way to follow a motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from osimlite.errors import SettingError, SimulationError
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP, shortest_step, weight
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP, INTEGRATORS, MERSON, shortest_step, weight
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.states import cubic
@@ -27,8 +27,8 @@ CALL_SECONDS = 0.1
 """About so long a call may take: nothing is told, and Ctrl-C is not heard, before it ends."""
 
 
-class RungeKuttaMerson(Stepper):
-    """Simbody's RungeKuttaMerson, the default integrator of OpenSim: `accuracy` means what it means there.
+class ControlledSteps(Stepper):
+    """Simbody's RungeKuttaMerson, the default integrator of OpenSim, or a method for stiff motion.
 
     Merson's method propagates a fourth-order solution and estimates its error from an embedded third-order one
     (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is taken
@@ -36,12 +36,16 @@ class RungeKuttaMerson(Stepper):
     are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.simulation.kernels.merson`), many in one call
     where a table of states is asked for.
 
+    The stiff methods, of :mod:`osimlite.simulation.kernels.bdf` and :mod:`~osimlite.simulation.kernels.rosenbrock`, keep
+    the same norm of their own estimated error below `accuracy`.
+
     Args:
         engine: whose mechanism.
         t: initial time, s.
         y: initial state.
         accuracy: as OpenSim understands it.
         observe: called with (time, state) for each step; of those that a table takes, once somebody wants to know.
+        integrator: which of `INTEGRATORS`.
 
     Attributes:
         attempted: steps tried so far, of which `taken` were accepted.
@@ -56,13 +60,20 @@ class RungeKuttaMerson(Stepper):
         y: Sequence[float],
         accuracy: float = DEFAULT_ACCURACY,
         observe: Observer | None = None,
+        integrator: str = MERSON,
     ) -> None:
         if not 0.0 < accuracy < 1.0:
             raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
         super().__init__(engine.derivative, t, y, observe, engine.state.names)
-        self._engine, self._accuracy, self._next_step = engine, accuracy, INITIAL_STEP
+        self._engine, self._accuracy, self._integrator, self._next_step = engine, accuracy, integrator, INITIAL_STEP
+        self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (self.time, self.state, self.derivative)
+
+    @property
+    def name(self) -> str:
+        """Of the method."""
+        return INTEGRATORS[self._integrator]
 
     def step(self, limit: float = inf) -> None:
         """Take one step of the size that the error allows, and choose the next one."""
@@ -116,7 +127,7 @@ class RungeKuttaMerson(Stepper):
         batch = Batch(
             self._engine,
             [self.state],
-            BatchOptions(to=to, accuracy=self._accuracy, report_times=times),
+            BatchOptions(to=to, accuracy=self._accuracy, integrator=self._integrator, report_times=times),
             start=self.time,
             next_step=self._next_step,
             most_logged=LOGGED_STEPS,
@@ -140,7 +151,9 @@ class RungeKuttaMerson(Stepper):
         (count,) = batch.counts
         count[merson.LOGGED] = 0
         batch.allow(steps)
-        batch.run()
+        if self._room is None:
+            self._room = batch.room()
+        batch.run(self._room)
         (ending,), logged = batch.endings.tolist(), int(count[merson.LOGGED])
         log = batch.log[:logged].copy(), batch.forces[:logged].copy()
         clock, state, counts = batch.clocks[0].tolist(), batch.states[0].tolist(), count[: merson.REPORTED].tolist()

@@ -1,0 +1,248 @@
+"""Backward differentiation formulas of orders 1 to 5, for stiff motion.
+
+The numerical differentiation formulas in backward differences, with steps that are equal for a while and orders that
+change (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997); the linear equations of
+Newton's iteration are those of :mod:`osimlite.simulation.kernels.condensation`.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from osimlite.simulation.kernels.condensation import condense, correct, linearise, product
+from osimlite.simulation.kernels.error_control import error_norm, projected_error
+from osimlite.simulation.kernels.implicit import (
+    ACCEPTED,
+    COUNTED_Q,
+    COUNTED_U,
+    EVALUATED,
+    HAS_DERIVATIVE,
+    LAST_TIME,
+    NEXT_STEP,
+    MEMORY,
+    REACHED,
+)
+from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, CONSTRAINED, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
+from osimlite.simulation.kernels.merson import ERRORS
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.states import is_finite
+
+ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3, MEMORY + 4, MEMORY + 5, MEMORY + 6
+"""Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none; for how many steps
+their derivatives have served; how fast iterations converge; how many steps were refused in turn."""
+MATRICES = MEMORY + 7
+"""Place of three matrices (6, 6) that change the step, and of a column."""
+HEAD = MATRICES + 3 * 36 + 6
+
+MOST_ORDER = 5
+ROWS = MOST_ORDER + 3
+STATES = ROWS + 2
+"""Room for so many states: backward differences, correction, right side."""
+
+KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
+GAMMA = (0.0, 1.0, 1.5, 11.0 / 6.0, 25.0 / 12.0, 137.0 / 60.0)
+ALPHA = tuple((1.0 - kappa) * gamma for kappa, gamma in zip(KAPPA, GAMMA, strict=True))
+ERROR_CONSTANT = tuple(kappa * gamma + 1.0 / (k + 1.0) for k, (kappa, gamma) in enumerate(zip(KAPPA, GAMMA, strict=True)))
+"""Constants of the formulas by order: weights of the differences, and of the correction in the step and in its error."""
+
+ITERATIONS, CONVERGED = 4, 0.05
+"""Newton's steps at most; what the error of an iteration may be, of that of a step."""
+RENEWED = 20
+"""After so many steps the derivatives are computed anew."""
+SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 8.0, 1.2
+"""Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
+PATIENCE = 3
+"""So many refused steps in turn and the history is dropped: something has changed abruptly."""
+
+
+def bdf(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+    """Try one step from y0, behind which its derivative stands, to y1, which its derivative is put behind."""
+    size = s[STATE_SIZE]
+    h = at(w, place)
+    rows, room = at(h, HEAD), at(h, HEAD + STATES * size)
+    d, psi, errors = at(rows, ROWS * size), at(rows, (ROWS + 1) * size), at(w, s[WORK_STATE] + ERRORS * size)
+    h[EVALUATED], h[HAS_DERIVATIVE] = 0.0, 1.0
+    if h[ORDER] == 0.0:
+        begin(s, h, y0, rows)
+    t0, accuracy, order = h[REACHED], h[ACCEPTED], int(h[ORDER])
+    t1 = t0 + h[STEP]
+    if h[LAST_TIME] <= t0 + 1.001 * h[STEP]:
+        t1 = h[LAST_TIME]
+        rescale(size, h, rows, (t1 - t0) / h[STEP])
+    c = h[STEP] / ALPHA[order]
+    iterations, is_new = 0, False
+    while True:
+        predict(size, order, rows, y1, psi)
+        if h[AGE] <= 0.0 or h[AGE] > RENEWED:
+            w[TIME] = t1
+            is_new = linearise(s, x, w, y1, at(y1, size), room) == OK
+            h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
+        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(s, c, room)):
+            if h[CONDENSED] != c:
+                h[CONDENSED], h[RATE] = c, 1.0
+            iterations = newton(s, x, w, t1, c, y0, y1, d, psi, errors, room, h)
+        if iterations > 0 or is_new or h[AGE] <= 0.0:
+            break
+        h[AGE] = 0.0
+    error = inf
+    if iterations > 0:
+        for k in range(size):
+            errors[k] = ERROR_CONSTANT[order] * d[k]
+        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+        # As in Simbody: what half a step would not mend, neither does the projection.
+        if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
+            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+    if not error <= accuracy:
+        refuse(size, h, rows, error / accuracy)
+        return OK
+    h[AGE] += 1.0
+    h[REFUSED] = 0.0
+    h[REACHED] = t1
+    for k in range(size):
+        total = y1[k]
+        for i in range(order + 1):
+            total -= rows[size * i + k]
+        d[k] = total
+        y1[size + k] = (psi[k] + total) / c
+        rows[size * (order + 2) + k] = total - rows[size * (order + 1) + k]
+        rows[size * (order + 1) + k] = total
+        for i in range(order, -1, -1):
+            rows[size * i + k] += rows[size * (i + 1) + k]
+    h[EQUAL] += 1.0
+    if h[EQUAL] > order:
+        choose(s, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
+    h[NEXT_STEP] = h[STEP]
+    return OK
+
+
+def begin(s: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
+    """Start with order 1, and a step that changes little."""
+    size = s[STATE_SIZE]
+    speed = error_norm(s, y0, at(y0, size), int(h[COUNTED_Q]), int(h[COUNTED_U]))
+    h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
+    h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
+    for k in range(size):
+        rows[k] = y0[k]
+        rows[size + k] = h[STEP] * y0[size + k]
+        for i in range(2, ROWS):
+            rows[size * i + k] = 0.0
+
+
+def predict(size: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
+    """The end of a step if the differences stay as they are, and what Newton's iteration starts from."""
+    for k in range(size):
+        end = rows[k]
+        sum_ = 0.0
+        for i in range(1, order + 1):
+            end += rows[size * i + k]
+            sum_ += GAMMA[i] * rows[size * i + k]
+        y[k] = end
+        psi[k] = sum_ / ALPHA[order]
+
+
+def newton(
+    s: Ints,
+    x: Floats,
+    w: Floats,
+    t: float,
+    c: float,
+    y0: Floats,
+    y1: Floats,
+    d: Floats,
+    psi: Floats,
+    step: Floats,
+    room: Floats,
+    h: Floats,
+) -> int:
+    """Solve c f(t, y1) = psi + d, where y1 is the prediction and d what is added to it; how many iterations that took.
+
+    None if they do not converge.
+    """
+    size, f1, before = s[STATE_SIZE], at(y1, s[STATE_SIZE]), 0.0
+    for k in range(size):
+        d[k] = 0.0
+    for iteration in range(ITERATIONS):
+        h[EVALUATED] += 1.0
+        w[TIME] = t
+        if call(s[LAWS], s, x, w, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
+            return 0
+        for k in range(size):
+            step[k] = c * f1[k] - psi[k] - d[k]
+        correct(s, c, room, step)
+        length = error_norm(s, y0, step, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+        if iteration > 0:
+            h[RATE] = max(0.3 * h[RATE], length / before)
+            if length > 2.0 * before:
+                return 0
+        for k in range(size):
+            y1[k] += step[k]
+            d[k] += step[k]
+        if min(1.0, h[RATE]) * length <= CONVERGED * h[ACCEPTED]:
+            return iteration + 1
+        before = length
+    return 0
+
+
+def refuse(size: int, h: Floats, rows: Floats, excess: float) -> None:
+    """Make the step shorter; the excess is infinite if there was no solution."""
+    h[REFUSED] += 1.0
+    h[EQUAL] = 0.0
+    if h[REFUSED] > PATIENCE:
+        h[NEXT_STEP], h[ORDER] = SHRINK * h[STEP], 0.0
+        return
+    wanted = SAFETY * excess ** (-1.0 / (h[ORDER] + 1.0)) if excess < inf else 0.25
+    rescale(size, h, rows, min(max(wanted, SHRINK), SAFETY))
+    h[NEXT_STEP] = h[STEP]
+
+
+def choose(s: Ints, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float) -> None:
+    """Choose order and step for the next steps."""
+    size, order, accuracy = s[STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
+    best, factor = order, reach(error / accuracy, order)
+    for other in (order - 1, order + 1):
+        if not 1 <= other <= MOST_ORDER:
+            continue
+        for k in range(size):
+            errors[k] = ERROR_CONSTANT[other] * rows[size * (other + 1) + k]
+        found = reach(error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U])) / accuracy, other)
+        if found > factor:
+            best, factor = other, found
+    factor = min(safety * factor, GROW)
+    if factor >= WORTH or factor < 1.0:
+        h[ORDER], h[EQUAL] = float(best), 0.0
+        rescale(size, h, rows, max(factor, SHRINK))
+
+
+def reach(excess: float, order: int) -> float:
+    """How many times longer a step would just do, of which the error is so many times what it may be."""
+    return max(excess, 1e-12) ** (-1.0 / (order + 1.0))
+
+
+def rescale(size: int, h: Floats, rows: Floats, factor: float) -> None:
+    """Change the step: the differences at other distances, on the polynomial through the same states."""
+    order = int(h[ORDER])
+    new, unit, both, column = at(h, MATRICES), at(h, MATRICES + 36), at(h, MATRICES + 72), at(h, MATRICES + 108)
+    differences(order, factor, new)
+    differences(order, 1.0, unit)
+    for i in range(order + 1):
+        for j in range(order + 1):
+            both[6 * i + j] = 0.0
+            for m in range(order + 1):
+                both[6 * i + j] += new[6 * j + m] * unit[6 * m + i]
+    for k in range(size):
+        for i in range(order + 1):
+            column[i] = rows[size * i + k]
+        for i in range(order + 1):
+            rows[size * i + k] = product(order + 1, at(both, 6 * i), column)
+    h[STEP] *= factor
+    h[EQUAL] = 0.0
+
+
+def differences(order: int, factor: float, matrix: Floats) -> None:
+    """What makes of differences those of which the steps are so many times longer."""
+    for j in range(order + 1):
+        total = 1.0
+        matrix[j] = total
+        for i in range(1, order + 1):
+            total *= (i - 1 - factor * j) / i if j > 0 else 0.0
+            matrix[6 * i + j] = total
