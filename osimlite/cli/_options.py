@@ -38,6 +38,13 @@ Engine = Annotated[
     typer.Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
 ]
 Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
+Integrator = Annotated[
+    str,
+    typer.Option(
+        help="'merson', whose steps are OpenSim's; 'bdf' for stiff motion, as of many muscles; 'rosenbrock' for stiff "
+        "motion at loose accuracy."
+    ),
+]
 SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
 ExternalLoads = Annotated[
     Path | None,

@@ -25,6 +25,7 @@ def simulate(
     to: options.To = 2.0,
     engine: options.Engine = "auto",
     accuracy: options.Accuracy = None,
+    integrator: options.Integrator = "merson",
     fixed_step: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Take the engine's own steps instead of controlling the error."),
@@ -110,6 +111,7 @@ def simulate(
                 trajectory = simulation.run(
                     to,
                     accuracy=DEFAULT_ACCURACY if accuracy is None else accuracy,
+                    integrator=integrator,
                     fixed_step=LIVE_STEP if gui and fixed_step is None else fixed_step,
                     report_interval=report_interval,
                     initial=initial,

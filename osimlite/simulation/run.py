@@ -48,8 +48,8 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
         model: what moves.
         to: how long, s.
         engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
-        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`, `fixed_step`, `report_interval`,
-            `initial`, `initial_speeds`, `skip_unsupported` and the others.
+        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`, `fixed_step`,
+            `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and the others.
 
     Raises:
         Interrupted: Ctrl-C ended the motion; it has the trajectory up to there.
@@ -181,7 +181,11 @@ class Simulation:
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
-            **({"accuracy": chosen.accuracy, "integrator": chosen.integrator} if fixed_step is None else {"fixed_step": fixed_step}),
+            **(
+                {"accuracy": chosen.accuracy, "integrator": chosen.integrator}
+                if fixed_step is None
+                else {"fixed_step": fixed_step}
+            ),
             "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
+from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.table import LAW_NUMBERS

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from math import inf
 from typing import Self
 
-from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
+from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.stepper import Observer, Stepper

@@ -106,7 +106,7 @@ class Batch:
         return np.zeros(self._room)
 
     def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
-        """Compute the runs from `first` up to `last`; other threads may compute others meanwhile, in rooms of theirs."""
+        """Compute the runs from `first` up to `last`; other threads compute others in rooms of theirs."""
         vectors = self._vectors
         size = self.states.shape[1]
         first_error = int(self._engine.structure[layout.WORK_STATE]) + merson.ERRORS * size

@@ -18,8 +18,8 @@ from osimlite.simulation.kernels.implicit import (
     EVALUATED,
     HAS_DERIVATIVE,
     LAST_TIME,
-    NEXT_STEP,
     MEMORY,
+    NEXT_STEP,
     REACHED,
 )
 from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, CONSTRAINED, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
@@ -27,7 +27,15 @@ from osimlite.simulation.kernels.merson import ERRORS
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.states import is_finite
 
-ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3, MEMORY + 4, MEMORY + 5, MEMORY + 6
+ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED = (
+    MEMORY,
+    MEMORY + 1,
+    MEMORY + 2,
+    MEMORY + 3,
+    MEMORY + 4,
+    MEMORY + 5,
+    MEMORY + 6,
+)
 """Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none; for how many steps
 their derivatives have served; how fast iterations converge; how many steps were refused in turn."""
 MATRICES = MEMORY + 7
@@ -42,10 +50,12 @@ STATES = ROWS + 2
 KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
 GAMMA = (0.0, 1.0, 1.5, 11.0 / 6.0, 25.0 / 12.0, 137.0 / 60.0)
 ALPHA = tuple((1.0 - kappa) * gamma for kappa, gamma in zip(KAPPA, GAMMA, strict=True))
-ERROR_CONSTANT = tuple(kappa * gamma + 1.0 / (k + 1.0) for k, (kappa, gamma) in enumerate(zip(KAPPA, GAMMA, strict=True)))
-"""Constants of the formulas by order: weights of the differences, and of the correction in the step and in its error."""
+ERROR_CONSTANT = tuple(
+    kappa * gamma + 1.0 / (k + 1.0) for k, (kappa, gamma) in enumerate(zip(KAPPA, GAMMA, strict=True))
+)
+"""Constants of the formulas by order: weights of the differences, of the correction, and of it in the error."""
 
-ITERATIONS, CONVERGED = 4, 0.05
+ITERATIONS, CONVERGED = 4, 0.2
 """Newton's steps at most; what the error of an iteration may be, of that of a step."""
 RENEWED = 20
 """After so many steps the derivatives are computed anew."""
@@ -215,7 +225,8 @@ def choose(s: Ints, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: 
 
 def reach(excess: float, order: int) -> float:
     """How many times longer a step would just do, of which the error is so many times what it may be."""
-    return max(excess, 1e-12) ** (-1.0 / (order + 1.0))
+    factor: float = max(excess, 1e-12) ** (-1.0 / (order + 1.0))
+    return factor
 
 
 def rescale(size: int, h: Floats, rows: Floats, factor: float) -> None:
@@ -233,7 +244,7 @@ def rescale(size: int, h: Floats, rows: Floats, factor: float) -> None:
         for i in range(order + 1):
             column[i] = rows[size * i + k]
         for i in range(order + 1):
-            rows[size * i + k] = product(order + 1, at(both, 6 * i), column)
+            rows[size * i + k] = product(0, order + 1, at(both, 6 * i), column)
     h[STEP] *= factor
     h[EQUAL] = 0.0
 

@@ -3,10 +3,10 @@
 An implicit method solves (1 - c J) d = r over and over, J being the derivative of the rates of a state (q, u, z) by it.
 Here J is what muscles, springs and stops make of it: each pushes along one displacement, with a force and with rates of
 its states that depend on that displacement, its speed and these states only. So its states are eliminated by
-themselves, as internal variables of a material are in finite elements, and so are the coordinates, whose rates count as
-the speeds. What is left is symmetric and of the size of the speeds: the mass matrix, and of each force a stiffness along
-its generalized force of 1 N. The equations of constraints count as heavy masses along them. All else (gravity, Coriolis
-forces, contacts) is left out of J: iterations converge without it, and W-methods keep their order.
+themselves, as internal variables of a material are in finite elements, and so are the coordinates, whose rates count
+as the speeds. What is left is symmetric and of the size of the speeds: the mass matrix, and of each force a stiffness
+along its generalized force of 1 N. The equations of constraints count as heavy masses along them. All else (gravity,
+Coriolis forces, contacts) is left out of J: iterations converge without it, and W-methods keep their order.
 """
 
 from __future__ import annotations
@@ -47,9 +47,14 @@ WIDTH = 2 + MOST_STATES
 INVERSE = (1 + MOST_STATES) * WIDTH
 GAINS = INVERSE + MOST_STATES * MOST_STATES
 PULLS, RIGHT, LEVER = GAINS + MOST_STATES, GAINS + 2 * MOST_STATES, GAINS + 3 * MOST_STATES
-RESPONSE_WORK = LEVER + 1
+FIRST, END = LEVER + 1, LEVER + 2
+RESPONSE_WORK = LEVER + 3
 """What is known of a force besides the generalized force of 1 N: the derivatives; the inverse of 1 - c J of the states;
-what a speed does to them, and they to the force; their right sides; what the displacement does to the force."""
+what a speed does to them, and they to the force; their right sides; what the displacement does to the force; the first
+degree of freedom that it moves, and the one after the last."""
+
+SLIGHT = 1e-12
+"""What counts as rounding among generalized forces of 1 N."""
 
 KERNEL, ITEM, FIRST_STATE, STATES, SENSE = 0, 1, 2, 3, 4
 """Of the integers of a response."""
@@ -86,8 +91,12 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats)
         for k in range(INVERSE):
             known[size + k] = w[SCRATCH + k]
         generalized_forces(s, w, right)
+        first, end = size, 0
         for k in range(size):
             known[k] = right[k]
+            if abs(right[k]) > SLIGHT:
+                first, end = min(first, k), k + 1
+        known[size + FIRST], known[size + END] = first, end
     return OK
 
 
@@ -116,15 +125,15 @@ def masses(s: Ints, w: Floats, mass: Floats) -> None:
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
-                add_square(size, HEAVY * largest / square, row, size, mass)
+                add_square(size, HEAVY * largest / square, row, 0, size, mass)
 
 
-def add_square(size: int, factor: float, row: Floats, end: int, matrix: Floats) -> None:
-    """Add a multiple of the product of a row with itself, up to a column or, if that is 0, to the diagonal."""
-    for i in range(size):
+def add_square(size: int, factor: float, row: Floats, first: int, end: int, matrix: Floats) -> None:
+    """Add a multiple of the product of a row with itself, from an entry up to another."""
+    for i in range(first, end):
         if row[i] != 0.0:
             scaled, target = factor * row[i], at(matrix, size * i)
-            for k in range(end if end > 0 else i + 1):
+            for k in range(first, end):
                 target[k] += scaled * row[k]
 
 
@@ -158,7 +167,7 @@ def condense(s: Ints, c: float, room: Floats) -> bool:
                 stiffness += a[2 + i] * gains[i]
                 lever += c * pulls[i] * a[WIDTH * (1 + i)]
         a[LEVER] = lever
-        add_square(size, -c * response[SENSE] * stiffness, known, 0, system)
+        add_square(size, -c * response[SENSE] * stiffness, known, int(a[FIRST]), int(a[END]), system)
     return cholesky(size, system, SMALLEST_PIVOT)
 
 
@@ -188,30 +197,33 @@ def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
     for number in range(s[RESPONSES]):
         response, known = at(s, s[RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         places, a = at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
-        force = a[LEVER] * response[SENSE] * product(size, known, d)
+        first, end = int(a[FIRST]), int(a[END])
+        force = a[LEVER] * response[SENSE] * product(first, end, known, d)
         for k in range(response[STATES]):
             if places[k] >= 0:
                 force += a[PULLS + k] * d[places[k]]
-        for k in range(size):
+        for k in range(first, end):
             right[k] += c * force * known[k]
     substitute(size, system, right)
     for number in range(s[RESPONSES]):
         response, known = at(s, s[RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         count, places, a = response[STATES], at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
-        displacement, speed = response[SENSE] * product(size, known, d), response[SENSE] * product(size, known, right)
+        first, end = int(a[FIRST]), int(a[END])
+        displacement = response[SENSE] * product(first, end, known, d)
+        speed = response[SENSE] * product(first, end, known, right)
         for i in range(count):
             a[RIGHT + i] = d[places[i]] + c * a[WIDTH * (1 + i)] * displacement if places[i] >= 0 else 0.0
         for i in range(count):
             if places[i] >= 0:
-                d[places[i]] = a[GAINS + i] * speed + product(count, at(a, INVERSE + count * i), at(a, RIGHT))
+                d[places[i]] = a[GAINS + i] * speed + product(0, count, at(a, INVERSE + count * i), at(a, RIGHT))
     for k in range(size):
         du[k] = right[k]
         d[k] += c * right[k]
 
 
-def product(count: int, a: Floats, b: Floats) -> float:
-    """Of two vectors."""
+def product(first: int, end: int, a: Floats, b: Floats) -> float:
+    """Of two vectors, from an entry up to another."""
     total = 0.0
-    for k in range(count):
+    for k in range(first, end):
         total += a[k] * b[k]
     return total

@@ -6,7 +6,7 @@ from math import inf, isfinite, sqrt
 
 from osimlite.simulation.integrators import weight
 from osimlite.simulation.kernels.layout import CONSTRAINED, FREEDOMS, LAWS, OK, PROJECT, SCRATCH, STATE_SIZE, TIME
-from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+from osimlite.simulation.kernels.pointers import Floats, Ints, call
 
 
 def projected(

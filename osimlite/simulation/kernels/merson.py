@@ -27,7 +27,6 @@ from osimlite.simulation.kernels.layout import (
     CONTACT_WORK,
     CONTACTS,
     FORCE_STAGE,
-    FREEDOMS,
     LAWS,
     OK,
     POSITION_STAGE,
@@ -204,6 +203,8 @@ def run(m: Motion, y: Floats) -> int:
             if t1 - t0 <= shortest_step(t0, counts[ATTEMPTED]):
                 return FAILED
             clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[ATTEMPTED]))
+            if sizes[METHOD] > 0:
+                m.w[sizes[METHOD_AT] + MEMORY] = 0.0
             continue
         counts[TAKEN] += 1
         clock[0] = t1
@@ -239,9 +240,9 @@ def run(m: Motion, y: Floats) -> int:
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     """Whether the end of a step has a derivative, which an implicit method has found where no forces are looked at."""
-    if m.sizes[METHOD] > 0 and m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
-        if m.s[CONTACTS] + m.sizes[WATCHES] == 0:
-            return is_finite(m.s[STATE_SIZE], f1)
+    is_looked_at = m.sizes[METHOD] == 0 or m.s[CONTACTS] + m.sizes[WATCHES] > 0
+    if not is_looked_at and m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
+        return is_finite(m.s[STATE_SIZE], f1)
     m.counts[EVALUATIONS] += 1
     return evaluated(m, t1, y1, f1, ACCELERATION_STAGE) == OK and is_finite(m.s[STATE_SIZE], f1)
 
@@ -259,7 +260,7 @@ def implicit_step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
         clock[1] = h[NEXT_STEP]
         if h[REACHED] > t0:
             return float(h[REACHED])
-        if h[NEXT_STEP] <= smallest:
+        if h[NEXT_STEP] <= smallest or not t0 + h[NEXT_STEP] > t0:
             return t0 - 1.0
     return t0
 

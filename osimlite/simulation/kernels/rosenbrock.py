@@ -18,8 +18,8 @@ from osimlite.simulation.kernels.implicit import (
     EVALUATED,
     HAS_DERIVATIVE,
     LAST_TIME,
-    NEXT_STEP,
     MEMORY,
+    NEXT_STEP,
     REACHED,
 )
 from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, CONSTRAINED, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
@@ -102,11 +102,13 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
         if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
             error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]))
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
-    if error <= accuracy:
-        h[REACHED], h[IS_NEW] = t1, 0.0
-        if cut or factor < WORTH and factor >= 1.0:
-            return OK
-    h[NEXT_STEP] = step * min(max(factor, SHRINK), GROW if error <= accuracy else SAFETY)
+    if not error <= accuracy:
+        # Near the resolution of the time, the step was longer than it was to be.
+        h[NEXT_STEP] = min(max(factor, SHRINK) * step, SAFETY * h[NEXT_STEP])
+        return OK
+    h[REACHED], h[IS_NEW] = t1, 0.0
+    if factor < 1.0 or (factor >= WORTH and not cut):
+        h[NEXT_STEP] = min(factor, GROW) * step
     return OK
 
 

@@ -1,0 +1,171 @@
+"""Integrators for stiff motion: their linear equations, order, error, constraints, contacts, and what they cost."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import SettingError
+from osimlite.multibody import build_mechanism
+from osimlite.simulation import Simulation
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.engines.controlled_steps import ControlledSteps
+from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.condensation import condensation_room, condense, correct, linearise
+from osimlite.simulation.many import run_many
+from osimlite.simulation.system import System
+from tests.simulation.elements.muscle_rows import hung, muscle
+from tests.simulation.equations import Equations, last, oscillator
+from tests.simulation.test_constrained import MODELS
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+METHODS = "bdf", "rosenbrock"
+
+
+def steps_of(f: Any, y: list[float], accuracy: float, method: str, to: float = 3.0) -> tuple[list[float], Any]:
+    """The end of a motion of auxiliary states only, and its stepper."""
+    stepper = ControlledSteps(Equations(f, len(y), 0), 0.0, y, accuracy, None, method)  # type: ignore[arg-type]
+    return last(stepper.steps(to))[1], stepper
+
+
+def hanging(case: str, excitation: float = 0.5, gravity: float = 9.80665) -> Any:
+    """A block that hangs on a muscle, off its equilibrium."""
+    force = muscle(case)
+    force.default_activation = 0.6 * excitation
+    model = hung(force, (excitation, excitation), gravity)
+    model.find("/jointset/slide/x").default_value = 0.33
+    return model
+
+
+# -------------------------------------------------------------------------------------------------- linear equations
+@pytest.mark.parametrize("case", ["thelen_default", "millard_damped", "millard_rigid", "dgf_default"])
+def test_condensed_equations_are_those_of_all_states(case):
+    """On a slider nothing but the muscle has derivatives: J is that of the engine."""
+    model = hanging(case)
+    mechanism = build_mechanism(model)
+    system = System(mechanism, force_elements(model, mechanism), code=PYTHON)
+    with Simulation(model, "compiled") as simulation:
+        y = np.array(simulation.initial_state({}, {"x": 0.1}, equilibrate=True))
+    s = system.structure
+    system.program.method("bdf")
+    room, f, c = np.zeros(condensation_room(1, int(s[layout.RESPONSES]))), np.zeros(len(y)), 2e-3
+    rates = partial(rates_at, system)
+    jacobian = np.column_stack([(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))])
+    assert linearise(system.program.ints, system.numbers, system._w, y, f, room) == layout.OK
+    assert condense(system.program.ints, c, room)
+    right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
+    found = right.copy()
+    correct(system.program.ints, c, room, found)
+    assert found == pytest.approx(np.linalg.solve(np.eye(len(y)) - c * jacobian, right), rel=1e-4, abs=1e-6)
+
+
+def rates_at(system: System, y: Any) -> Any:
+    assert system.realize(0.0, y, layout.ACCELERATION_STAGE) == layout.OK
+    return np.array(system.found())
+
+
+# ------------------------------------------------------------------------------------------------------------- order
+@pytest.mark.parametrize(("method", "order"), [("bdf", 5), ("rosenbrock", 3)])
+def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
+    """The estimated error goes with h^(k + 1) in a formula of order k, with h^k in the embedded one of order k - 1."""
+    power = order + 1 if method == "bdf" else order
+    loose, tight = (steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in (1e-5, 1e-8))
+    assert tight / loose == pytest.approx(1e3 ** (1.0 / power), rel=0.25)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
+def test_error_follows_the_accuracy(method, accuracy):
+    y, stepper = steps_of(oscillator, [1.0, 0.0], accuracy, method)
+    error = max(abs(y[0] - math.cos(3.0)), abs(y[1] + math.sin(3.0)))
+    assert 1e-3 * accuracy < error < 2.0 * accuracy * stepper.taken
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_jump_is_passed(method):
+    """What changes abruptly makes the steps short there, and only there."""
+    y, stepper = steps_of(lambda t, y: [0.0 if t < 1.0 else 10.0], [0.0], 1e-6, method, to=2.0)
+    assert y[0] == pytest.approx(10.0, abs=1e-4)
+    assert stepper.attempted < 300
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_motion_that_explodes_is_an_error(method):
+    with pytest.raises(osimlite.errors.SimulationError, match=r"cannot go on at t = (0\.999|1\.000)"):
+        steps_of(lambda t, y: [y[0] * y[0]], [1.0], 1e-4, method, to=2.0)
+
+
+# ----------------------------------------------------------------------------------------------------------- motions
+@pytest.mark.parametrize(
+    ("case", "method"), [("thelen_default", "bdf"), ("millard_damped", "rosenbrock"), ("dgf_default", "bdf")]
+)
+def test_a_block_hangs_on_a_muscle(case, method):
+    with Simulation(hanging(case), "compiled", equilibrate=True) as simulation:
+        exact = simulation.run(0.3, accuracy=1e-9)
+        found = simulation.run(0.3, accuracy=1e-6, integrator=method)
+    assert found.summary["integrator"] == {"bdf": "BDF", "rosenbrock": "Rosenbrock"}[method]
+    # At every report: the interpolated motion too.
+    assert np.abs(found.values - exact.values).max() < 2e-5
+    for path, values in exact.auxiliary.items():
+        assert np.abs(found.auxiliary[path] - values).max() < 2e-5, path
+
+
+def test_a_stiff_muscle_needs_few_evaluations():
+    with Simulation(hanging("dgf_default", 0.02, 1.0), "compiled", equilibrate=True) as simulation:
+        counts = {
+            name: simulation.run(1.0, accuracy=1e-3, integrator=name).summary["evaluations"]
+            for name in ("merson", *METHODS)
+        }
+    assert 10 * max(counts[name] for name in METHODS) < counts["merson"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", MODELS)
+def test_constraints_hold(name, method):
+    with Simulation(MODELS[name](), "compiled") as simulation:
+        exact = simulation.run(0.3, accuracy=1e-8, report_interval=0.1)
+        found = simulation.run(0.3, accuracy=1e-5, report_interval=0.1, integrator=method)
+    assert np.abs(found.values - exact.values).max() < 1e-3
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_contacts_begin_and_end(walker, method):
+    with Simulation(walker, "compiled") as simulation:
+        exact = simulation.run(0.6, accuracy=1e-7).summary["contact_events"]
+        found = simulation.run(0.6, accuracy=1e-4, integrator=method).summary["contact_events"]
+    assert [event["contact"] for event in found] == [event["contact"] for event in exact]
+    assert [event["time_s"] for event in found] == pytest.approx([event["time_s"] for event in exact], abs=1e-4)
+
+
+# ------------------------------------------------------------------------------------------------------- many in a call
+@pytest.mark.parametrize("method", METHODS)
+def test_steps_do_not_depend_on_how_many_are_taken_in_a_call(walker, method, monkeypatch):
+    with Simulation(walker, "compiled", integrator=method) as simulation:
+        together = simulation.run(0.2)
+        monkeypatch.setattr("osimlite.simulation.engines.controlled_steps.LOGGED_STEPS", 1)
+        assert np.array_equal(simulation.run(0.2).values, together.values)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_many_runs_are_as_one(walker, method):
+    with Simulation(walker, "compiled") as simulation:
+        start = simulation.initial_state({}, {})
+        rows = np.array([start, start]) + 1e-3 * np.arange(2)[:, None]
+        both = run_many(simulation.engine, rows, 0.2, integrator=method, threads=1)
+        alone = [run_many(simulation.engine, row[None], 0.2, integrator=method).states[0] for row in rows]
+    assert np.array_equal(both.states, alone)
+
+
+def test_an_unknown_integrator_is_refused(walker):
+    with Simulation(walker, "compiled") as simulation:
+        with pytest.raises(SettingError, match=r"no integrator 'bfd'.*'bdf'"):
+            simulation.run(0.1, integrator="bfd")
+        with pytest.raises(SettingError, match="no integrator 'bfd'"):
+            run_many(simulation.engine, [simulation.initial_state({}, {})], 0.1, integrator="bfd")
