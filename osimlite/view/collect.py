@@ -33,7 +33,7 @@ from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushe
 WIDTH_OF_HALF_SPACE = 2.5
 """How much of a half space is drawn: edges of the square as a multiple of the model's size."""
 
-CONTACT_OPACITY, HALF_SPACE_OPACITY, WRAP_OPACITY = 0.5, 0.2, 0.5
+CONTACT_OPACITY, HALF_SPACE_OPACITY, WRAP_OPACITY = 0.5, 0.2, 0.3
 """How much of their opacity contact and wrap surfaces keep, which files show as wireframes: bodies shine through."""
 
 SPRING: Color = (0.0, 0.62, 0.45)

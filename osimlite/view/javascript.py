@@ -132,7 +132,9 @@ class _Writer:
             case ast.While(test=test, body=body, orelse=[]):
                 return [f"while ({self.of(test)}) {{", *self.block(body), "}"]
             case ast.For(target=ast.Name(id=name), iter=over, body=body, orelse=[]):
-                return [f"for ({self.loop(_local(name), over)}) {{", *self.block(body), "}"]
+                # As in Python, what becomes of the variable within the loop makes no difference to the next round.
+                counter = self.temporary()
+                return [f"for ({self.loop(counter, over)}) {{", f"{_local(name)} = {counter};", *self.block(body), "}"]
             case ast.Break():
                 return ["break;"]
             case ast.Continue():

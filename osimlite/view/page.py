@@ -34,7 +34,7 @@ from osimlite.view.motion import Motion, activity, in_mechanism_order
 from osimlite.view.pushes import Pushes
 from osimlite.view.scene import LAYERS, Scene
 
-SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "viewer.js")
+SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "curves.js", "viewer.js")
 """The parts of the page's own program, in their order."""
 
 TRAVELS = 0.5

@@ -12,7 +12,7 @@ import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.view import Shown
-from tests.view.motions import stroll
+from tests.view.motions import Recorded, stroll
 
 WALKER, GAIT, SHOULDER = "walker", "m0014", "m0163"
 
@@ -104,9 +104,66 @@ def test_lines_go_where_the_scene_says(file_of, open_page, tmp_path):
     assert moved > 5
 
 
-def test_dependent_coordinates_follow_in_the_page_alone(shared, open_page, tmp_path):
+def rajagopal(shared) -> Path:
     (path,) = (shared / "corpus" / "models").glob("*/RajagopalLaiUhlrich2023.osim")
-    view = shown(path)
+    return path
+
+
+def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_path):
+    view = shown(rajagopal(shared))
+    mechanism, paths = view.scene.mechanism, osimlite.paths(view.model)
+    page = open_page(view.write_page(tmp_path / "page.html"))
+    page.run("v.setCoordinate('knee_angle_r', 1.2)")
+    q = values(page)
+    lengths, arms = paths.lengths(q), paths.moment_arms(q)
+    names = [line.path for line in view.scene.lines if line.layer == "paths"]
+    # Of knees that move the patella along, of hips, and of what is not crossed.
+    for coordinate in ("knee_angle_r", "hip_flexion_r", "ankle_angle_l"):
+        place = mechanism.coordinate_index(coordinate)
+        found = page.run("x[1].map((k) => v.mechanism.routes.over(k, x[0], v.mechanism, v.q))", [place, [*range(80)]])
+        path = mechanism.coordinates[place].path
+        assert [item["length"] for item in found] == pytest.approx([lengths[name] for name in names], abs=1e-12)
+        assert [item["arm"] for item in found] == pytest.approx([arms[name].get(path, 0.0) for name in names], abs=1e-8)
+
+
+def test_a_muscle_that_is_clicked_shows_its_curves(file_of, open_page, tmp_path):
+    view = shown(file_of(GAIT))
+    page = open_page(view.write_page(tmp_path / "page.html"))
+    card = page.page.locator("#curves")
+    assert not card.is_visible()
+    muscle = next(line.path for line in view.scene.lines if "gas" in line.path)
+    page.run("v.select(x)", muscle)
+    length = osimlite.paths(view.model).lengths(values(page))[muscle]
+    assert muscle.rpartition("/")[2] in card.inner_text() and f"{100.0 * length:.2f} cm" in card.inner_text()
+    shown_of = card.locator("figure strong").all_inner_texts()
+    assert any("knee" in name for name in shown_of) and not any("pelvis" in name for name in shown_of)
+    before = card.locator("circle").first.get_attribute("cx")
+    page.run("v.setCoordinate(x, -1.0)", next(name for name in shown_of if "knee" in name))
+    page.until("document.querySelector('#curves circle').getAttribute('cx') !== x", before)
+    page.run("v.select('/bodyset')")
+    assert not card.is_visible()
+
+
+def test_muscles_have_the_colour_of_their_activation(file_of, open_page, tmp_path):
+    view = shown(file_of(GAIT))
+    mechanism = view.scene.mechanism
+    names = [line.path for line in view.scene.lines if line.layer == "paths"][:3]
+    q = np.tile(mechanism.default_state()[0], (2, 1))
+    levels = {f"{name}/activation": np.array((0.2, level)) for name, level in zip(names, (0.0, 0.4, 1.0), strict=True)}
+    motion = Recorded(np.array((0.0, 1.0)), mechanism.coordinate_names, q, 0.0 * q, {}, levels)
+    page = open_page(shown(file_of(GAIT), motion).write_page(tmp_path / "page.html"))
+    page.run("v.setTime(1.0)")
+    color = """x.map((name) => {
+      const group = v.stage.rods.find((g) => g.parent.name === 'paths'), [mesh] = group.children;
+      const k = v.data.lines.findIndex((line) => line.path === name), i = group.userData.owners.indexOf(k);
+      const light = [...mesh.instanceColor.array.slice(3 * i, 3 * i + 3)];
+      return light.map((l) => l < 0.0031308 ? 12.92 * l : 1.055 * l ** (1 / 2.4) - 0.055);
+    })"""
+    assert np.array(page.run(color, names)) == pytest.approx(np.array([(0, 0, 1), (0.4, 0, 0.6), (1, 0, 0)]), abs=2e-3)
+
+
+def test_dependent_coordinates_follow_in_the_page_alone(shared, open_page, tmp_path):
+    view = shown(rajagopal(shared))
     mechanism = view.scene.mechanism
     page = open_page(view.write_page(tmp_path / "page.html"))
     knee, patella = (mechanism.coordinate_index(name) for name in ("knee_angle_r", "knee_angle_r_beta"))

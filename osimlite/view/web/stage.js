@@ -3,7 +3,7 @@
 (() => {
   const { bytes, point } = window.osimlite;
   const T = window.THREE;
-  const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
+  const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
 
   const floats = (text) => new Float32Array(bytes(text).buffer);
   const toned = ([r, g, b]) => new T.Color().setRGB(r, g, b, T.SRGBColorSpace);
@@ -212,7 +212,8 @@
       const turn = new T.Quaternion(), middle = new T.Vector3(), size = new T.Vector3(), m = new T.Matrix4();
       let i = 0;
       for (const [k, line] of lines) {
-        const corners = this.mechanism.corners(k, this.q, this.poses), r = line.radius;
+        const corners = this.mechanism.corners(k, this.q, this.poses);
+        const r = (this.glow(line.path)[0] === SELECTED ? 1.8 : 1) * line.radius;
         corners.forEach((corner, s) => {
           start.set(...corner);
           balls.setMatrixAt(i, m.makeScale(r, r, r).setPosition(start));
@@ -236,10 +237,10 @@
       const { lines, owners } = group.userData, colors = {};
       for (const [k, line] of lines) {
         const [glow, strength] = this.glow(line.path), levels = this.data.motion?.activations[line.path];
-        if (levels && this.row >= 0 && glow !== SELECTED) {
-          const a = levels[this.row] / 255;
-          colors[k] = toned([a, 0, 1 - a]);
-        } else colors[k] = strength ? new T.Color(glow) : toned(line.color);
+        // Blue is what rests.
+        if (glow === SELECTED) colors[k] = new T.Color(CHOSEN);
+        else if (levels && this.row >= 0) colors[k] = toned([levels[this.row] / 255, 0, 1 - levels[this.row] / 255]);
+        else colors[k] = strength ? new T.Color(glow) : toned(line.color);
       }
       for (const mesh of group.children) {
         for (let i = 0; i < mesh.count; i++) mesh.setColorAt(i, colors[owners[i]]);
@@ -302,7 +303,11 @@
       this.wanted();
     }
 
-    select(path) { this.selected = path; this.paint(); }
+    select(path) {
+      this.selected = path;
+      this.paint();
+      (this.rods || []).forEach((group) => this.lay(group));
+    }
 
     showMarks(on) { this.hideMarks = !on; this.paint(); }
 

@@ -1,7 +1,7 @@
 "use strict";
 // The page as a whole: what is selected, which pose is shown, and the motion that plays.
 (() => {
-  const { Mechanism, Stage, Tree, Sliders, showProperties, showFindings, make, $, bytes } = window.osimlite;
+  const { Curves, Mechanism, Stage, Tree, Sliders, showProperties, showFindings, make, $, bytes } = window.osimlite;
 
   class Viewer {
     constructor(data) {
@@ -11,6 +11,7 @@
       this.stage = new Stage($("#canvas"), data, this.mechanism);
       this.tree = new Tree(this);
       this.sliders = new Sliders(this);
+      this.curves = new Curves(this);
       this.title();
       this.layers();
       this.labels();
@@ -55,6 +56,7 @@
       this.q = this.mechanism.coupled(Array.from(q));
       this.stage.pose(this.q, row);
       this.sliders.show(this.q);
+      this.curves.moved();
     }
 
     setCoordinate(k, value) {
@@ -150,6 +152,7 @@
       this.playing = false;
       $("#play").textContent = "▶";
       $("#play").setAttribute("aria-label", "Play");
+      this.curves.moved();
     }
 
     // -------------------------------------------------------------------------------------------- selection
@@ -158,6 +161,7 @@
       this.stage.select(path);
       this.tree.reveal(path);
       showProperties(this, path);
+      this.curves.show(path);
     }
 
     mouse() {
