@@ -11,7 +11,17 @@ A surface inside which a point of the piece lies bends it nowhere, as in OpenSim
 from __future__ import annotations
 
 from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
-from osimlite.simulation.kernels.cable_surfaces import ARC, POINT, SQUARE, STEP, SURFACE_NUMBERS, shoot, value
+from osimlite.simulation.kernels.cable_surfaces import (
+    ARC,
+    KIND,
+    POINT,
+    SQUARE,
+    STEP,
+    SURFACE_NUMBERS,
+    TORUS,
+    shoot,
+    value,
+)
 from osimlite.simulation.kernels.geodesic_search import (
     OWNER,
     SLOT,
@@ -21,9 +31,9 @@ from osimlite.simulation.kernels.geodesic_search import (
     start_after,
     to_ground,
 )
-from osimlite.simulation.kernels.geodesic_starts import SURFACE, start
+from osimlite.simulation.kernels.geodesic_starts import ANY_SIDE, AS_MEANT, OTHER_WAY, SIDE, SURFACE, depth, start
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
-from osimlite.simulation.kernels.path_wraps import FIRST, LAST, WRAP_INTS, in_surface
+from osimlite.simulation.kernels.path_wraps import in_surface
 from osimlite.simulation.kernels.paths import (
     AT,
     COUNT,
@@ -44,20 +54,21 @@ from osimlite.simulation.kernels.paths import (
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import direction, station
-from osimlite.simulation.kernels.vectors import put, vector
+from osimlite.simulation.kernels.vectors import Vector, put, vector
 
-PLACES = 0
-"""Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its piece begins at, and the
-last one that it may end at."""
+WRAP_INTS = 4
+PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
+"""Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its piece begins at, the
+last one that it may end at, and the first one of its PathWrap's range."""
 CHAIN, SEARCH, POSES = 0, 1, 2
 """Integers after the wraps: where in the record the slots are, room for a search, and the poses of the surfaces."""
 HOW, POSE_NUMBERS = 12, 13
-NOT, SHORT_WAY, OTHER_WAY = 0.0, 1.0, -1.0
-"""Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand."""
+NOT = 0.0
+"""Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand, see `start`."""
 
 TOUCH = 1e-10
 """The angle (rad) by which a piece turns at least around a surface that it is put on."""
-INSIDE = 1e-9
+INSIDE = 1e-14
 """A point counts as inside a surface if it is so far below it, in units of its function."""
 LOOSE, TURNS = 3, 12
 """So many times each of several surfaces is put into a piece anew; so often surfaces may come and go."""
@@ -84,6 +95,8 @@ def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
     order, work = at(found, ORDER), at(found, ORDER + size)
     slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
     place_surfaces(s, w, i, p)
+    for k in range(1, int(found[COUNT])):
+        find_near(i, p, found, slots, int(order[k - 1]), int(order[k]))
     for k in range(int(found[COUNT]) - 2, -1, -1):
         count = bend(i, p, found, int(order[k]), int(order[k + 1]))
         if count > 0:
@@ -114,6 +127,7 @@ def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
         for axis in range(3):
             pose[axis], pose[3 + axis], pose[6 + axis] = direction(s, w, link, t[axis], t[3 + axis], t[6 + axis])
         put(pose, 9, station(s, w, link, n[STATION], n[STATION + 1], n[STATION + 2]))
+        pose[HOW] = NOT
 
 
 def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
@@ -124,18 +138,20 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     chain, room, poses = at(found, slots[CHAIN]), at(found, slots[SEARCH]), at(found, slots[POSES])
     put(chain, 0, vector(work, NODE_WORK * one + PLACE))
     put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
-    near = find_near(wraps, p, found, slots, i[WRAPS], one, two)
+    near = 0
+    for number in range(i[WRAPS]):
+        near += 1 if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT else 0
     count, loose = 0, LOOSE if near > 1 else 0
     for turn in range(TURNS if near > 0 else 0):
         changed = False
         for number in range(i[WRAPS]):
-            pose = at(poses, POSE_NUMBERS * number)
-            if pose[HOW] != NOT:
+            own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
+            if own[FIRST] == one and pose[HOW] != NOT:
                 place = place_of(chain, count, number)
                 if place > 0 and (turn < loose or not chain[SLOT * place + GEODESIC + ARC] > 0.0):
                     take_out(chain, count, place)
                     count, place, changed = count - 1, 0, True
-                if place == 0 and put_in(at(p, wraps[WRAP_INTS * number + PLACES]), pose, chain, count, number, room):
+                if place == 0 and put_in(at(p, own[PLACES]), pose, chain, count, number, room):
                     count, changed = count + 1, True
         if not changed and turn != loose:
             break
@@ -148,20 +164,30 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     return count
 
 
-def find_near(wraps: Ints, p: Floats, found: Floats, slots: Ints, count: int, one: int, two: int) -> int:
-    """Note which wraps may bend the piece between two points, from outside of their surfaces; returns how many."""
-    chain, near = at(found, slots[CHAIN]), 0
-    for number in range(count):
+def find_near(i: Ints, p: Floats, found: Floats, slots: Ints, one: int, two: int) -> None:
+    """Note which wraps may bend the piece between two points, from outside of their surfaces, and how."""
+    size = i[POINTS] + 2 * i[WRAPS]
+    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(found, ORDER + size)
+    for number in range(i[WRAPS]):
         own, pose = at(wraps, WRAP_INTS * number), at(found, slots[POSES] + POSE_NUMBERS * number)
-        pose[HOW] = NOT
-        if own[FIRST] == one and two <= own[LAST]:
-            surface = at(p, own[PLACES] + SURFACE)
-            inside = INSIDE * surface[SQUARE]
-            first, second = in_surface(pose, vector(chain, 0)), in_surface(pose, vector(chain, SLOT))
-            if value(surface, first) <= inside and value(surface, second) <= inside:
-                pose[HOW] = SHORT_WAY
-                near += 1
-    return near
+        if own[FIRST] == one:
+            numbers = at(p, own[PLACES])
+            surface = at(numbers, SURFACE)
+            inside, a, b = INSIDE * surface[SQUARE], seen(pose, work, one), seen(pose, work, two)
+            is_near = two <= own[LAST] and value(surface, a) <= inside and value(surface, b) <= inside
+            pose[HOW] = AS_MEANT if is_near else NOT
+            if is_near and own[LAST] - own[RANGE] > 1 and (numbers[SIDE] != 0.0 or surface[KIND] == TORUS):
+                deepest = depth(surface, a, b)
+                for k in range(1, int(found[COUNT])):
+                    before, after = int(found[ORDER + k - 1]), int(found[ORDER + k])
+                    others = own[RANGE] <= before != one and after <= own[LAST]
+                    if others and depth(surface, seen(pose, work, before), seen(pose, work, after)) < deepest:
+                        pose[HOW] = ANY_SIDE
+
+
+def seen(pose: Floats, work: Floats, node: int) -> Vector:
+    """A node of the path in the frame of a surface."""
+    return in_surface(pose, vector(work, NODE_WORK * node + PLACE))
 
 
 def place_of(chain: Floats, count: int, number: int) -> int:

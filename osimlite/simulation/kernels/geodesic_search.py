@@ -108,8 +108,8 @@ def smooth(chain: Floats, count: int, room: Floats) -> bool:
 def part_of(slot: Floats, corrections: Floats) -> float:
     """The part of its corrections that a geodesic may take; 0 if it gets shorter than nothing, which it then is."""
     start, arc = at(slot, GROUND_START), slot[GEODESIC + ARC]
-    forwards, sideways = corrections[0] * start[ALONG_BENDS], corrections[1] * start[ACROSS_BENDS]
-    turn = max(abs(forwards), abs(sideways), abs(corrections[2]))
+    bends = max(abs(start[ALONG_BENDS]), abs(start[ACROSS_BENDS]))
+    turn = max(abs(corrections[2]), bends * max(abs(corrections[0]), abs(corrections[1]), abs(corrections[3])))
     part = MOST_TURN / turn if turn > MOST_TURN else 1.0
     if not arc + part * corrections[3] > LEAST_PART * arc:
         if arc + corrections[3] <= 0.0 and arc * abs(start[ALONG_BENDS]) < SHORT:

@@ -9,6 +9,9 @@ surface, of all sides by where the way is shorter:
   great circle is a geodesic, so the path may go around the far side;
 - a torus: the path goes through the hole, and never through the plane outside of the ring.
 
+Of several pieces around one cylinder or torus only that which comes nearest to its axis, or its ring, need do so. The
+others bend where they go through it, the shorter way.
+
 All points are in the frame of the surface, in m. Neighbours of a piece that are inside count as on the surface.
 """
 
@@ -42,6 +45,10 @@ Start = tuple[float, Vector, Vector, float]
 """The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
 surface; its direction there; its length on the surface, m."""
 
+AS_MEANT, ANY_SIDE, OTHER_WAY = 1.0, 2.0, -1.0
+"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; on the other
+side of an ellipsoid than is meant."""
+
 LEAST = 1e-100
 """What is not divided by."""
 SAMPLES, STEPS = 16, 6
@@ -50,17 +57,25 @@ PIECES = 8
 """By so many pieces a length on an ellipsoid is measured at first."""
 
 
-def start(p: Floats, first: Vector, second: Vector, way: float) -> Start:
-    """Where a straight piece between two points begins to bend around what the numbers tell of.
-
-    On the other side of an ellipsoid than is meant if `way` is -1.
-    """
+def start(p: Floats, first: Vector, second: Vector, how: float) -> Start:
+    """Where a straight piece between two points begins to bend around what the numbers tell of."""
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == CYLINDER:
-        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, axis, side)
+        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, axis, 0.0 if how == ANY_SIDE else side)
     if surface[KIND] == TORUS:
-        return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side)
-    return around_ellipsoid(surface, first, second, axis, side, way)
+        return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
+    return around_ellipsoid(surface, first, second, axis, side, how)
+
+
+def depth(p: Floats, first: Vector, second: Vector) -> float:
+    """The squared distance of a piece from the axis of a cylinder, or the ring of a torus; 0 for other surfaces."""
+    if p[KIND] == CYLINDER:
+        x, y, _ = first
+        wx, wy, _ = minus(second, first)
+        part = min(max(-(x * wx + y * wy) / max(wx * wx + wy * wy, LEAST), 0.0), 1.0)
+        x, y = x + part * wx, y + part * wy
+        return x * x + y * y
+    return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS]) if p[KIND] == TORUS else 0.0
 
 
 def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
@@ -119,7 +134,7 @@ def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: 
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
-    normal = times(how, unit(cross(out, way)))
+    normal = times(-1.0 if how == OTHER_WAY else 1.0, unit(cross(out, way)))
     centre = times(dot(normal, one), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
     a1, a2 = touching(minus(one, centre), radius, normal, 1.0), touching(minus(two, centre), radius, normal, -1.0)
@@ -143,15 +158,26 @@ def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector
     return along(foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point))
 
 
-def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
+def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float) -> Start:
     """The start on a torus about z: as on a cylinder in the place of the ring that is nearest to the line."""
-    way = minus(second, first)
+    x, y, _ = near = nearest_to_ring(ring, first, second)
+    if side != 0.0 and not on_side(near, axis, side):
+        return 0.0, first, near, 0.0
+    rx, ry, _ = inwards = unit((-x, -y, 0.0))
+    centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
+    one, two = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
+    turn, point, way, length = around_cylinder(tube, inf, one, two, 0, 0.0 if how == ANY_SIDE else 1.0)
+    return turn, along(back(point, inwards, tangent), 1.0, centre), back(way, inwards, tangent), length
+
+
+def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
+    """The point of a piece that is nearest to a ring about z."""
+    wx, wy, wz = way = minus(second, first)
     best, least = 0.0, inf
     for k in range(SAMPLES + 1):
         distance = distance_from_ring(along(first, k / SAMPLES, way), ring)
         if distance < least:
             best, least = k / SAMPLES, distance
-    wx, wy, wz = way
     for _ in range(STEPS):
         x, y, z = along(first, best, way)
         square = max(x * x + y * y, LEAST)
@@ -161,15 +187,7 @@ def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: 
         if not bends > 0.0:
             break
         best = min(max(best - slope / bends, 0.0), 1.0)
-    x, y, z = near = along(first, best, way)
-    if side != 0.0 and not on_side(near, axis, side):
-        return 0.0, first, way, 0.0
-    rx, ry, _ = inwards = unit((-x, -y, 0.0))
-    centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
-    turn, point, along_way, length = around_cylinder(
-        tube, inf, seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent), 0, 1.0
-    )
-    return turn, along(back(point, inwards, tangent), 1.0, centre), back(along_way, inwards, tangent), length
+    return along(first, best, way)
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:

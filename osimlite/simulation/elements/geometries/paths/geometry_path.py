@@ -86,6 +86,7 @@ class Surface:
         numbers: what the law is given, or those of :mod:`osimlite.simulation.kernels.geodesic_starts`.
         first: number of the first point between which and the last one the path may wrap.
         last: number of the last one.
+        begin: number of the first one of all pieces that the same PathWrap may bend.
     """
 
     number: int
@@ -95,6 +96,7 @@ class Surface:
     numbers: tuple[float, ...]
     first: int
     last: int
+    begin: int = 0
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ class ThroughPoints:
         kernel, room = "wrapped_path" if self.surfaces else "straight_path", ORDER + len(nodes) * (1 + NODE_WORK)
         if self.geodesic and self.surfaces:
             for surface in self.surfaces:
-                wraps += len(numbers), surface.first, surface.last
+                wraps += len(numbers), surface.first, surface.last, surface.begin
                 numbers += surface.numbers
             most = max(Counter(surface.first for surface in self.surfaces).values())
             slots, room = slots_and_room(most, len(self.surfaces), room)
@@ -180,7 +182,9 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     if builder.geodesic:
         points = [replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points]
         pieces = [(surface, k) for surface in surfaces if surface.law for k in range(surface.first, surface.last)]
-        surfaces = [replace(surface, number=number, first=k) for number, (surface, k) in enumerate(pieces)]
+        surfaces = [
+            replace(surface, number=number, first=k, begin=surface.first) for number, (surface, k) in enumerate(pieces)
+        ]
     return ThroughPoints(builder.path(owner), tuple(points), tuple(surfaces), builder.geodesic)
 
 
