@@ -31,7 +31,7 @@ from osimlite.simulation.kernels.geodesic_search import (
     start_after,
     to_ground,
 )
-from osimlite.simulation.kernels.geodesic_starts import ANY_SIDE, AS_MEANT, OTHER_WAY, SIDE, SURFACE, depth, start
+from osimlite.simulation.kernels.geodesic_starts import ANY_SIDE, AS_MEANT, PULLED, SIDE, SURFACE, depth, start
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
 from osimlite.simulation.kernels.path_wraps import in_surface
 from osimlite.simulation.kernels.paths import (
@@ -156,9 +156,9 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
         if not changed and turn != loose:
             break
         if turn >= loose and not smooth(chain, count, room):
-            # There need not be a geodesic on a side of an ellipsoid: there may be one on the other.
+            # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is.
             for k in range(1, count + 1):
-                poses[POSE_NUMBERS * int(chain[SLOT * k + OWNER]) + HOW] = OTHER_WAY
+                poses[POSE_NUMBERS * int(chain[SLOT * k + OWNER]) + HOW] = PULLED
             put(chain, SLOT, vector(chain, SLOT * (count + 1)))
             count = 0
     return count
@@ -211,7 +211,7 @@ def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room
     arc = 0.0
     for k in range(count + 1):
         first, second = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
-        turn, meets, along, length = start(p, first, second, pose[HOW])
+        turn, meets, along, length = start(p, first, second, pose[HOW], room)
         if turn > most:
             place, most, point, way, arc = k + 1, turn, meets, along, length
     if place == 0:

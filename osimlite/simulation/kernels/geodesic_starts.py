@@ -19,7 +19,17 @@ from __future__ import annotations
 
 from math import atan2, cos, inf, pi, sin, sqrt
 
-from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, KIND, RADIUS, SQUARE, TORUS, TUBE, WEIGHTS
+from osimlite.simulation.kernels.cable_surfaces import (
+    CYLINDER,
+    ELLIPSOID,
+    KIND,
+    RADIUS,
+    SQUARE,
+    TORUS,
+    TUBE,
+    WEIGHTS,
+    value,
+)
 from osimlite.simulation.kernels.closest_on_ellipsoid import closest_point
 from osimlite.simulation.kernels.pointers import Floats, at
 from osimlite.simulation.kernels.vectors import (
@@ -31,6 +41,8 @@ from osimlite.simulation.kernels.vectors import (
     elementwise,
     minus,
     norm,
+    plus,
+    put,
     replaced,
     times,
     unit,
@@ -45,26 +57,26 @@ Start = tuple[float, Vector, Vector, float]
 """The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
 surface; its direction there; its length on the surface, m."""
 
-AS_MEANT, ANY_SIDE, OTHER_WAY = 1.0, 2.0, -1.0
-"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; on the other
-side of an ellipsoid than is meant."""
+AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
+"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; around an
+ellipsoid where a string comes to lie."""
 
 LEAST = 1e-100
 """What is not divided by."""
 SAMPLES, STEPS = 16, 6
 """The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
-PIECES = 8
-"""By so many pieces a length on an ellipsoid is measured at first."""
+DEEP, BEADS, PULLS = 0.8, 16, 8
+"""From this angle (rad) on a string is pulled tight over an ellipsoid: of so many pieces, so often."""
 
 
-def start(p: Floats, first: Vector, second: Vector, how: float) -> Start:
+def start(p: Floats, first: Vector, second: Vector, how: float, room: Floats) -> Start:
     """Where a straight piece between two points begins to bend around what the numbers tell of."""
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == CYLINDER:
         return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, axis, 0.0 if how == ANY_SIDE else side)
     if surface[KIND] == TORUS:
         return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
-    return around_ellipsoid(surface, first, second, axis, side, how)
+    return around_ellipsoid(surface, first, second, axis, side, how, room)
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
@@ -106,7 +118,9 @@ def around_cylinder(radius: float, half_length: float, first: Vector, second: Ve
     return turn, (radius * nx, radius * ny, z), (-way * ny, way * nx, slope), radius * turn * sqrt(1.0 + slope * slope)
 
 
-def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: float, how: float) -> Start:
+def around_ellipsoid(
+    p: Floats, first: Vector, second: Vector, axis: int, side: float, how: float, room: Floats
+) -> Start:
     """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
 
     The circle is in the plane of the ends and the way from the middle of the chord straight out of the surface.
@@ -134,7 +148,30 @@ def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: 
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
-    normal = times(-1.0 if how == OTHER_WAY else 1.0, unit(cross(out, way)))
+    found = on_section(radii, one, two, cross(out, way), room)
+    turn, _, _, _ = found
+    if p[KIND] == ELLIPSOID and (how == PULLED or (turn > DEEP and dot(out, middle) > 0.0)):
+        found = shortened(p, turn, first, second, room)
+        if side == 0.0:
+            whole = string(room)
+            on_section(radii, one, two, cross(way, out), room)
+            other = shortened(p, turn, first, second, room)
+            if string(room) < whole:
+                found = other
+    return found
+
+
+def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Floats) -> Start:
+    """The start on a section of an ellipsoid, and beads along it.
+
+    Args:
+        radii: of the ellipsoid.
+        one: an end, so scaled that the surface is the unit sphere.
+        two: the other end, likewise.
+        across: normal to the plane of the section; the path turns to the left about it.
+        room: filled with the beads.
+    """
+    normal = unit(across)
     centre = times(dot(normal, one), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
     a1, a2 = touching(minus(one, centre), radius, normal, 1.0), touching(minus(two, centre), radius, normal, -1.0)
@@ -143,11 +180,51 @@ def around_ellipsoid(p: Floats, first: Vector, second: Vector, axis: int, side: 
     if turn < -1e-6:
         turn += 2.0 * pi
     length = 0.0
-    for k in range(PIECES):
-        angle = turn * (k + 0.5) / PIECES
-        length += norm(elementwise(radii, along(times(cos(angle), across), -sin(angle), a1)))
-    ways = elementwise(radii, across)
-    return turn, elementwise(radii, along(centre, 1.0, a1)), ways, turn / PIECES * length
+    for k in range(1, BEADS):
+        angle = turn * (k - 0.5) / (BEADS - 1)
+        c, s = cos(angle), sin(angle)
+        length += norm(elementwise(radii, along(times(c, across), -s, a1)))
+        put(room, 3 * k, elementwise(radii, along(along(centre, c, a1), s, across)))
+    return turn, elementwise(radii, along(centre, 1.0, a1)), elementwise(radii, across), turn / (BEADS - 1) * length
+
+
+def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Floats) -> Start:
+    """A start from a string of beads that is pulled tight over an ellipsoid, by few of them at first.
+
+    A section that turns far may be near no geodesic, or not near the shortest one.
+    """
+    put(room, 0, first)
+    put(room, 3 * BEADS, second)
+    stride = BEADS // 4
+    one, two = BEADS, 0
+    while stride > 0:
+        for pull in range(PULLS + 1):
+            # Those that are new come first.
+            for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
+                bead = times(0.5, plus(vector(room, 3 * (k - stride)), vector(room, 3 * (k + stride))))
+                if value(p, bead) > 0.0:
+                    for _ in range(2):
+                        out = elementwise(vector(p, WEIGHTS), bead)
+                        bead = along(bead, 0.5 * value(p, bead) / dot(out, out), out)
+                    if stride == 1 and pull == PULLS:
+                        one, two = min(one, k), k
+                put(room, 3 * k, bead)
+        stride //= 2
+    if two == 0:
+        return 0.0, first, second, 0.0
+    begin, end = vector(room, 3 * one - 3), vector(room, 3 * one)
+    length = 0.5 * (norm(minus(end, begin)) + norm(minus(vector(room, 3 * two + 3), vector(room, 3 * two))))
+    for k in range(one, two):
+        length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
+    return turn, times(0.5, plus(begin, end)), minus(end, begin), length
+
+
+def string(room: Floats) -> float:
+    """Length of the string of beads."""
+    length = 0.0
+    for k in range(BEADS):
+        length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
+    return length
 
 
 def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
