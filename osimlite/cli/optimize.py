@@ -63,6 +63,7 @@ def optimize(
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
     accuracy: options.Accuracy = None,
+    integrator: options.Integrator = "merson",
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
@@ -91,7 +92,8 @@ def optimize(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
+        accuracy=accuracy, report_interval=report_interval, integrator=integrator,
+        interpolation=interpolation, is_planted=planted,
         feet=tuple(foot) if foot else None, equilibrate=equilibrate, skip_unsupported=skip_unsupported,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:

@@ -43,6 +43,7 @@ def sweep(
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
     accuracy: options.Accuracy = None,
+    integrator: options.Integrator = "merson",
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
@@ -73,7 +74,8 @@ def sweep(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None, to=to,
-        engine=engine, accuracy=accuracy, report_interval=report_interval, interpolation=interpolation,
+        engine=engine, accuracy=accuracy, report_interval=report_interval, integrator=integrator,
+        interpolation=interpolation,
         is_planted=planted, feet=tuple(foot) if foot else None, equilibrate=equilibrate,
         skip_unsupported=skip_unsupported,
     )  # fmt: skip

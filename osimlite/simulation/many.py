@@ -22,6 +22,7 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.protocol import Engine
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
 from osimlite.simulation.runs import Floats, Ints, Runs, Watch
@@ -113,8 +114,14 @@ class BatchEngine(Engine, Protocol):
     def contact_radii(self, numbers: ArrayLike | None = None) -> Floats:
         """Radius of surface 2 of each contact for each row of numbers (v, P), m."""
 
-    def renewal(self, model: Model, folder: Path) -> Renewal:
-        """What makes parts of the model anew, which is that of the engine; `folder` is that of its file."""
+    def renewal(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> Renewal:
+        """What makes parts of the model anew, which is that of the engine.
+
+        Args:
+            model: of which numbers will be others.
+            folder: of its file.
+            wrapping: how its paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+        """
 
 
 class Renewed(Protocol):

@@ -18,8 +18,9 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell_doubt
 from osimlite.schema.model import Model
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines import engine_name
-from osimlite.simulation.integrators import DEFAULT_ACCURACY
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
 from osimlite.simulation.start import in_units_of, suspect_value
 from osimlite.sweep.controls import Control, check_nodes, controller_of
 from osimlite.sweep.measures import is_expression, measure_name
@@ -63,6 +64,7 @@ class Plan:
         to: how long a run lasts, s.
         engine: that computes it, by name.
         accuracy: of the integrator.
+        integrator: see :class:`osimlite.simulation.Options`; so too `wrapping`.
         stops: what ends a run before.
         is_planted: whether the walker is put on the ground with the deeper foot, at rest there, before each run.
         feet: contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out.
@@ -80,6 +82,8 @@ class Plan:
     to: float = 2.0
     engine: str = "compiled"
     accuracy: float = DEFAULT_ACCURACY
+    integrator: str = MERSON
+    wrapping: str = OPENSIM
     stops: tuple[Stop, ...] = ()
     is_planted: bool = False
     feet: tuple[str, ...] | None = None
@@ -156,7 +160,11 @@ class Plan:
             "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
             **({"equilibrate": True} if self.equilibrate else {}),
-            **({"interpolation": self.interpolation} if self.interpolation != "linear" else {}),
+            **{
+                name: getattr(self, name)
+                for name, usual in (("interpolation", "linear"), ("integrator", MERSON), ("wrapping", OPENSIM))
+                if getattr(self, name) != usual
+            },
             "skip_unsupported": self.skip_unsupported,
         }
 
@@ -206,6 +214,7 @@ def plan(
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
     if made.accuracy >= 1.0:
         raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
+    check_integrator(made.integrator)
     targets = {place: item.target for place, item in enumerate(found)}
     nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
     check_nodes(nodes, made.interpolation, made.to)

@@ -190,6 +190,7 @@ class Runner:
             self.plan.to,
             numbers=self._numbers(variants),
             accuracy=self.plan.accuracy,
+            integrator=self.plan.integrator,
             report_times=self._report_times.tolist(),
             watches=look.watches,
             most_events=look.most_events,
@@ -243,6 +244,7 @@ class Runner:
                 trajectory = simulation.run(
                     plan.to,
                     accuracy=plan.accuracy,
+                    integrator=plan.integrator,
                     report_interval=plan.interval or plan.to,
                     initial={infos[k].path: row[k] for k in may} | auxiliary,
                     initial_speeds={infos[k].path: row[count + k] for k in may},

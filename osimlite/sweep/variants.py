@@ -270,7 +270,13 @@ class Variants:
 
     def _whole(self) -> Variant:
         plan = self._plan
-        simulation = Simulation(self.model, plan.engine, skip_unsupported=plan.skip_unsupported, folder=plan.folder)
+        simulation = Simulation(
+            self.model,
+            plan.engine,
+            skip_unsupported=plan.skip_unsupported,
+            wrapping=plan.wrapping,
+            folder=plan.folder,
+        )
         engine: Any = simulation.engine
         infos = engine.mechanism.coordinates
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
@@ -283,7 +289,7 @@ class Variants:
             return self._whole()
         given = self.given
         if self._renewal is None:
-            self._renewal = given.engine.renewal(self.model, Path(self._plan.folder or "."))
+            self._renewal = given.engine.renewal(self.model, Path(self._plan.folder or "."), self._plan.wrapping)
         made = self._renewal.renewed(self._owners)
         if made is None:
             return self._whole()

@@ -15,6 +15,7 @@ from osimlite.errors import OsimliteError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines import many
 from osimlite.simulation.engines.base import KernelEngine
 from osimlite.simulation.engines.linking import version
@@ -69,8 +70,8 @@ class CompiledEngine(KernelEngine):
         """Radii of the second surfaces of all contacts, m."""
         return many.contact_radii(self, numbers)
 
-    def renewal(self, model: Model, folder: Path) -> NumbersOnly:
+    def renewal(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> NumbersOnly:
         """What makes parts of the model anew."""
         from osimlite.simulation.engines.renewal import NumbersOnly
 
-        return NumbersOnly(model, self, folder)
+        return NumbersOnly(model, self, folder, wrapping)

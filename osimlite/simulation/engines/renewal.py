@@ -51,14 +51,15 @@ class NumbersOnly:
         model: of which nothing else changes.
         engine: of the same model before.
         folder: of its file.
+        wrapping: how its paths bend around surfaces.
     """
 
-    def __init__(self, model: Model, engine: CompiledEngine, folder: Path) -> None:
+    def __init__(self, model: Model, engine: CompiledEngine, folder: Path, wrapping: str) -> None:
         self._model, self._engine = model, engine
         self._mechanism: Mechanism = engine.mechanism
         self._forces: Forces = engine.forces
         self._components = model.tree().by_path
-        self._builder = ElementBuilder(model, engine.mechanism, folder)
+        self._builder = ElementBuilder(model, engine.mechanism, folder, wrapping=wrapping)
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
