@@ -22,6 +22,7 @@ def measured(model, *measures, vary=None, row=(0.31,), **choices):
 def test_they_are_of_the_columns_of_a_simulation():
     model = pulled()
     model.add(ActuatorPowerProbe(name="power", actuator_names=("mu",)))
+    model.add(ActuatorPowerProbe(name="work", actuator_names=("all",), probe_operation="integrate", gain=2.0))
     names = {
         "x": lambda run: run.values[:, 0],
         "/jointset/slide/x/value": lambda run: run.values[:, 0],
@@ -30,6 +31,7 @@ def test_they_are_of_the_columns_of_a_simulation():
         "/forceset/mu/activation": lambda run: run.auxiliary["/forceset/mu/activation"],
         "mu": lambda run: run.forces["mu"],
         "power_mu": lambda run: run.probes["power_mu"],
+        "work_mu": lambda run: run.probes["work_mu"],
         "mu/control": lambda run: np.full(len(run.times), 0.3),
         "time": lambda run: run.times,
     }

@@ -96,7 +96,8 @@ class NumbersOnly:
         if not made.keys() <= self._items.keys():
             return None
         only_forces = all(isinstance(owner, Force | Controller) for owner in owners)
-        if any(isinstance(element, DeclaredProbe) for element in self._forces.elements):
+        has_probes = any(isinstance(element, DeclaredProbe) for element in self._forces.elements)
+        if has_probes and not all(isinstance(owner, Controller) for owner in owners):
             if not only_forces:
                 # The mass of the model has a say in what muscles use.
                 return None
