@@ -41,7 +41,7 @@ def measured(model: Model) -> Measures:
     return Measures(
         1 + sum(len(sweep.poses) for sweep in looked_at),
         [*wrappings(model, paths, start, looked_at)],
-        [jump for sweep in looked_at for jump in jumps(sweep)],
+        [*jumps(paths, looked_at)],
         [*_on_surfaces(paths, start, looked_at)],
         [*moving_points(paths)],
         starts,

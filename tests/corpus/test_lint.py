@@ -56,7 +56,8 @@ REASONS = {
 def test_no_error_without_proof(corpus_model: CorpusModel) -> None:
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
-    report = validate(corpus_model.path)
+    # The errors among the rules about what is measured are proved in tests/oracle/test_lint_measures.py.
+    report = validate(corpus_model.path, ignore="OSIM63")
     assert {finding.code for finding in report.errors} == PROVED.get(corpus_model.id, set()), str(report)
 
 
@@ -65,7 +66,7 @@ def test_what_opensim_refuses_is_explained_in_its_line(corpus_model: CorpusModel
         pytest.skip("OpenSim loads this file")
     code, text, words = REASONS[corpus_model.id]
     lines = corpus_model.path.read_text("utf-8", "replace").splitlines() or [""]
-    errors = [finding for finding in validate(corpus_model.path).errors if finding.code == code]
+    errors = validate(corpus_model.path, select=code).errors
     assert any(
         words in finding.message and finding.line is not None and text in lines[finding.line - 1] for finding in errors
     ), "\n".join(map(str, errors))

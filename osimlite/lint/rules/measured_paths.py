@@ -6,7 +6,7 @@ from math import degrees
 
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.measures import MEASURES, Jump, MovingPoint, measures_of
+from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.text import listed
@@ -106,7 +106,7 @@ def wrong_wrapping(subject: Subject, found: Found) -> None:
             )
 
 
-JUMP = Threshold("path-jump", 0.001, "m", "so far may a path jump; less than 0.0005 is not looked for")
+JUMP = Threshold("path-jump", 0.001, "m", "so far may a path jump; less than 0.001 is not looked for")
 
 
 @rule("OSIM632", "path-jump", severity=WARNING, thresholds=(JUMP,), about=MEASURES)
@@ -163,12 +163,9 @@ def path_jump(subject: Subject, found: Found) -> None:
     </PathSpring>
     ```
     """
-    least = subject.config.value_of(JUMP)
-    greatest: dict[str, Jump] = {}
     for jump in measures_of(subject).jumps:
-        if jump.size >= max(least, greatest[jump.owner].size if jump.owner in greatest else 0.0):
-            greatest[jump.owner] = jump
-    for jump in greatest.values():
+        if jump.size < subject.config.value_of(JUMP):
+            continue
         owner = subject.tree.at(jump.owner)
         parts = listed([f"'{part}'" for part in jump.parts])
         why = f"{parts} {'come or go' if len(jump.parts) > 1 else 'comes or goes'}" if parts else "its way changes"

@@ -1,0 +1,87 @@
+"""What is measured of paths and muscles: when, how it is told that it could not be, and who does without."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from osimlite.document.source import Source
+from osimlite.lint import Config, measures, validate
+from osimlite.lint.many import check_files
+from osimlite.lint.reporters import render
+
+JUMPING = "fail-02-two-coordinates.osim"
+
+
+@pytest.fixture
+def jumping(fixtures: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "m.osim"
+    path.write_bytes((fixtures / "lint" / "OSIM632" / JUMPING).read_bytes())
+    (tmp_path / "osimlite.toml").write_text("")
+    return path
+
+
+@pytest.fixture
+def without_numba(monkeypatch):
+    monkeypatch.setattr(measures, "_missing", lambda: ["numba"])
+
+
+def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
+    script = (
+        "import sys; from osimlite.lint import validate; assert not validate(sys.argv[1]).unmeasured;"
+        "print([name for name in ('numpy', 'osimlite.simulation') if name in sys.modules])"
+    )
+    command = [sys.executable, "-c", script, str(fixtures / "lint" / "skeleton.osim")]
+    assert subprocess.run(command, check=True, capture_output=True, text=True).stdout == "[]\n"
+
+
+def test_what_is_missing_is_told_in_one_line_and_is_no_finding(jumping, without_numba):
+    report = validate(jumping)
+    assert not report.findings
+    (why,) = report.unmeasured
+    assert why == f"{jumping}: that needs numba; run: pip install 'osimlite[sim]'"
+    for name in ("full", "concise"):
+        assert render(report, name, width=200).endswith(f"Paths and muscles (OSIM63) were not measured: {why}.\n")
+    assert not validate(jumping, ignore="OSIM63").unmeasured
+
+
+def test_the_cache_tells_it_again_and_measures_once_it_can(jumping, monkeypatch):
+    with monkeypatch.context() as context:
+        context.setattr(measures, "_missing", lambda: ["numba"])
+        reports = [check_files([str(jumping)], Config()) for _ in range(2)]
+    assert all(len(report.unmeasured) == 1 and not report.findings for report in reports)
+    assert check_files([str(jumping)], Config()).codes == {"OSIM632": 2}
+
+
+def test_a_comment_is_not_called_unused_where_nobody_measured(jumping, without_numba):
+    jumping.write_text("<!-- osimlite: ignore OSIM632 OSIM505 -->\n" + jumping.read_text().partition("\n")[2])
+    (finding,) = validate(jumping).findings
+    assert finding.code == "OSIM010" and "'OSIM505'" in finding.message
+
+
+def test_a_model_that_cannot_be_computed_is_named_with_the_reason(fixtures):
+    text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text().replace("<PinJoint", "<ScrewJoint", 1)
+    report = validate(Source(text.replace("</PinJoint>", "</ScrewJoint>", 1).encode(), "m.osim"))
+    assert set(report.codes) >= {"OSIM102"} and not any(code.startswith("OSIM63") for code in report.codes)
+    (why,) = report.unmeasured
+    assert why.startswith("m.osim: ") and "ScrewJoint" in why
+
+
+def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
+    text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text()
+    (one, two) = validate(Source(text.encode())).findings
+    # It comes in at 0.2 and goes at 1.
+    assert "jumps by 18 mm at 'hip_flexion' = 11.46 deg, where 'b' comes or goes" in one.message
+    assert "jumps by 98.7 mm at 'knee_angle' = -57.3 deg" in two.message
+
+
+def test_the_language_server_does_not_measure(jumping):
+    pytest.importorskip("pygls")
+    from osimlite.lsp.analysis import Analysis
+    from osimlite.lsp.text import Text
+
+    report = Analysis(Text(jumping.read_text()), str(jumping)).report
+    assert not report.findings and not report.unmeasured
