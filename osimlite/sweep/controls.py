@@ -101,7 +101,9 @@ def nodes_of(name: str) -> list[str]:
     Raises:
         SettingError: the times are not written so.
     """
-    front, _, word = name.partition("@")
+    front, at, word = name.partition("@")
+    if at and not word:
+        _time(name, word)
     if ":" in word:
         first, _, rest = word.partition(":")
         last, _, number = rest.partition(":")
@@ -144,7 +146,7 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         return
     for actuator, parts in _by_actuator(controls, NODE).items():
         times = [time for time, _ in parts]
-        if len(times) < FEWEST_OF_CUBIC or times[0] > 0.0 or times[-1] < to:
+        if len(times) < FEWEST_OF_CUBIC or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
                 f"a cubic needs {FEWEST_OF_CUBIC} nodes or more, the first at 0 and the last at the end of the runs, "
                 f"{to:g} s; those of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
@@ -162,9 +164,7 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
         SettingError: there is no such actuator, or a control is something else.
     """
     actuators = {key: item.path for item in model.components(Actuator) for key in (item.name, item.path)}
-    made = PrescribedController(
-        name="given_controls", socket_actuators=tuple(actuators.get(key, key) for key in controls)
-    )
+    made = _controller(model, "given", [actuators.get(key, key) for key in controls])
     for name, given in controls.items():
         if name not in actuators:
             raise SettingError(f"the model has no actuator '{name}' to control{did_you_mean(name, actuators)}")
@@ -177,6 +177,13 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
         else:
             raise SettingError(f"the control of '{name}' is {given!r}; a sweep takes numbers and tables")
     return made
+
+
+def _controller(model: Model, kind: str, actuators: Sequence[str]) -> PrescribedController:
+    """One without functions, and with a name of its own: a model that a search has written has others of the kind."""
+    taken = {item.name for item in model.components(Controller)}
+    name = next(name for number in count(1) if (name := f"{kind}_{number}") not in taken)
+    return PrescribedController(name=name, socket_actuators=tuple(actuators))
 
 
 def _around(times: Values) -> tuple[float, ...]:
@@ -206,10 +213,7 @@ class VariedControls:
             self._scale(model, actuator, place)
         for kind in (OFFSET, NODE, SWITCH):
             if parts := _by_actuator(controls, kind):
-                # A model that a search has written has such controllers.
-                taken = {item.name for item in model.components(Controller)}
-                name = next(name for k in count(1) if (name := f"{kind}_{k}") not in taken)
-                made = PrescribedController(name=name, socket_actuators=tuple(parts))
+                made = _controller(model, kind, list(parts))
                 made.ControlFunctions.objects += [self._function(kind, own, interpolation) for own in parts.values()]
                 self.controllers.append(model.add(made))
 

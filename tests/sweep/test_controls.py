@@ -140,13 +140,13 @@ def test_files_of_other_controllers_are_read_once(tmp_path):
 
 def test_the_model_that_is_written_does_what_was_found(tmp_path):
     vary = {"m*/control@0:0.03:3": (0.0, 1.0), "motor/control@switch1": (0.0, TO), "mu/control@scale": (0.5, 2.0)}
-    made = plan(pulled(), vary, to=TO, accuracy=1e-7)
+    made = plan(pulled(), vary, to=TO, accuracy=1e-7, controls={"motor": 0.1})
     found = optimize(made, Objective("end(x)"), tmp_path, budget=12, popsize=6)
     assert list(found.values)[:3] == ["m*/control@0", "m*/control@0.015", "m*/control@0.03"]
     best = osimlite.read(found.model)
     assert ends(best)[0] == pytest.approx(found.value, rel=1e-12)
     # It can be varied again.
-    Variants(plan(best, vary))
+    Variants(plan(best, vary, controls={"motor": 0.1}))
 
 
 def test_the_results_are_the_same_for_any_number_of_workers(tmp_path):
@@ -176,6 +176,7 @@ def test_names():
     [
         ("mu/control@soon", "is a time in s, 'switch1', 'switch2' ... or 'scale', not 'soon'"),
         ("mu/control@-1", "is a time in s"),
+        ("mu/control@", "is a time in s"),
         ("mu/control@0:1", "@FIRST:LAST:COUNT, with a count of two or more"),
         ("mo/control@0.1", "did you mean 'mu/control'"),
         ("mu,mo/control", "there is no coordinate, parameter, control or number 'mu,mo/control'"),
