@@ -1,4 +1,4 @@
-"""Names that a package offers and imports when they are first used, so that importing the package costs nothing."""
+"""What is imported when it is first used, so that importing the package costs nothing."""
 
 from __future__ import annotations
 
@@ -21,3 +21,17 @@ def imported_when_used(package: str, modules: Mapping[str, str]) -> Callable[[st
         return getattr(import_module(modules[name]), name)
 
     return get
+
+
+def shown_in_notebooks(by: str) -> Callable[[Any], str | None]:
+    """What a class takes as its ``_repr_html_``, by which Jupyter shows objects of it.
+
+    Args:
+        by: name of the function in :mod:`osimlite.view.notebook` that says it in HTML.
+    """
+
+    def _repr_html_(self: Any) -> str | None:
+        said: str | None = getattr(import_module("osimlite.view.notebook"), by)(self)
+        return said
+
+    return _repr_html_

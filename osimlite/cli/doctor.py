@@ -39,6 +39,8 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "osimlite.mjcf, translate --check": ("mujoco", "numpy"),
     "models as YAML": ("pyyaml",),
     "trajectory.to_frame()": ("pandas",),
+    "trajectory.to_arrow()": ("pyarrow",),
+    "trajectory.to_xarray()": ("xarray", "pandas"),
     "sweep": ("numpy", "pyarrow", "filelock"),
     "optimize": ("numpy", "pyarrow", "filelock", "cma"),
     "the language server for editors": ("pygls",),

@@ -183,8 +183,7 @@ def _document(
 ) -> Document:
     reader = ObjectReader(_included_by(source))
     top = _top_in(source, root if upgraded is None else upgraded.root, reader, of)
-    if version != CURRENT_VERSION:
-        layout_of(top).version = version
+    layout_of(top).version, layout_of(top).file = version, source.file
     notes = reader.notes
     if upgraded is not None:
         notes = _renumber(source, top, notes, upgraded)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from osimlite._lazy import shown_in_notebooks
 from osimlite.text import visible
 
 
@@ -115,6 +116,8 @@ class Report:
     checked: int = 1
     known: int = 0
     unmeasured: list[str] = field(default_factory=list)
+
+    _repr_html_ = shown_in_notebooks("findings")
 
     @property
     def errors(self) -> list[Finding]:

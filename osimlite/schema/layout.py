@@ -18,7 +18,8 @@ class Layout:
     `comments` stand before the object itself. `before` holds, per tag, the comments and unknown elements that stood
     before that property (key None: at the end). `raw` keeps, per field, text that reads only partly, together with
     the value it was read as: while the value is unchanged the text is written back. `attributes` are unknown ones,
-    `after` is what followed the last member of a list, `version` the version of a whole document,
+    `after` is what followed the last member of a list, `version` the version of a whole document and `file` where
+    that was read from,
     `prolog` and `epilog` the comments before and behind its root element. `defaults` is the ``<defaults>`` block of a
     document; `inherited` names the fields whose value an object took from it. `include` is there if the object was
     read from a file of its own.
@@ -30,6 +31,7 @@ class Layout:
     attributes: dict[str, str] = field(default_factory=dict)
     after: list[Remark] = field(default_factory=list)
     version: int | None = None
+    file: str | None = None
     prolog: list[str] = field(default_factory=list)
     epilog: list[str] = field(default_factory=list)
     defaults: list[Object] = field(default_factory=list)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, overload
 
+from osimlite._lazy import shown_in_notebooks
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, ModelComponent, made
 from osimlite.schema.constraints import ConstraintSet
@@ -73,6 +74,8 @@ class Model(ModelComponent):
         ModelVisualPreferences, name="modelvisualpreferences"
     )
     """What a viewer should show of the model."""
+
+    _repr_html_ = shown_in_notebooks("model")
 
     @property
     def document_version(self) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite._lazy import shown_in_notebooks
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.kinematics import Kinematics, kinematics
@@ -65,6 +66,8 @@ class Paths:
         routes: what each runs through, in terms of the mechanism, by these names.
         mechanism: of the model.
     """
+
+    _repr_html_ = shown_in_notebooks("paths")
 
     def __init__(self, model: Model, wrapping: str = OPENSIM) -> None:
         self.mechanism = build_mechanism(model)

@@ -88,6 +88,7 @@ class Simulation:
     Errors are those of :func:`simulate`.
 
     Attributes:
+        model: what moves.
         options: that were chosen.
         constraints: names of what the coordinates of the state must fulfil.
         paths: of all states, in the order of OpenSim.
@@ -95,6 +96,7 @@ class Simulation:
 
     def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
         self.options = chosen = Options.of(choices)
+        self.model = model
         # Only Bullet has a window.
         make = engine_factory("bullet" if chosen.show and engine == AUTO else engine)
         self.mechanism: Mechanism = build_mechanism(
@@ -314,9 +316,8 @@ class Simulation:
             summary,
         )
         values, speeds = self.state.histories(states)
-        return Trajectory(
-            self.mechanism, times, values, speeds, report, self.state.auxiliary_histories(states), self.paths
-        )
+        auxiliary = self.state.auxiliary_histories(states)
+        return Trajectory(self.mechanism, times, values, speeds, report, auxiliary, self.paths, self.model)
 
 
 @QUIET

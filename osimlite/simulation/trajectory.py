@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite._lazy import shown_in_notebooks
 from osimlite._require import require
 from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import sto_text
 
 
@@ -33,7 +35,10 @@ class Trajectory:
         auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
             a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it.
         paths: of all states, in the order of OpenSim: ".../value" and ".../speed" of the coordinates, and `auxiliary`.
+        model: what was simulated, if that is known: notebooks show it.
     """
+
+    _repr_html_ = shown_in_notebooks("trajectory")
 
     def __init__(
         self,
@@ -44,9 +49,10 @@ class Trajectory:
         report: Report,
         auxiliary: Mapping[str, ArrayLike] = MappingProxyType({}),
         paths: Sequence[str] = (),
+        model: Model | None = None,
     ) -> None:
         count = len(mechanism.coordinates)
-        self.mechanism = mechanism
+        self.mechanism, self.model = mechanism, model
         self.times: Array = np.array(times, dtype=float)
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
@@ -120,22 +126,54 @@ class Trajectory:
         """
         write_atomically(path, self.states_text())
 
-    def to_frame(self) -> Any:
-        """All values, speeds and forces as a pandas DataFrame over time (s); units are SI and radians.
+    @property
+    def columns(self) -> dict[str, Array]:
+        """All values, speeds, states, forces and probes (n,), in SI units and radians.
 
-        Columns are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces` and `probes`.
+        They are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces` and `probes`.
+        """
+        columns: dict[str, Array] = {}
+        for place, name in enumerate(self.coordinates):
+            columns[name] = self.values[:, place]
+            columns[f"{name}/speed"] = self.speeds[:, place]
+        return {**columns, **self.auxiliary, **self.forces, **self.probes}
+
+    def to_frame(self) -> Any:
+        """The `columns` as a pandas DataFrame over time (s).
 
         Raises:
             MissingDependency: pandas is not installed.
         """
         pandas = require("pandas", extra="frame", purpose="a data frame")
-        columns: dict[str, Array] = {}
-        for place, name in enumerate(self.coordinates):
-            columns[name] = self.values[:, place]
-            columns[f"{name}/speed"] = self.speeds[:, place]
-        return pandas.DataFrame(
-            {**columns, **self.auxiliary, **self.forces, **self.probes}, index=pandas.Index(self.times, name="time")
-        )
+        return pandas.DataFrame(self.columns, index=pandas.Index(self.times, name="time"))
+
+    def to_arrow(self) -> Any:
+        """The `columns`, after ``time`` (s), as a pyarrow Table, which Polars, DuckDB and Parquet take as it is.
+
+        Raises:
+            MissingDependency: pyarrow is not installed.
+        """
+        return require("pyarrow", extra="frame", purpose="an Arrow table").table({"time": self.times, **self.columns})
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset over ``time`` (s), in SI units and radians.
+
+        ``value`` and ``speed`` are also over ``coordinate``. ``state``, ``force``, ``probe`` and ``energy`` hold
+        `auxiliary`, `forces`, `probes` and `energy`, over ``state_name`` and so on; without any, they are left out.
+
+        Raises:
+            MissingDependency: xarray is not installed.
+        """
+        xarray = require("xarray", extra="frame", purpose="a data set of xarray")
+        groups = {"state": self.auxiliary, "force": self.forces, "probe": self.probes, "energy": self.energy}
+        data: dict[str, Any] = {"value": (("time", "coordinate"), self.values)}
+        data["speed"] = ("time", "coordinate"), self.speeds
+        coords: dict[str, Any] = {"time": self.times, "coordinate": list(self.coordinates)}
+        for name, columns in groups.items():
+            if columns:
+                coords[f"{name}_name"] = list(columns)
+                data[name] = ("time", f"{name}_name"), np.column_stack(list(columns.values()))
+        return xarray.Dataset(data, coords, {"model": self.mechanism.name})
 
     def states_text(self) -> str:
         """The text of states.sto: all states, in the order of `paths`."""

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite._lazy import shown_in_notebooks
 from osimlite._require import require
 from osimlite.document.printer import write
 from osimlite.errors import OsimliteError, SettingError, SimulationError
@@ -19,7 +20,7 @@ from osimlite.files import folder_to_fill, write_atomically
 from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import KEY, Partial, damage_told, partial_of, refuse_overwrite, schema, spare
+from osimlite.sweep.results import KEY, Partial, ResultTable, damage_told, partial_of, refuse_overwrite, schema, spare
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
 from osimlite.sweep.search import BudgetExhausted, Search, method_named
@@ -54,8 +55,8 @@ class Objective:
 
 
 @dataclass(frozen=True)
-class Optimum:
-    """The best that was found.
+class Optimum(ResultTable):
+    """The best that was found; as a table, all evaluations.
 
     Attributes:
         value: of the objective.
@@ -74,6 +75,11 @@ class Optimum:
     ended: str
     model: Path
     history: Path
+
+    _repr_html_ = shown_in_notebooks("optimum")
+
+    def _results(self) -> Path:
+        return self.history
 
 
 def optimize(

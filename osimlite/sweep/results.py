@@ -336,6 +336,34 @@ def _batches(path: Path, take: Callable[[Any], object]) -> int:
     return end
 
 
+class ResultTable:
+    """What tells of results in a Parquet file, one row for each run; all of them are read at once."""
+
+    def _results(self) -> Path:
+        raise NotImplementedError
+
+    def to_arrow(self) -> Any:
+        """The rows as a pyarrow Table.
+
+        Raises:
+            OsimliteError: the file is damaged.
+        """
+        pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
+        with damage_told(self._results()), open(self._results(), "rb") as stream:
+            return pq.read_table(stream)
+
+    def to_frame(self) -> Any:
+        """The rows as a pandas DataFrame; OsimliteError as of :meth:`to_arrow`, MissingDependency without pandas."""
+        require("pandas", extra="frame", purpose="a data frame")
+        table = self.to_arrow()
+        return table.to_pandas().set_index(table.column_names[0])
+
+    def to_xarray(self) -> Any:
+        """The rows as an xarray Dataset over their number; errors as of :meth:`to_frame`."""
+        require("xarray", extra="frame", purpose="a data set of xarray")
+        return self.to_frame().to_xarray()
+
+
 @contextmanager
 def damage_told(path: str | Path) -> Iterator[None]:
     """An error that names the file, where Parquet is read that is damaged."""

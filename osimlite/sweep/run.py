@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from osimlite._lazy import shown_in_notebooks
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
-from osimlite.sweep.results import Partial, partial_of, schema, spare
+from osimlite.sweep.results import Partial, ResultTable, partial_of, schema, spare
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
 
@@ -47,7 +48,7 @@ def interrupted(partial: Partial, runs: str) -> Interrupted:
 
 
 @dataclass
-class Outcome:
+class Outcome(ResultTable):
     """What a sweep did.
 
     Attributes:
@@ -65,6 +66,11 @@ class Outcome:
     status: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
+
+    _repr_html_ = shown_in_notebooks("runs")
+
+    def _results(self) -> Path:
+        return self.path
 
 
 def settings(plan: Plan, samples: Samples) -> dict[str, Any]:

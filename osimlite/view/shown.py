@@ -95,9 +95,13 @@ class Shown:
         q = mechanism.assemble(values or {})
         return cls(model, scene, q, motion, findings, tuple(remarks))
 
+    def page_text(self) -> str:
+        """One self-contained page (HTML)."""
+        return page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q))
+
     def write_page(self, path: str | Path) -> Path:
         """Write one self-contained page (HTML)."""
-        write_atomically(path, page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q)))
+        write_atomically(path, self.page_text())
         return Path(path)
 
     def write_glb(self, path: str | Path) -> Path:

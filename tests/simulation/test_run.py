@@ -377,6 +377,21 @@ def test_frame_says_what_to_install(walker):
         assert frame["RFootForce.RightShank.force.Y"].iloc[0] > 300.0
 
 
+def test_arrow_and_xarray_hold_what_the_trajectory_does(walker):
+    for package in ("pyarrow", "xarray"):
+        pytest.importorskip(package, reason=f"needs {package} (extra 'frame')")
+    trajectory = osimlite.simulate(walker, to=0.02)
+    table, data = trajectory.to_arrow(), trajectory.to_xarray()
+    assert table.column_names == ["time", *trajectory.columns]
+    assert np.array_equal(table["RHip_rz"].to_numpy(), trajectory.values[:, 4])
+    assert np.array_equal(data.speed.sel(coordinate="RHip_rz"), trajectory.speeds[:, 4])
+    label = "RFootForce.RightShank.force.Y"
+    assert np.array_equal(data.force.sel(force_name=label), trajectory.forces[label])
+    assert np.array_equal(data.energy.sel(energy_name="total"), trajectory.energy["total"])
+    # The walker has no muscles and no probes.
+    assert {*data.data_vars} == {"value", "speed", "force", "energy"}
+
+
 def test_a_model_without_coordinates_stands_still():
     model = Model(name="block")
     model.add(WeldJoint(name="w").between(model.ground, model.add(Body(name="b", mass=1.0))))

@@ -40,7 +40,7 @@ def chromium() -> Iterator[Any]:
 class Page:
     """A page of the viewer in the browser; `errors` holds what it complained of."""
 
-    def __init__(self, browser: Any, url: str, *, offline: bool) -> None:
+    def __init__(self, browser: Any, url: str, *, offline: bool, waits: bool) -> None:
         self.context = browser.new_context(viewport={"width": 1000, "height": 700}, offline=offline)
         self.page = self.context.new_page()
         self.errors: list[str] = []
@@ -49,7 +49,8 @@ class Page:
         self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(url)
-        self.until("v && v.stage.frames_drawn > 0")
+        if waits:
+            self.until("v && v.stage.frames_drawn > 0")
 
     def run(self, code: str, argument: Any = None) -> Any:
         """The value of an expression, in which `v` is the viewer and `x` the argument."""
@@ -65,12 +66,12 @@ class Page:
 
 @pytest.fixture
 def open_page(chromium: Any) -> Iterator[Any]:
-    """Open a file or an address; a file is opened without a network."""
+    """Open a file or an address, and wait until the model is drawn; a file is opened without a network."""
     pages: list[Page] = []
 
-    def opened(where: Path | str) -> Page:
+    def opened(where: Path | str, *, waits: bool = True) -> Page:
         url = where if isinstance(where, str) else where.resolve().as_uri()
-        pages.append(Page(chromium, url, offline=not isinstance(where, str)))
+        pages.append(Page(chromium, url, offline=not isinstance(where, str), waits=waits))
         return pages[-1]
 
     yield opened

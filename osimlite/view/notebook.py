@@ -1,0 +1,161 @@
+"""What Jupyter shows of models, motions, findings, paths and sweeps: HTML, with the page of the viewer inside.
+
+The page stands in an ``<iframe>`` whose text is all there: it asks no network for anything, has no more rights than to
+run its own program, and so works in the sandboxed frames of VS Code and Colab as well. A class says which of these
+functions shows its objects, see :func:`osimlite._lazy.shown_in_notebooks`.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Iterable, Sequence
+from html import escape
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from osimlite.errors import OsimliteError
+from osimlite.text import counted
+
+if TYPE_CHECKING:
+    from osimlite.lint.diagnostic import Report
+    from osimlite.schema.base import Component
+    from osimlite.schema.model import Model
+    from osimlite.simulation.paths import Paths
+    from osimlite.simulation.trajectory import Trajectory
+    from osimlite.sweep.optimize import Optimum
+    from osimlite.sweep.run import Outcome
+
+MOST_ROWS, MOST_COMPONENTS, MOST_BYTES = 200, 3000, 12_000_000
+"""What a notebook is burdened with at most: rows of a table, components of a tree, characters of a page."""
+
+FIRST_ROWS = 10
+"""Rows of results that are shown."""
+
+HEIGHT = 460
+"""Of the page, pixels."""
+
+COLORS = {"error": "#d1242f", "warning": "#b97700", "info": "#5d6b7a"}
+
+_UNPACK = """<!doctype html><meta charset="utf-8"><script>
+new Response(new Blob([Uint8Array.from(atob("@PAGE@"), (c) => c.charCodeAt(0))]).stream()
+  .pipeThrough(new DecompressionStream("gzip"))).text()
+  .then((text) => { document.open(); document.write(text); document.close(); });
+</script>"""
+
+
+def model(item: Model) -> str:
+    """The component tree, and the model in space."""
+    tree = item.tree()
+    own = [component for component in tree.components if not tree.is_internal(component)]
+    below: dict[int, list[Component]] = {}
+    for component in own[1:MOST_COMPONENTS]:
+        below.setdefault(id(tree.parent_of(component)), []).append(component)
+
+    def branch(component: Component) -> str:
+        words = f"{escape(component.name)} <i>{escape(type(component).tag)}</i>"
+        parts = below.get(id(component), [])
+        if not parts:
+            return f"<div style='margin-left:1.1em'>{words}</div>"
+        inner = "".join(map(branch, parts))
+        return f"<details style='margin-left:1.1em'><summary>{words} ({len(parts)})</summary>{inner}</details>"
+
+    head = f"<b>{escape(item.name) or 'a model'}</b>: {counted(len(own), 'component')}"
+    inner = "".join(map(branch, below.get(id(item), [])))
+    return f"<details><summary>{head}</summary>{inner}{_left(len(own), MOST_COMPONENTS)}</details>{_space(item)}"
+
+
+def trajectory(item: Trajectory) -> str:
+    """What it is in a line, and the motion, to be played."""
+    return f"<div>{escape(repr(item))}</div>" + ("" if item.model is None else _space(item.model, item))
+
+
+def findings(item: Report) -> str:
+    """A table of the findings, the worst first."""
+    rows = sorted(item.findings, key=lambda finding: finding.severity.rank)
+    parts = ("error", item.errors), ("warning", item.warnings), ("remark", item.infos)
+    counts = ", ".join(counted(len(part), kind) for kind, part in parts)
+    cells = (
+        [
+            f"<b style='color:{COLORS[finding.severity]}'>{finding.severity}</b>",
+            f"<span title='{escape(finding.name)}'>{finding.code}</span>",
+            escape(finding.place),
+            escape(finding.message),
+            escape(finding.suggestion or ""),
+        ]
+        for finding in rows
+    )
+    words = f"<div>{counts} in {counted(item.checked, 'file')}</div>"
+    return words + (_table(("", "code", "place", "message", "suggestion"), cells, len(rows)) if rows else "")
+
+
+def paths(item: Paths) -> str:
+    """Length and moment arms of each path in the default pose."""
+    lengths, arms = item.lengths({}), item.moment_arms({})
+    cells = (
+        [
+            escape(name),
+            f"{lengths[name]:.5g}",
+            ", ".join(f"{escape(path.rpartition('/')[2])} {arm:.4g}" for path, arm in arms[name].items()),
+        ]
+        for name in item.names
+    )
+    return "<div>in the default pose</div>" + _table(("path", "length (m)", "moment arms (m)"), cells, len(lengths))
+
+
+def runs(item: Outcome) -> str:
+    """The first rows of a sweep."""
+    table = item.to_arrow()
+    rows = table.slice(0, FIRST_ROWS).to_pylist()
+    cells = ([_number(value) for value in row.values()] for row in rows)
+    words = f"<div>{counted(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
+    return words + _table(table.column_names, cells, table.num_rows, FIRST_ROWS)
+
+
+def optimum(item: Optimum) -> str:
+    """The best that a search has found."""
+    words = f"{_number(item.value)} in evaluation {item.evaluation} of {item.evaluations} ({escape(item.ended)})"
+    cells = ([escape(name), _number(value)] for name, value in item.values.items())
+    return f"<div>best: {words}</div>" + _table(("variable", "value"), cells, len(item.values))
+
+
+def _space(item: Model, motion: Trajectory | None = None) -> str:
+    """The page of the viewer, or why there is none."""
+    from osimlite.view.shown import Shown
+
+    file = None if item.layout is None else item.layout.file
+    folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
+    try:
+        shown = Shown.of(item, None if motion is None else motion.mechanism, folders, motion=motion)
+        packed = base64.b64encode(gzip.compress(shown.page_text().encode(), 6, mtime=0)).decode()
+    except OsimliteError as error:
+        return f"<div>no picture: {escape(error.message)}</div>"
+    if len(packed) > MOST_BYTES:
+        return (
+            f"<div>a page of {len(packed) / 1e6:.0f} MB is too large for a notebook; write it to a file: "
+            "<code>osimlite.view.Shown.of(model, motion=trajectory).write_page('page.html')</code></div>"
+        )
+    remarks = "".join(f"<div>{escape(remark)}</div>" for remark in shown.remarks)
+    return (
+        f"<iframe srcdoc='{escape(_UNPACK.replace('@PAGE@', packed))}' sandbox='allow-scripts' loading='lazy' "
+        f"style='width:100%;height:{HEIGHT}px;border:1px solid #d9dfe6;border-radius:6px'></iframe>{remarks}"
+    )
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, most: int = MOST_ROWS) -> str:
+    """A table of cells in HTML, of which the first rows are shown."""
+
+    def line(tag: str, cells: Sequence[str]) -> str:
+        return "<tr>" + "".join(f"<{tag} style='text-align:left'>{cell}</{tag}>" for cell in cells) + "</tr>"
+
+    body = "".join(line("td", row) for row in islice(rows, most))
+    return f"<table><thead>{line('th', headings)}</thead><tbody>{body}</tbody></table>{_left(count, most)}"
+
+
+def _left(count: int, most: int) -> str:
+    return f"<div>… and {count - most} more</div>" if count > most else ""
+
+
+def _number(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else escape("" if value is None else str(value))
