@@ -23,15 +23,15 @@ def imported_when_used(package: str, modules: Mapping[str, str]) -> Callable[[st
     return get
 
 
-def shown_in_notebooks(by: str) -> Callable[[Any], str | None]:
+def shown_in_notebooks(by: str) -> Callable[[Any], str]:
     """What a class takes as its ``_repr_html_``, by which Jupyter shows objects of it.
 
     Args:
         by: name of the function in :mod:`osimlite.view.notebook` that says it in HTML.
     """
 
-    def _repr_html_(self: Any) -> str | None:
-        said: str | None = getattr(import_module("osimlite.view.notebook"), by)(self)
+    def _repr_html_(self: Any) -> str:
+        said: str = getattr(import_module("osimlite.view.notebook"), by)(self)
         return said
 
     return _repr_html_
