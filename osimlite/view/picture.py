@@ -231,7 +231,7 @@ class _Heap:
         if lit:
             # Normals follow the cofactors, which also serve what is stretched or flat.
             turn = matrix[:3, :3]
-            cofactors = np.array([np.cross(turn[1], turn[2]), np.cross(turn[2], turn[0]), np.cross(turn[0], turn[1])])
+            cofactors = np.cross(turn[[1, 2, 0]], turn[[2, 0, 1]])
             normals = surfaces.normals_of(surface) @ cofactors.T @ self._axes.T
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
