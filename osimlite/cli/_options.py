@@ -45,6 +45,10 @@ Integrator = Annotated[
         "motion at loose accuracy."
     ),
 ]
+Wrapping = Annotated[
+    str,
+    typer.Option(help="How paths bend around surfaces: 'opensim', as there; 'geodesic', smoothly, the shortest way."),
+]
 SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
 ExternalLoads = Annotated[
     Path | None,

@@ -34,6 +34,7 @@ def view(
             show_default="computed, if the motion has speeds",
         ),
     ] = None,
+    wrapping: options.Wrapping = "opensim",
     geometry: options.Geometry = None,
     page: Annotated[
         Path | None,
@@ -58,6 +59,10 @@ def view(
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
 
+    Muscles bend around their wrap surfaces in every pose. Where the motion has activations, as a file of states, they
+    are blue at rest and red when active. A click on one shows its length and moment arms over each coordinate that it
+    crosses.
+
     Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb or --screenshot it writes
     files instead.
 
@@ -72,7 +77,9 @@ def view(
     mechanism = build_mechanism(model)
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
     folders = options.mesh_folders(file, geometry)
-    shown = Shown.of(model, mechanism, folders, file=file, motion=motion, forces=forces, values=given)
+    shown = Shown.of(
+        model, mechanism, folders, file=file, motion=motion, forces=forces, values=given, wrapping=wrapping
+    )
     for remark in shown.remarks:
         say(remark)
     if page is not None:

@@ -25,7 +25,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.paths import GeometryPath
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.gather import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.paths import geometry_path
 from osimlite.view import surfaces
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
@@ -51,21 +51,27 @@ _ENDLESS = 1.0
 _MARKER_RADIUS = 0.008
 
 
-def build_scene(model: Model, mechanism: Mechanism, folders: MeshFolders | None = None) -> Scene:
+def build_scene(
+    model: Model, mechanism: Mechanism, folders: MeshFolders | None = None, wrapping: str = OPENSIM
+) -> Scene:
     """Everything that can be drawn of a model; what cannot is a remark.
 
     Args:
         model: what to draw.
         mechanism: of the same model.
         folders: where its mesh files may be.
+        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+
+    Raises:
+        SettingError: there is no such wrapping.
     """
-    return _Collector(model, mechanism, folders or MeshFolders()).scene()
+    return _Collector(model, mechanism, folders or MeshFolders(), wrapping).scene()
 
 
 class _Collector:
-    def __init__(self, model: Model, mechanism: Mechanism, folders: MeshFolders) -> None:
+    def __init__(self, model: Model, mechanism: Mechanism, folders: MeshFolders, wrapping: str) -> None:
         self.model, self.mechanism, self.folders = model, mechanism, folders
-        self.builder = ElementBuilder(model, mechanism, Path())
+        self.builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
         self.tree = self.builder.tree
         self.surfaces: list[Surface] = []
         self.places: dict[int, int] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import json
 import math
@@ -22,17 +21,14 @@ from osimlite.multibody.motions import AxisMotion
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.paths import pull_path
-from osimlite.simulation.kernels.table import law_function
-from osimlite.simulation.polylines import Polylines
 from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
-from osimlite.view.javascript import as_javascript
 from osimlite.view.motion import Motion, activity, in_mechanism_order
 from osimlite.view.pushes import Pushes
+from osimlite.view.routes import kernels_text, routes_data, text_of
 from osimlite.view.scene import LAYERS, Scene
+from osimlite.view.surfaces import normals_of
 
 SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "curves.js", "viewer.js")
 """The parts of the page's own program, in their order."""
@@ -54,7 +50,7 @@ def page_text(data: Mapping[str, Any]) -> str:
         "@TITLE@": html.escape(str(data["name"]) or "osimlite"),
         "@STYLE@": read("page.css"),
         "@LIBRARY@": read("three.js"),
-        "@SCRIPT@": "".join((_kernels(data["routes"]), *map(read, SCRIPTS))),
+        "@SCRIPT@": "".join((kernels_text(data["routes"]), *map(read, SCRIPTS))),
         "@DATA@": words,
     }
     text = read("page.html")
@@ -158,7 +154,7 @@ def _drawn(scene: Scene) -> dict[str, Any]:
             }
             for line in scene.lines
         ],
-        "routes": _routes(scene.polylines),
+        "routes": routes_data(scene.polylines),
         "axes": [
             {"path": axes.path, "body": axes.body, "matrix": _rows(axes.matrix), "length": axes.length}
             for axes in scene.axes
@@ -166,44 +162,12 @@ def _drawn(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _routes(paths: Polylines) -> dict[str, Any] | None:
-    """The paths as the kernels take them, and what the page must know of their layout."""
-    if not paths.items:
-        return None
-    return {
-        "structure": _base64(paths.structure.astype("<i4")),
-        "numbers": _base64(paths.numbers.astype("<f8")),
-        "laws": paths.laws[1:],
-        "items": paths.items,
-        "traces": paths.traces,
-        "room": paths.room,
-        "work": paths.work,
-        "layout": {
-            "link": layout.LINK_WORK,
-            "position": layout.POSITION,
-            "wrench": layout.WRENCH,
-            "law": layout.LAW,
-            "record": layout.RECORD,
-        },
-    }
-
-
-def _kernels(routes: Mapping[str, Any] | None) -> str:
-    """What the page computes paths with."""
-    if routes is None:
-        return "window.osimlite = {};\n"
-    kernels = as_javascript([law_function(name) for name in routes["laws"]], [pull_path])
-    return f"window.osimlite = {{ kernels: {kernels} }};\n"
-
-
 def _surface(surface: Surface) -> dict[str, str]:
-    from osimlite.view.surfaces import normals_of
-
     normals = np.rint(127.0 * np.clip(normals_of(surface), -1.0, 1.0)).astype(np.int8)
     return {
-        "points": _base64(surface.points.astype("<f4")),
-        "normals": _base64(normals),
-        "triangles": _base64(surface.triangles.astype("<u4")),
+        "points": text_of(surface.points.astype("<f4")),
+        "normals": text_of(normals),
+        "triangles": text_of(surface.triangles.astype("<u4")),
     }
 
 
@@ -276,17 +240,17 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
                 "surface": push.on.surface,
                 "body": push.on.body,
                 "near": push.on.near.tolist(),
-                "values": _base64(np.hstack((push.forces, torques)).astype("<f4")),
+                "values": text_of(np.hstack((push.forces, torques)).astype("<f4")),
             }
         )
     return {
-        "times": _base64(times.astype("<f8")),
-        "values": _base64(values.astype("<f8")),
+        "times": text_of(times.astype("<f8")),
+        "values": text_of(values.astype("<f8")),
         "ends": np.column_stack((values.min(axis=0), values.max(axis=0))).tolist(),
         "travels": bool(np.linalg.norm(last - first) > TRAVELS * np.linalg.norm(high - low)),
         "forces": forces,
         "activations": {
-            path: _base64(np.rint(255.0 * level).astype(np.uint8)) for path, level in activity(scene, motion).items()
+            path: text_of(np.rint(255.0 * level).astype(np.uint8)) for path, level in activity(scene, motion).items()
         },
     }
 
@@ -316,7 +280,3 @@ def _rows(matrix: Array) -> list[float]:
     """The upper three rows of a matrix (4, 4), one after the other."""
     rows: list[float] = matrix[:3].ravel().tolist()
     return rows
-
-
-def _base64(array: Any) -> str:
-    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -17,6 +17,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.text import listed
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
@@ -63,6 +64,7 @@ class Shown:
         motion: Motion | Path | None = None,
         forces: Path | None = None,
         values: Mapping[str, float] | None = None,
+        wrapping: str = OPENSIM,
     ) -> Shown:
         """Make a model ready.
 
@@ -74,13 +76,15 @@ class Shown:
             motion: how it moves, or the file (.sto, .mot) that says so.
             forces: a file with contact forces, for a motion from a file.
             values: of coordinates by name (rad, m); over a motion from a file they stay so.
+            wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
 
         Raises:
             OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
+            SettingError: there is no such wrapping.
         """
         mechanism = build_mechanism(model) if mechanism is None else mechanism
         places = MeshFolders(None if file is None else file.parent, folders)
-        scene = build_scene(model, mechanism, places)
+        scene = build_scene(model, mechanism, places, wrapping)
         config = Config(mesh_paths=tuple(str(folder.resolve()) for folder in places.searched))
         findings = validate(model if file is None else file, config=config).findings
         remarks = []

@@ -8,14 +8,9 @@ from __future__ import annotations
 
 from math import cos, isnan, nan, pi, sin, sqrt
 
-from osimlite.simulation.kernels.cable_paths import GEODESIC
-from osimlite.simulation.kernels.cable_surfaces import ALONG_BENDS, END, POINT, START, STEP, shoot
-from osimlite.simulation.kernels.geodesic_paths import CHAIN, PLACES, POSE_NUMBERS, POSES, SEARCH
-from osimlite.simulation.kernels.geodesic_starts import SURFACE
 from osimlite.simulation.kernels.layout import NUMBERS, RECORD
-from osimlite.simulation.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground, in_surface
-from osimlite.simulation.kernels.paths import ALONG, COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
-from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
+from osimlite.simulation.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground
+from osimlite.simulation.kernels.paths import COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.vectors import (
     Vector,
@@ -25,7 +20,6 @@ from osimlite.simulation.kernels.vectors import (
     elementwise,
     put,
     times,
-    turned_back,
     unit,
     vector,
 )
@@ -59,39 +53,6 @@ def trace_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
             surface = item - own[WRAP_INTS * wrap + BACK]
             count += call(own[WRAP_INTS * wraps + wrap], s, x, w, y, at(f, 3 * count), surface)
-    return count
-
-
-def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
-    """The same of a path that runs along geodesics: each is shot anew, in the direction of the line before it."""
-    i, p, found = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
-    points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
-    order, work = at(found, ORDER), at(found, ORDER + points + 2 * i[WRAPS])
-    slots = at(wraps, WRAP_INTS * i[WRAPS])
-    geodesic, room = at(found, slots[CHAIN] + GEODESIC), at(found, slots[SEARCH])
-    geodesic[STEP] = 0.0
-    count = 0
-    for k in range(int(found[COUNT])):
-        number = int(order[k])
-        here = at(work, NODE_WORK * number)
-        put(f, 3 * count, vector(here, PLACE))
-        count += 1
-        wrap = (number - points) // 2
-        if number >= points and number == points + 2 * wrap:
-            surface, pose = (
-                at(p, wraps[WRAP_INTS * wrap + PLACES] + SURFACE),
-                at(found, slots[POSES] + POSE_NUMBERS * wrap),
-            )
-            point = in_surface(pose, vector(here, PLACE))
-            way = turned_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
-            length = here[NODE_WORK + SURFACE_LENGTH]
-            if dot(way, way) > 0.0 and shoot(surface, point, way, length, geodesic, room):
-                bends = max(abs(geodesic[START + ALONG_BENDS]), abs(geodesic[END + ALONG_BENDS]))
-                parts = pieces(bends * length)
-                for part in range(1, parts):
-                    shoot(surface, point, way, length * part / parts, geodesic, room)
-                    put(f, 3 * count, in_ground(pose, vector(geodesic, END + POINT)))
-                    count += 1
     return count
 
 

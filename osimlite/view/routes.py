@@ -1,0 +1,50 @@
+"""Paths for the page: their layout as data, and the kernels that compute them as JavaScript."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.paths import pull_path
+from osimlite.simulation.kernels.table import law_function
+from osimlite.simulation.polylines import Polylines
+from osimlite.view.javascript import as_javascript
+
+
+def routes_data(paths: Polylines) -> dict[str, Any] | None:
+    """The paths as the kernels take them, and what the page must know of their layout."""
+    if not paths.items:
+        return None
+    return {
+        "structure": text_of(paths.structure.astype("<i4")),
+        "numbers": text_of(paths.numbers.astype("<f8")),
+        "laws": paths.laws[1:],
+        "items": paths.items,
+        "traces": paths.traces,
+        "room": paths.room,
+        "work": paths.work,
+        "layout": {
+            "link": layout.LINK_WORK,
+            "position": layout.POSITION,
+            "wrench": layout.WRENCH,
+            "law": layout.LAW,
+            "record": layout.RECORD,
+        },
+    }
+
+
+def kernels_text(routes: Mapping[str, Any] | None) -> str:
+    """What the page computes paths with."""
+    if routes is None:
+        return "window.osimlite = {};\n"
+    kernels = as_javascript([law_function(name) for name in routes["laws"]], [pull_path])
+    return f"window.osimlite = {{ kernels: {kernels} }};\n"
+
+
+def text_of(array: Any) -> str:
+    """The numbers of an array as text (base64), in their order."""
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
