@@ -103,10 +103,9 @@ class ModelControls:
     """
 
     def __init__(self, builder: ElementBuilder) -> None:
-        actuators = [item for item in builder.tree.components if isinstance(item, Actuator)]
         names: list[str] = []
         self._first: dict[str, int] = {}
-        for actuator in actuators:
+        for actuator in builder.components(Actuator):
             path, count = builder.path(actuator), actuator.control_count
             self._first[path] = len(names)
             names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
@@ -155,8 +154,8 @@ def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
     """
     from osimlite.simulation.elements.gather import module_name
 
-    for controller in builder.tree.components:
-        if isinstance(controller, Unknown) or not isinstance(controller, Controller):
+    for controller in builder.components(Controller):
+        if isinstance(controller, Unknown):
             continue
         # OpenSim 4.6 enables a ControlSetController that has read its file.
         if not (controller.enabled or isinstance(controller, ControlSetController)):
@@ -183,7 +182,6 @@ def named(builder: ElementBuilder, controller: Controller) -> list[Any]:
 def actuators_by_name(builder: ElementBuilder) -> dict[str, Actuator]:
     """The first actuator of each name."""
     found: dict[str, Actuator] = {}
-    for component in builder.tree.components:
-        if isinstance(component, Actuator):
-            found.setdefault(component.name, component)
+    for component in builder.components(Actuator):
+        found.setdefault(component.name, component)
     return found

@@ -8,7 +8,7 @@ from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from re import sub
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from osimlite.meshes.folders import MeshFolders
     from osimlite.simulation.elements.items import ForceElement
 
+C = TypeVar("C")
 Triple = tuple[float, float, float]
 
 WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
@@ -143,6 +144,7 @@ class ElementBuilder:
         self.tree = model.tree()
         self.mechanism = mechanism
         self.folder = folder
+        self._of: dict[type, list[Any]] = {}
         self.drives: dict[str, list[Drive]] = {}
         self.early_return, self.own_times, self.geodesic = early_return, own_times, wrapping == GEODESIC
 
@@ -152,6 +154,12 @@ class ElementBuilder:
         from osimlite.meshes.folders import MeshFolders
 
         return MeshFolders(self.folder)
+
+    def components(self, kind: type[C]) -> list[C]:
+        """The components of a class, in the order of the model."""
+        if kind not in self._of:
+            self._of[kind] = [item for item in self.tree.components if isinstance(item, kind)]
+        return self._of[kind]
 
     def forces(self) -> Iterator[Any]:
         """Yield everything that applies a force, known or not, or has states that go with one."""

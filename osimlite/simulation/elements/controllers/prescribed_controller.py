@@ -46,7 +46,7 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
     """
     path = builder.path(controller)
     actuators = actuators_by_name(builder)
-    actuators |= {builder.path(item): item for item in builder.tree.components if isinstance(item, Actuator)}
+    actuators |= {builder.path(item): item for item in builder.components(Actuator)}
     table = read_controls(beside(builder.folder, str(controller.controls_file)))
     known = {word if isinstance(word, str) else builder.path(word) for word in controller.socket_actuators}
     if builder.model.document_version < LISTS_OF_PATHS:
