@@ -22,7 +22,6 @@ from rich.console import Console
 import osimlite
 from _corpus import CORPUS
 from _pair import pair, report
-from osimlite.schema.muscles import Muscle
 from osimlite.sweep.plan import plan
 from osimlite.sweep.run import sweep
 from osimlite.sweep.runner import Runner
@@ -36,9 +35,7 @@ TO, NODES, RUNS, ROUNDS, HEIGHT = 0.5, 6, 100, 3, "end(center_of_mass_Y)"
 
 def main() -> None:
     model = osimlite.read(MODEL)
-    names = dict.fromkeys(muscle.name.rpartition("_")[0] for muscle in model.components(Muscle))
-    vary = {f"{name}_?/control@0:{TO:g}:{NODES}": "0.01:1" for name in names}
-    made = plan(model, vary, measures=(HEIGHT,), to=TO, equilibrate=True)
+    made = plan(model, {f"{{*}}_?/control@0:{TO:g}:{NODES}": "0.01:1"}, measures=(HEIGHT,), to=TO, equilibrate=True)
     chosen = samples(made.variables, "sobol", RUNS)
     rows, variants = chosen.block(0, RUNS), Variants(made)
     variants.put(rows[0].tolist())

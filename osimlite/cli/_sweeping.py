@@ -21,7 +21,8 @@ Vary = Annotated[
         help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
         "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor of it), or parameter of "
         "the model function. MUSCLE/control@0:0.5:6 are six nodes of a control over time, @switch1 is a time at which "
-        "it is switched. Names may have * and ?, and be several with commas: they vary as one.",
+        "it is switched. Names may have * and ?, and be several with commas: they vary as one; what is "
+        "in {} makes a variable for each text that it stands for.",
         show_default=False,
     ),
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -9,6 +10,7 @@ from typing import TypeVar
 
 from osimlite.errors import SettingError
 from osimlite.multibody.parts import CoordinateInfo
+from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value
 from osimlite.schema.model import Model
@@ -99,6 +101,27 @@ def named(pattern: str, components: Iterable[N]) -> list[N]:
             return []
         found |= {id(item): item for item in own}
     return [item for item in known if id(item) in found]
+
+
+def each(name: str, model: Model) -> list[str]:
+    """A name for each different text that stands for what is in braces in the name or path of a component.
+
+    ``{*}_?/control`` is ``soleus_?/control``, ``vasti_?/control`` and so on.
+    """
+    head, brace, rest = name.partition("{")
+    if not brace:
+        return [name]
+    inner, _, tail = rest.partition("}")
+    end = re.split("[/@]", tail)[0]
+    form = re.compile(f"{_regular(head)}({_regular(inner)}){_regular(end)}")
+    components = model.components(Actuator if re.match("/control(@|$)", tail[len(end) :]) else Component)
+    known = (item.path if head.startswith("/") else item.name for item in components)
+    return [f"{head}{text}{tail}" for text in dict.fromkeys(found[1] for found in map(form.fullmatch, known) if found)]
+
+
+def _regular(pattern: str) -> str:
+    """A part of a name as a regular expression."""
+    return "".join({"*": "[^/]*", "?": "[^/]", "[": "[", "]": "]"}.get(letter, re.escape(letter)) for letter in pattern)
 
 
 def _is_meant(pattern: str, name: str) -> bool:

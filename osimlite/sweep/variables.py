@@ -7,6 +7,7 @@
 ``/forceset/*Foot*/.../stiffness``      several numbers that are the same in each run
 ``*/max_isometric_force@scale``         factor of numbers of the model
 ``BRA/control``                         control of an actuator at all times, added to what the model does
+``{*}_?/control``                       the same of each muscle, that of both legs alike
 ``soleus_?/control@0.1``                and what else can be varied of :mod:`controls <osimlite.sweep.controls>`
 ``thigh_length``                        parameter of the function that makes the model
 ``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
@@ -33,7 +34,7 @@ from osimlite.schema.actuators import Actuator
 from osimlite.schema.model import Model
 from osimlite.simulation.start import suspect_value
 from osimlite.sweep.controls import SCALE, Control, control, nodes_of
-from osimlite.sweep.properties import Place, named, places, spellings
+from osimlite.sweep.properties import Place, each, named, places, spellings
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
@@ -173,13 +174,21 @@ def variables(
     Raises:
         SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
     """
-    found = []
-    for name, given in [(name, given) for names, given in ranges.items() for name in nodes_of(names)]:
-        target, unit = _target(name, model, mechanism, parameters)
-        made = _variable(name, target, unit, given)
-        if isinstance(target, Start) and not target.is_speed:
-            made = replace(made, doubt=_doubt(made, given, mechanism))
-        found.append(made)
+    found: list[Variable] = []
+    for names, given in ranges.items():
+        known = [
+            (name, _target(name, model, mechanism, parameters))
+            for word in each(names, model)
+            for name in nodes_of(word)
+        ]
+        for name, meaning in known:
+            if meaning is not None:
+                made = _variable(name, *meaning, given)
+                if isinstance(made.target, Start) and not made.target.is_speed:
+                    made = replace(made, doubt=_doubt(made, given, mechanism))
+                found.append(made)
+        if all(meaning is None for _, meaning in known):
+            raise _unknown(names, model, mechanism, parameters)
     taken: dict[object, str] = {}
     for item in found:
         for part in getattr(item.target, "parts", (item.target,)):
@@ -203,8 +212,8 @@ def refuse_counts(found: Sequence[Variable]) -> None:
             )
 
 
-def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> tuple[Target, str]:
-    """What a name means, and in what unit."""
+def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> tuple[Target, str] | None:
+    """What a name means, and in what unit; None if nothing."""
     front, _, last = name.rpartition("/")
     for key, is_speed in ((name, False), (front, last == "speed")):
         if (key == name or last in ("value", "speed")) and (meant := named(key, mechanism.coordinates)):
@@ -224,17 +233,20 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         return Property(found, bool(word)), "" if word else unit
     if name == "slope":
         return Slope(), "rad"
+    return None
+
+
+def _unknown(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> SettingError:
+    """The error for a name that means nothing."""
+    route = name.partition("@")[0]
     if named(route, model.components(Actuator)):
-        raise SettingError(
-            f"'{name}' is an actuator: vary its control, as '{route}/control', or a property by its path"
-        )
+        return SettingError(f"'{name}' is an actuator: vary '{route}/control', or one of its properties")
     known = [f"{info.name}{what}" for info in mechanism.coordinates for what in ("", "/speed")] + [*parameters, "slope"]
     known += [f"{info.path}{what}" for info in mechanism.coordinates for what in ("", "/speed")]
     known += [f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)]
     known += spellings(model) if "/" in name else []
-    raise SettingError(
-        f"there is no coordinate, parameter, control or number '{name}' to vary{did_you_mean(name, known)}"
-    )
+    near = did_you_mean(name, known)
+    return SettingError(f"there is no coordinate, parameter, control or number '{name}' to vary{near}")
 
 
 def _coordinates(name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model) -> tuple[Target, str]:

@@ -168,6 +168,9 @@ def test_names():
     assert targets("/forceset/*/control@0.5") == [Control((mu, motor), "node", 0.5)]
     assert targets("mu/control@0:0.5:2") == [Control((mu,), "node", 0.0), Control((mu,), "node", 0.5)]
     assert targets("mu/control@switch2") == [Control((mu,), "switch", 2.0)]
+    assert targets("{m*}/control@1") == [Control((mu,), "node", 1.0), Control((motor,), "node", 1.0)]
+    assert targets("/forceset/m{?}/control") == [Control((mu,))]
+    assert [len(target.places) for target in targets("{*}/max_control@scale")] == [1, 1]
     assert targets("mu/control@scale") == [Control((mu,), "scale")]
 
 
@@ -179,8 +182,9 @@ def test_names():
         ("mu/control@", "is a time in s"),
         ("mu/control@0:1", "@FIRST:LAST:COUNT, with a count of two or more"),
         ("mo/control@0.1", "did you mean 'mu/control'"),
+        ("{n*}/control", r"control or number '\{n\*\}/control' to vary"),
         ("mu,mo/control", "there is no coordinate, parameter, control or number 'mu,mo/control'"),
-        ("mu@0.1", "'mu@0.1' is an actuator: vary its control, as 'mu/control'"),
+        ("mu@0.1", "'mu@0.1' is an actuator: vary 'mu/control'"),
         ("mu/max_isometric_forc", "did you mean 'mu/max_isometric_force'"),
     ],
 )

@@ -48,7 +48,7 @@ def test_controls():
     for name in ("motor/control", "/forceset/motor/control"):
         (found,) = variables({name: "-1:1"}, model, build_mechanism(model))
         assert found.target == Control(("/forceset/motor",))
-    with pytest.raises(SettingError, match="'motor' is an actuator: vary its control, as 'motor/control', or"):
+    with pytest.raises(SettingError, match="'motor' is an actuator: vary 'motor/control', or"):
         variables({"motor": "0:1"}, model, build_mechanism(model), {})
     with pytest.raises(SettingError, match="did you mean 'motor/control'"):
         variables({"moter/control": "0:1"}, model, build_mechanism(model))
