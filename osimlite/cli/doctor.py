@@ -35,6 +35,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "simulate --plot": ("numpy", "matplotlib"),
     "gait --basin": ("numpy", "matplotlib"),
     "view --screenshot": ("numpy", "pillow"),
+    "view --rerun": ("numpy", "rerun-sdk"),
     "simulate --animate": ("numpy", "pillow"),
     "osimlite.mjcf, translate --check": ("mujoco", "numpy"),
     "models as YAML": ("pyyaml",),
@@ -48,7 +49,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
 }
 """The packages that a command, or an option of it, cannot do without, but for those of the plain installation."""
 
-EXTRAS = ("", "sim", "bullet", "view", "plot", "sweep", "optimize", "lsp", "mujoco", "yaml", "frame", "oracle")
+EXTRAS = ("", "sim", "bullet", "view", "plot", "sweep", "optimize", "rerun", "lsp", "mujoco", "yaml", "frame", "oracle")
 """The plain installation and what is added to it; `all` and `dev` gather these, `fast` is an older name of `sim`."""
 
 MESHES = (".vtp", ".stl", ".obj")

@@ -46,6 +46,10 @@ def view(
         Path | None,
         typer.Option(metavar="FILE", help="Write a file for Blender, slides and web pages (glTF).", show_default=False),
     ] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd).", show_default=False),
+    ] = None,
     screenshot: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write a picture (.png); needs no display.", show_default=False),
@@ -63,8 +67,8 @@ def view(
     are blue at rest and red when active. A click on one shows its length and moment arms over each coordinate that it
     crosses.
 
-    Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb or --screenshot it writes
-    files instead.
+    Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb, --rerun or --screenshot it
+    writes files instead.
 
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
@@ -86,9 +90,11 @@ def view(
         say(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
     if glb is not None:
         say(f"wrote {shown.write_glb(glb)} ({glb.stat().st_size / 1e6:.1f} MB)")
+    if rerun is not None:
+        say(f"wrote {shown.write_rrd(rerun)} ({rerun.stat().st_size / 1e6:.1f} MB); look at it with: rerun {rerun}")
     if screenshot is not None:
         say(f"wrote {shown.write_picture(screenshot, SIZE, at)}")
-    if page is None and glb is None and screenshot is None:
+    if page is None and glb is None and rerun is None and screenshot is None:
         _serve(shown, port, browser=browser)
 
 

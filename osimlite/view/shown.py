@@ -26,6 +26,7 @@ from osimlite.view.page import page_data, page_text
 from osimlite.view.picture import Arrow, Camera, Style, draw
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.recording import Recording, read_recording
+from osimlite.view.rrd import write_rrd
 from osimlite.view.scene import Color, Scene
 from osimlite.view.server import PageServer
 
@@ -111,6 +112,10 @@ class Shown:
     def write_glb(self, path: str | Path) -> Path:
         """Write a file of glTF 2.0 (.glb), with the motion if there is one."""
         return write_glb(self.scene, self.q, self.motion, path)
+
+    def write_rrd(self, path: str | Path) -> Path:
+        """Write a recording for Rerun (.rrd), with the motion if there is one; MissingDependency without rerun-sdk."""
+        return write_rrd(self.scene, self.q, self.motion, path)
 
     def server(self, port: int = 0) -> PageServer:
         """Serve the page at a port of this machine; 0 takes any that is free."""

@@ -48,7 +48,7 @@ def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
     assert not any("optimize" in uses for uses in found.values())
 
 
-MODULES = {"pillow": "PIL", "pyyaml": "yaml"}
+MODULES = {"pillow": "PIL", "pyyaml": "yaml", "rerun-sdk": "rerun"}
 """What is imported of a package, where that is not its name."""
 
 EXAMPLES = {

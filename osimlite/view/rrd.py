@@ -1,0 +1,104 @@
+"""A model, and how it moves, as a recording for Rerun (.rrd): bodies, meshes, paths, contact forces, and their curves.
+
+Bodies are entities below ``model``, named by their component paths, with their shapes below them; lines and forces are
+in ground beside them. Everything is over the timeline ``time``, s. Curves are below ``coordinates`` (rad or m),
+``activations`` and ``forces`` (N).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.files import write_atomically
+from osimlite.multibody.spatial import Array
+from osimlite.view.motion import Motion, activity, activity_color, in_mechanism_order
+from osimlite.view.picture import FORCE
+from osimlite.view.pushes import LONGEST_ARROW, Pushes
+from osimlite.view.scene import Color, Scene
+
+
+def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -> Path:
+    """Write what is shown of a model.
+
+    Args:
+        scene: what there is to see.
+        q: coordinate values (n,), the pose of a model without motion.
+        motion: how it moves, or None.
+        path: the file to write.
+
+    Raises:
+        MissingDependency: rerun-sdk is not installed.
+        OsimliteError: the file cannot be written.
+    """
+    rr: Any = require("rerun", extra="rerun", purpose="a recording for Rerun")
+    times, rows = np.zeros(1), q[None, :]
+    if motion is not None:
+        times = np.asarray(motion.times, dtype=float)
+        rows = in_mechanism_order(motion, scene.mechanism, np.asarray(motion.values, dtype=float))
+    poses = [scene.at(row) for row in rows]
+    recording = rr.RecordingStream(scene.mechanism.name or "osimlite")
+    stream = recording.binary_stream()
+
+    def entity(*parts: str) -> str:
+        return str(rr.new_entity_path([word for part in parts for word in part.split("/") if word]))
+
+    def still(name: str, *what: Any) -> None:
+        recording.log(name, *what, static=True)
+
+    def moving(name: str, columns: Any) -> None:
+        recording.send_columns(name, [rr.TimeColumn("time", duration=times)], columns)
+
+    def strength(name: str, scalars: Array) -> None:
+        moving(name, rr.Scalars.columns(scalars=scalars))
+
+    axis = int(np.argmax(np.abs(scene.up)))
+    upright = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if scene.up[axis] > 0.0 else 'DOWN'}"
+    still("model", getattr(rr.ViewCoordinates, upright))
+    bodies = [entity("model", path) for path in (*(body.path for body in scene.mechanism.bodies), "ground")]
+    for k, name in enumerate(bodies):
+        rotations, origins = [pose.rotations[k] for pose in poses], [pose.origins[k] for pose in poses]
+        moving(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
+    for item in scene.drawn():
+        surface = scene.surfaces[item.surface]
+        points, corners, color = surface.points, surface.triangles, _rgba(item.color, item.opacity)
+        shape = rr.Mesh3D(vertex_positions=points, triangle_indices=corners, albedo_factor=color)
+        placed = rr.Transform3D(translation=item.matrix[:3, 3], mat3x3=item.matrix[:3, :3])
+        still(bodies[item.body] + entity(item.path), placed, shape)
+
+    levels = {} if motion is None else activity(scene, motion)
+    for place, line in enumerate(scene.lines):
+        if line.visible and line.layer in scene.shown:
+            name, strips = entity("model", line.layer, line.path), [pose.lines[place] for pose in poses]
+            still(name, rr.LineStrips3D.from_fields(radii=line.radius))
+            level = levels.get(line.path)
+            colors = [line.color] * len(poses) if level is None else map(activity_color, level)
+            moving(name, rr.LineStrips3D.columns(strips=strips, colors=list(map(_rgba, colors))))
+    if motion is not None:
+        for path_of, level in levels.items():
+            strength(entity("activations", path_of), level)
+        for info, column in zip(scene.mechanism.coordinates, rows.T, strict=True):
+            strength(entity("coordinates", info.name), column)
+        pushes = Pushes.of(scene, motion, times)
+        low, high = scene.box(rows[0])
+        size = float(np.linalg.norm(high - low))
+        scale = LONGEST_ARROW * size / max(pushes.largest, 1e-300)
+        for push in pushes.pushes:
+            name = entity("forces", push.on.path, push.on.labels[0])
+            starts = [push.point(number, pose) for number, pose in enumerate(poses)]
+            still(f"/model{name}", rr.Arrows3D.from_fields(radii=0.006 * size, colors=_rgba(FORCE)))
+            moving(f"/model{name}", rr.Arrows3D.columns(vectors=scale * push.forces, origins=starts))
+            strength(name, np.linalg.norm(push.forces, axis=1))
+    layout = require("rerun.blueprint", extra="rerun", purpose="a recording for Rerun")
+    curves = [layout.TimeSeriesView(origin=kind, name=kind) for kind in ("coordinates", "activations", "forces")]
+    space = layout.Spatial3DView(origin="model", name=scene.mechanism.name)
+    recording.send_blueprint(layout.Horizontal(space, layout.Vertical(*curves), column_shares=[2, 1]))
+    write_atomically(path, stream.read())
+    return Path(path)
+
+
+def _rgba(color: Color, opacity: float = 1.0) -> list[int]:
+    return [round(255.0 * part) for part in (*color, opacity)]
