@@ -104,8 +104,13 @@ def test_lines_go_where_the_scene_says(file_of, open_page, tmp_path):
     assert moved > 5
 
 
-def test_paths_run_along_geodesics_on_request(file_of, open_page, tmp_path):
-    pages = {wrapping: shown(file_of(SHOULDER), wrapping=wrapping) for wrapping in ("opensim", "geodesic")}
+def rajagopal(shared) -> Path:
+    (path,) = (shared / "corpus" / "models").glob("*/RajagopalLaiUhlrich2023.osim")
+    return path
+
+
+def test_paths_run_along_geodesics_on_request(shared, open_page, tmp_path):
+    pages = {wrapping: shown(rajagopal(shared), wrapping=wrapping) for wrapping in ("opensim", "geodesic")}
     lines = {wrapping: view.scene.at(view.q).lines for wrapping, view in pages.items()}
     page = open_page(pages["geodesic"].write_page(tmp_path / "page.html"))
     differing = 0
@@ -114,11 +119,6 @@ def test_paths_run_along_geodesics_on_request(file_of, open_page, tmp_path):
         assert corners.shape == expected.shape and np.abs(corners - expected).max() < 1e-9
         differing += usual.shape != expected.shape or np.abs(usual - expected).max() > 1e-3
     assert differing > 3
-
-
-def rajagopal(shared) -> Path:
-    (path,) = (shared / "corpus" / "models").glob("*/RajagopalLaiUhlrich2023.osim")
-    return path
 
 
 def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_path):
