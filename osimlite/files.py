@@ -147,9 +147,7 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
             yield stream
         if there is None:
             Path(name).chmod(0o666 & ~_umask())
-        replaces = there is None or _made_like(name, target, there)
-        if replaces:
-            Path(name).replace(target)
+        replaces = (there is None or _made_like(name, target, there)) and _replaced(name, target)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
@@ -158,6 +156,24 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
         raise
     if not replaces:
         _copy_into(name, target)
+
+
+def put_in_place(path: Path, target: Path) -> None:
+    """Let a finished file take the place of another.
+
+    Raises:
+        OSError, OsimliteError: it cannot.
+    """
+    if not _replaced(path, target):
+        _copy_into(path, target)
+
+
+def from_folder(path: str | Path, folder: str | Path) -> str:
+    """A path as it leads there from a folder, with slashes; the whole path from another drive of Windows."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).absolute().as_posix()
 
 
 def make_folder(path: str | Path) -> Path:
@@ -224,7 +240,18 @@ def _made_like(name: str, target: Path, there: os.stat_result) -> bool:
     return True
 
 
-def _copy_into(name: str, target: Path) -> None:
+def _replaced(name: str | Path, target: Path) -> bool:
+    """Put a file in the place of another; False if that stays, as on Windows while a program has it open."""
+    try:
+        os.replace(name, target)
+    except PermissionError:
+        if not target.is_file():
+            raise
+        return False
+    return True
+
+
+def _copy_into(name: str | Path, target: Path) -> None:
     """Write what is in one file into another, which stays itself, and remove the first.
 
     Raises:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import settings
@@ -98,3 +99,25 @@ def corpus(shared: Path) -> list[CorpusModel]:
     if not models:
         pytest.skip("needs the folder of real models (corpus) in the shared reference folder")
     return models
+
+
+DESCRIPTORS = Path("/proc/self/fd")
+
+
+@pytest.fixture
+def windows_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that is open is neither removed nor replaced: Windows lets others write to it, no more."""
+    if not DESCRIPTORS.exists():
+        pytest.skip("only Linux tells which files are open")
+
+    def guarded(does: Callable[..., None]) -> Callable[..., None]:
+        def refuse(*paths: str | Path, **words: Any) -> None:
+            at_stake = {os.path.realpath(path) for path in paths}
+            if not at_stake.isdisjoint(os.path.realpath(handle) for handle in DESCRIPTORS.iterdir()):
+                raise PermissionError(13, "Permission denied")
+            does(*paths, **words)
+
+        return refuse
+
+    for name in ("replace", "rename", "unlink", "remove"):
+        monkeypatch.setattr(os, name, guarded(getattr(os, name)))

@@ -150,7 +150,7 @@ def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, an
     import tempfile
 
     from osimlite.errors import OsimliteError
-    from osimlite.files import make_folder
+    from osimlite.files import make_folder, put_in_place
 
     is_new = not folder.exists()
     make_folder(folder)
@@ -170,12 +170,14 @@ def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, an
             with progress_bar("drawing", None) as progress:
                 written.append(draw(model, trajectory, beside / "animation.gif", progress=progress))
         for path in written:
-            path.replace(folder / path.name)
+            put_in_place(path, folder / path.name)
         # Files of an earlier simulation would be taken for those of this one.
         for name in SOME - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(folder if is_new else beside, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
         raise
     beside.rmdir()
     return [folder / path.name for path in written]

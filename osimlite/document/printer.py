@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from copy import copy
 from pathlib import Path
 from typing import Any, Literal
@@ -10,7 +9,7 @@ from typing import Any, Literal
 from osimlite.document.escape import escape, quoted
 from osimlite.document.foreign import relaid
 from osimlite.document.lexical import formatter
-from osimlite.files import write_atomically
+from osimlite.files import from_folder, write_atomically
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.layout import Include, Layout, Remark
@@ -135,7 +134,7 @@ class _Printer:
         """The file of an included object as it is found from where the document will stand."""
         if self.folder is None or Path(self.folder, include.file).resolve() == Path(include.path):
             return include.file
-        return Path(os.path.relpath(include.path, self.folder)).as_posix()
+        return from_folder(include.path, self.folder)
 
     def _property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
         kind = spec.kind

@@ -7,6 +7,7 @@ import os
 from lsprotocol import types
 
 from osimlite.document.lexical import formatter
+from osimlite.files import from_folder
 from osimlite.lint.setup import Setup
 from osimlite.lsp.analysis import Analysis
 from osimlite.lsp.cursor import Element
@@ -61,7 +62,7 @@ def _led_to(analysis: Analysis, offset: int) -> str:
     target = analysis.target_at(offset)
     if target is None:
         return ""
-    file = os.path.relpath(target.file, os.path.dirname(analysis.file) or ".")
+    file = from_folder(target.file, os.path.dirname(analysis.file) or ".")
     if target.item is None:
         return f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."
     said = f"{type(target.item).tag} `{target.path or target.item.name}`"

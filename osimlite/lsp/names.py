@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from osimlite.files import from_folder
 from osimlite.lint.beside import beginning, folders_in
 from osimlite.lint.setup import Setup
 from osimlite.lsp.analysis import Analysis
@@ -128,7 +129,7 @@ def _files(folder: str, content: str) -> Iterator[Name]:
     for place in (folder, *map(str, folders_in(Path(folder))[:50])):
         for path in _listed(place, suffixes):
             likely = content in _SUFFIXES or f"<{content}".encode() in beginning(path)
-            yield Name(os.path.relpath(path, folder).replace(os.sep, "/"), content if likely else "", likely)
+            yield Name(from_folder(path, folder), content if likely else "", likely)
 
 
 def _listed(folder: str, suffixes: tuple[str, ...]) -> list[str]:

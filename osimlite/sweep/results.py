@@ -21,6 +21,7 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import MissingFileError, OsimliteError, SettingError
+from osimlite.files import put_in_place
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.text import counted, listed
 
@@ -228,7 +229,7 @@ class Partial:
 
                 self.read(take)
                 put(1)
-            beside.replace(self.path)
+            put_in_place(beside, self.path)
         except OSError as error:
             raise OsimliteError(f"cannot write the file: {error.strerror or error}", file=str(self.path)) from None
         finally:
@@ -238,14 +239,15 @@ class Partial:
 
     def close(self) -> None:
         """Let go of the file, and leave it as it is; one without rows is removed."""
-        if self.rows == 0:
-            self.partial.unlink(missing_ok=True)
-        self._let_go()
+        self._let_go(removing=self.rows == 0)
 
-    def _let_go(self) -> None:
+    def _let_go(self, *, removing: bool = False) -> None:
         with suppress(OSError, AttributeError):
             # What was lost to a full disk has been told of; and there may be no stream yet.
             self._stream.close()
+        if removing:
+            # Windows removes no file that is open, and others may write one as soon as the lock is gone.
+            self.partial.unlink(missing_ok=True)
         if self._lock.is_locked:
             with suppress(OSError):
                 # Windows removes no file that is open, but the lock does so there itself.

@@ -322,6 +322,22 @@ def test_a_full_disk_is_told(tmp_path):
     partial.close()
 
 
+@pytest.mark.usefixtures("windows_files")
+def test_a_table_of_results_lets_go_of_its_files_first(tmp_path):
+    columns = schema({"run": "int64"}, {})
+    Partial(tmp_path / "empty", columns).close()
+    assert not (tmp_path / "empty.partial").exists()
+    partial = Partial(tmp_path / "whole", columns)
+    partial.add([[0, 1]])
+    with partial.finish().open():
+        partial.close()
+        again = Partial(tmp_path / "whole", columns)
+        again.add([[2]])
+        again.finish()
+        again.close()
+    assert not {path.name for path in tmp_path.iterdir()} & {"empty.partial", "whole.partial"}
+
+
 def test_differences_in_words():
     assert differences({"a": 1, "b": [1]}, {"a": 2, "b": [2], "c": 3}) == [
         "a (1 before, 2 now)",
