@@ -41,8 +41,8 @@ Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in O
 Integrator = Annotated[
     str,
     typer.Option(
-        help="'merson', whose steps are OpenSim's; 'bdf' for stiff motion, as of many muscles; 'rosenbrock' for stiff "
-        "motion at loose accuracy."
+        help="'merson', whose steps are OpenSim's; 'adams' for smooth motion, as of few muscles; 'bdf' for stiff "
+        "motion, as of many; 'rosenbrock' for stiff motion at loose accuracy."
     ),
 ]
 Wrapping = Annotated[

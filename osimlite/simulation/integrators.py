@@ -8,8 +8,8 @@ from osimlite.errors import SettingError
 from osimlite.text import or_known
 
 MERSON = "merson"
-INTEGRATORS = {MERSON: "RungeKuttaMerson", "bdf": "BDF", "rosenbrock": "Rosenbrock"}
-"""The integrators with error control by the names that users give, with their own names: that of OpenSim, and two for
+INTEGRATORS = {MERSON: "RungeKuttaMerson", "adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}
+"""The integrators with error control by the names that users give, with their own names: that of OpenSim, and those for
 stiff motion, whose kernels have the names that users give."""
 
 DEFAULT_ACCURACY = 1e-3

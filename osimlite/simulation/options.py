@@ -36,8 +36,8 @@ class Options:
 
     Attributes:
         accuracy: of the integrator, with the meaning it has in OpenSim.
-        integrator: "merson", whose steps are OpenSim's; "bdf" for stiff motion, as of models with many muscles; or
-            "rosenbrock" for stiff motion at loose accuracy.
+        integrator: "merson", whose steps are OpenSim's; "adams" for smooth motion that is a little stiff, as of few
+            muscles; "bdf" for stiff motion, as of many; or "rosenbrock" for stiff motion at loose accuracy.
         fixed_step: take the engine's own steps of this length (s) instead of controlling the error.
         report_interval: time between the recorded moments, s; the last one is the end in any case.
         initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their

@@ -24,7 +24,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.integrators import check_integrator
+from osimlite.simulation.integrators import MERSON, check_integrator
 from osimlite.simulation.options import Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
@@ -148,6 +148,8 @@ class Simulation:
         if fixed_step is not None:
             _check_step(fixed_step, to)
         check_integrator(chosen.integrator)
+        if fixed_step is not None and chosen.integrator != MERSON:
+            raise SettingError(f"a fixed step goes without the integrator '{chosen.integrator}'; take one of them")
         if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):

@@ -13,6 +13,7 @@ from osimlite.simulation.integrators import INITIAL_STEP, MERSON
 from osimlite.simulation.kernels import layout, merson
 from osimlite.simulation.kernels.condensation import condensation_room
 from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.table import LAW_MODULES
 from osimlite.simulation.many import BatchOptions
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class Batch:
         self._room = int(s[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
         self._sizes[merson.START_HOLDS] = start_holds
         if options.integrator != MERSON:
-            method = import_module(f"{kernels.__name__}.{options.integrator}")
+            method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
             self._sizes[merson.METHOD :] = engine.program.method(options.integrator), self._room
             self._room += method.HEAD + method.STATES * size
             self._room += condensation_room(int(s[layout.FREEDOMS]), int(s[layout.RESPONSES]))

@@ -36,8 +36,8 @@ class ControlledSteps(Stepper):
     are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.simulation.kernels.merson`), many in one call
     where a table of states is asked for.
 
-    The methods for stiff motion, :mod:`osimlite.simulation.kernels.bdf` and `rosenbrock`, keep the same norm of the
-    error that they estimate below `accuracy`.
+    The methods for stiff motion, :mod:`osimlite.simulation.kernels.multistep` and `rosenbrock`, keep the same norm of
+    the error that they estimate below `accuracy`.
 
     Args:
         engine: whose mechanism.

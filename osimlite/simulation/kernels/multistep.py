@@ -1,8 +1,12 @@
-"""Backward differentiation formulas of orders 1 to 5, for stiff motion.
+"""Multistep methods of variable order and step: backward differentiation formulas, and Adams-Moulton's.
 
-The numerical differentiation formulas in backward differences, with steps that are equal for a while and orders that
-change (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997); the linear equations of
-Newton's iteration are those of :mod:`osimlite.simulation.kernels.condensation`.
+Both keep backward differences, with steps that are equal for a while and orders that change: the numerical
+differentiation formulas of orders 1 to 5 (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput.
+18, 1997) those of the state, Adams' formulas of orders 2 to 8 those of its derivative (E. Hairer, S. P. Norsett,
+G. Wanner, Solving Ordinary Differential Equations I, chapter III.1). These err much less where they are stable; their
+error is estimated as that of the formula of one order less. Both solve c f(y) = psi + d, where d is what y differs from
+its prediction, by Newton's iteration; its linear equations are those of
+:mod:`osimlite.simulation.kernels.condensation`.
 """
 
 from __future__ import annotations
@@ -39,27 +43,37 @@ ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED = (
 """Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none; for how many steps
 their derivatives have served; how fast iterations converge; how many steps were refused in turn."""
 MATRICES = MEMORY + 7
-"""Place of three matrices (6, 6) that change the step, and of a column."""
-HEAD = MATRICES + 3 * 36 + 6
+"""Place of three matrices (8, 8) that change the step, and of a column."""
+WIDTH = 8
+HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
 
-MOST_ORDER = 5
-ROWS = MOST_ORDER + 3
+BDF, ADAMS = 0, 1
+MOST_ORDER = 5, 7
+ROWS = max(MOST_ORDER) + 3
 STATES = ROWS + 2
-"""Room for so many states: backward differences, correction, right side."""
+"""Room for so many states: y and its backward differences, or y and those of h f; d, and psi."""
 
-KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
-GAMMA = (0.0, 1.0, 1.5, 11.0 / 6.0, 25.0 / 12.0, 137.0 / 60.0)
-ALPHA = tuple((1.0 - kappa) * gamma for kappa, gamma in zip(KAPPA, GAMMA, strict=True))
-ERROR_CONSTANT = tuple(
-    kappa * gamma + 1.0 / (k + 1.0) for k, (kappa, gamma) in enumerate(zip(KAPPA, GAMMA, strict=True))
+_ONES = (1.0,) * WIDTH
+_KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0, 0.0, 0.0)
+_SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in range(WIDTH))
+_ADAMS = (1.0, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480, 5257 / 17280)
+PREDICTED = (*_ONES, 0.0, *_ADAMS[:-1])
+GIVEN = _SUMS + _ONES
+ALPHA = tuple((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)) + tuple(
+    1.0 / g for g in _ADAMS
 )
-"""Constants of the formulas by order: weights of the differences, of the correction, and of it in the error."""
+DIFFERENCE = _ONES + ALPHA[WIDTH:]
+ERROR_CONSTANT = tuple(
+    kappa * total + 1.0 / (order + 1.0) for order, (kappa, total) in enumerate(zip(_KAPPA, _SUMS, strict=True))
+) + tuple((low - g) * a for low, g, a in zip((0.0, *_ADAMS), _ADAMS, _ONES, strict=False))
+"""Constants of both methods: by difference its weight in the prediction, and in psi; by order h / c, the newest
+difference by d, and the error by the newest difference."""
 
-ITERATIONS, CONVERGED = 4, 0.2
+ITERATIONS, CONVERGED = 4, 0.03
 """Newton's steps at most; what the error of an iteration may be, of that of a step."""
 RENEWED = 20
 """After so many steps the derivatives are computed anew."""
-SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 8.0, 1.2
+SAFETY, SHRINK, GROW, WORTH = 0.8, 0.2, 8.0, 1.2
 """Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
 PATIENCE = 3
 """So many refused steps in turn and the history is dropped: something has changed abruptly."""
@@ -67,6 +81,16 @@ PATIENCE = 3
 
 def bdf(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1, which its derivative is put behind."""
+    return multistep(s, x, w, y0, y1, place, BDF)
+
+
+def adams(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+    """The same by the other method."""
+    return multistep(s, x, w, y0, y1, place, ADAMS)
+
+
+def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int, method: int) -> int:
+    """The same by either."""
     size = s[STATE_SIZE]
     h = at(w, place)
     rows, room = at(h, HEAD), at(h, HEAD + STATES * size)
@@ -78,18 +102,18 @@ def bdf(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> in
     t1 = t0 + h[STEP]
     if h[LAST_TIME] <= t0 + 1.001 * h[STEP]:
         t1 = h[LAST_TIME]
-        rescale(size, h, rows, (t1 - t0) / h[STEP])
-    c = h[STEP] / ALPHA[order]
+        rescale(size, method, h, rows, (t1 - t0) / h[STEP])
+    constants = WIDTH * method + order
+    c = h[STEP] / ALPHA[constants]
     iterations, is_new = 0, False
     while True:
-        predict(size, order, rows, y1, psi)
+        predict(size, method, order, rows, y1, psi)
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
             w[TIME] = t1
             is_new = linearise(s, x, w, y1, at(y1, size), room) == OK
-            h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
+            h[AGE], h[CONDENSED], h[RATE] = 1.0 if is_new else 0.0, 0.0, 1.0
         if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(s, c, room)):
-            if h[CONDENSED] != c:
-                h[CONDENSED], h[RATE] = c, 1.0
+            h[CONDENSED] = c
             iterations = newton(s, x, w, t1, c, y0, y1, d, psi, errors, room, h)
         if iterations > 0 or is_new or h[AGE] <= 0.0:
             break
@@ -97,30 +121,33 @@ def bdf(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> in
     error = inf
     if iterations > 0:
         for k in range(size):
-            errors[k] = ERROR_CONSTANT[order] * d[k]
+            errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
         error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]))
         # As in Simbody: what half a step would not mend, neither does the projection.
         if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
             error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]))
     if not error <= accuracy:
-        refuse(size, h, rows, error / accuracy)
+        refuse(size, method, h, rows, error / accuracy)
         return OK
     h[AGE] += 1.0
     h[REFUSED] = 0.0
     h[REACHED] = t1
     for k in range(size):
-        total = y1[k]
-        for i in range(order + 1):
-            total -= rows[size * i + k]
-        d[k] = total
-        y1[size + k] = (psi[k] + total) / c
-        rows[size * (order + 2) + k] = total - rows[size * (order + 1) + k]
-        rows[size * (order + 1) + k] = total
-        for i in range(order, -1, -1):
+        y1[size + k] = (psi[k] + d[k]) / c
+        newest = DIFFERENCE[constants] * d[k]
+        if method == BDF:
+            # Of the states as they were projected; their derivatives are not.
+            newest = y1[k]
+            for i in range(order + 1):
+                newest -= rows[size * i + k]
+        rows[size * (order + 2) + k] = newest - rows[size * (order + 1) + k]
+        rows[size * (order + 1) + k] = newest
+        for i in range(order, 0, -1):
             rows[size * i + k] += rows[size * (i + 1) + k]
+        rows[k] = y1[k]
     h[EQUAL] += 1.0
     if h[EQUAL] > order:
-        choose(s, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
+        choose(s, method, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
     h[NEXT_STEP] = h[STEP]
     return OK
 
@@ -138,16 +165,15 @@ def begin(s: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
             rows[size * i + k] = 0.0
 
 
-def predict(size: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
-    """The end of a step if the differences stay as they are, and what Newton's iteration starts from."""
+def predict(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
+    """The end of a step if the newest difference is zero, and psi."""
+    first = WIDTH * method
     for k in range(size):
-        end = rows[k]
-        sum_ = 0.0
+        y[k], psi[k] = rows[k], 0.0
         for i in range(1, order + 1):
-            end += rows[size * i + k]
-            sum_ += GAMMA[i] * rows[size * i + k]
-        y[k] = end
-        psi[k] = sum_ / ALPHA[order]
+            y[k] += PREDICTED[first + i] * rows[size * i + k]
+            psi[k] += GIVEN[first + i] * rows[size * i + k]
+        psi[k] /= ALPHA[first + order]
 
 
 def newton(
@@ -193,7 +219,7 @@ def newton(
     return 0
 
 
-def refuse(size: int, h: Floats, rows: Floats, excess: float) -> None:
+def refuse(size: int, method: int, h: Floats, rows: Floats, excess: float) -> None:
     """Make the step shorter; the excess is infinite if there was no solution."""
     h[REFUSED] += 1.0
     h[EQUAL] = 0.0
@@ -201,26 +227,28 @@ def refuse(size: int, h: Floats, rows: Floats, excess: float) -> None:
         h[NEXT_STEP], h[ORDER] = SHRINK * h[STEP], 0.0
         return
     wanted = SAFETY * excess ** (-1.0 / (h[ORDER] + 1.0)) if excess < inf else 0.25
-    rescale(size, h, rows, min(max(wanted, SHRINK), SAFETY))
+    rescale(size, method, h, rows, min(max(wanted, SHRINK), SAFETY))
     h[NEXT_STEP] = h[STEP]
 
 
-def choose(s: Ints, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float) -> None:
+def choose(
+    s: Ints, method: int, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float
+) -> None:
     """Choose order and step for the next steps."""
     size, order, accuracy = s[STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
     best, factor = order, reach(error / accuracy, order)
     for other in (order - 1, order + 1):
-        if not 1 <= other <= MOST_ORDER:
+        if not 1 <= other <= MOST_ORDER[method]:
             continue
         for k in range(size):
-            errors[k] = ERROR_CONSTANT[other] * rows[size * (other + 1) + k]
+            errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
         found = reach(error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U])) / accuracy, other)
         if found > factor:
             best, factor = other, found
     factor = min(safety * factor, GROW)
     if factor >= WORTH or factor < 1.0:
         h[ORDER], h[EQUAL] = float(best), 0.0
-        rescale(size, h, rows, max(factor, SHRINK))
+        rescale(size, method, h, rows, max(factor, SHRINK))
 
 
 def reach(excess: float, order: int) -> float:
@@ -229,22 +257,25 @@ def reach(excess: float, order: int) -> float:
     return factor
 
 
-def rescale(size: int, h: Floats, rows: Floats, factor: float) -> None:
-    """Change the step: the differences at other distances, on the polynomial through the same states."""
-    order = int(h[ORDER])
-    new, unit, both, column = at(h, MATRICES), at(h, MATRICES + 36), at(h, MATRICES + 72), at(h, MATRICES + 108)
+def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:
+    """Change the step: the differences at other distances, on the polynomial through the same values."""
+    # Adams' are of the derivative times the step, behind the state.
+    order, differing = int(h[ORDER]) - method, at(rows, size * method)
+    scale = factor if method == ADAMS else 1.0
+    new, unit, both = at(h, MATRICES), at(h, MATRICES + WIDTH * WIDTH), at(h, MATRICES + 2 * WIDTH * WIDTH)
+    column = at(both, WIDTH * WIDTH)
     differences(order, factor, new)
     differences(order, 1.0, unit)
     for i in range(order + 1):
         for j in range(order + 1):
-            both[6 * i + j] = 0.0
+            both[WIDTH * i + j] = 0.0
             for m in range(order + 1):
-                both[6 * i + j] += new[6 * j + m] * unit[6 * m + i]
+                both[WIDTH * i + j] += scale * new[WIDTH * j + m] * unit[WIDTH * m + i]
     for k in range(size):
         for i in range(order + 1):
-            column[i] = rows[size * i + k]
+            column[i] = differing[size * i + k]
         for i in range(order + 1):
-            rows[size * i + k] = product(0, order + 1, at(both, 6 * i), column)
+            differing[size * i + k] = product(0, order + 1, at(both, WIDTH * i), column)
     h[STEP] *= factor
     h[EQUAL] = 0.0
 
@@ -256,4 +287,4 @@ def differences(order: int, factor: float, matrix: Floats) -> None:
         matrix[j] = total
         for i in range(1, order + 1):
             total *= (i - 1 - factor * j) / i if j > 0 else 0.0
-            matrix[6 * i + j] = total
+            matrix[WIDTH * i + j] = total
