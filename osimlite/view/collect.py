@@ -219,7 +219,9 @@ class _Collector:
         of = (self.tree.path_of(owner) if owner is not None else None) or name
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
         course = geometry_path.read(self.builder, owner)
-        self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible))
+        found = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
+        wraps = tuple(self.tree.path_of(surface) or "" for surface in found)
+        self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps))
 
     def _force(self, force: Force, path: str) -> None:
         """The line of a force between two points, and where the force of a contact is shown."""

@@ -147,7 +147,7 @@ def _drawn(scene: Scene) -> dict[str, Any]:
                 "radius": line.radius,
                 "visible": line.visible,
                 **(
-                    {"route": next(routes), "most": scene.polylines.room}
+                    {"route": next(routes), "most": scene.polylines.room, "wraps": line.wraps}
                     if isinstance(line.course, ThroughPoints)
                     else {"points": [{"body": point.body, "at": point.location.tolist()} for point in line.course]}
                 ),

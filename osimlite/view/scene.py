@@ -75,6 +75,7 @@ class Line:
         color: red, green, blue, 0 to 1.
         radius: how thick to draw it, m.
         visible: whether the model wants it shown.
+        wraps: paths of the wrap objects that it may bend around.
     """
 
     path: str
@@ -83,6 +84,7 @@ class Line:
     color: Color
     radius: float = 0.004
     visible: bool = True
+    wraps: tuple[str, ...] = ()
 
     @property
     def start(self) -> LinePoint:

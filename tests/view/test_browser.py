@@ -156,6 +156,20 @@ def test_a_muscle_that_is_clicked_shows_its_curves(file_of, open_page, tmp_path)
     assert not card.is_visible()
 
 
+def test_what_a_muscle_wraps_around_is_shown_with_it(shared, open_page, tmp_path):
+    page = open_page(shown(rajagopal(shared)).write_page(tmp_path / "page.html"))
+    seen = "v.stage.layered.wrap.filter((mesh) => mesh.visible).map((mesh) => mesh.name)"
+    page.run("v.stage.show('wrap', false)")
+    assert page.run(seen) == []
+    page.run("v.select('/forceset/gasmed_r')")
+    assert sorted(name.rpartition("/")[2] for name in page.run(seen)) == ["GasMed_at_condyles_r", "GasMed_at_shank_r"]
+    page.run("v.stage.show('wrap', true)")
+    assert len(page.run(seen)) > 10
+    page.run("v.stage.show('wrap', false)")
+    page.run("v.select('/bodyset')")
+    assert page.run(seen) == []
+
+
 def test_muscles_have_the_colour_of_their_activation(file_of, open_page, tmp_path):
     view = shown(file_of(GAIT))
     mechanism = view.scene.mechanism

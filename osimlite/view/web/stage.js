@@ -307,16 +307,27 @@
       this.selected = path;
       this.paint();
       (this.rods || []).forEach((group) => this.lay(group));
+      this.showWraps();
     }
 
     showMarks(on) { this.hideMarks = !on; this.paint(); }
 
-    // Models that hide each of their wrap surfaces would have nothing to show: whoever asks for the layer gets all of it.
     show(layer, on) {
       this.layers[layer].visible = on;
-      const all = layer === "wrap";
-      for (const object of this.layered[layer] || []) object.visible = on && (all || object.userData.visible);
+      for (const object of this.layered[layer] || []) object.visible = on && object.userData.visible;
+      // Models that hide each of their wrap surfaces would have nothing to show: whoever asks for them gets them all.
+      if (layer === "wrap") this.allWraps = true;
+      this.showWraps();
       this.wanted();
+    }
+
+    // What the selected path bends around is shown with it.
+    showWraps() {
+      const own = new Set(this.data.lines.filter((line) => line.path === this.selected).flatMap((line) => line.wraps || []));
+      const on = this.layers.wrap.visible;
+      for (const mesh of this.layered.wrap || []) {
+        mesh.visible = own.has(mesh.userData.path) || (on && (this.allWraps || mesh.userData.visible));
+      }
     }
 
     // Look at the model from a direction, all of it in sight.
