@@ -23,7 +23,7 @@ import numpy as np
 from osimlite._load import module_named, module_of_file
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.runs import Runs, Watch
-from osimlite.sweep.expressions import Expression
+from osimlite.sweep.expressions import Expression, Quantity, quantities
 from osimlite.sweep.variables import Floats
 from osimlite.text import did_you_mean, or_known
 
@@ -66,6 +66,11 @@ class Batch:
     names: Sequence[str]
     report_times: Floats
     memory: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """What can be looked at during the runs."""
+        return quantities(self.engine)
 
 
 @dataclass(frozen=True)
@@ -136,11 +141,14 @@ class Run:
     largest_forces: Mapping[str, float]
     engine: Any = field(repr=False)
     states: Floats = field(repr=False)
+    quantities: Mapping[str, Quantity] = field(repr=False)
 
     def history(self, name: str) -> Floats:
-        """A value or a speed at the times."""
-        place, locked = _state_place(self.engine, name)
-        return np.full(len(self.times), locked) if place is None else self.states[:, place]
+        """What a name in an expression stands for, at the times."""
+        if name not in self.quantities:
+            raise SettingError(f"a run has no '{name}'{did_you_mean(name, self.quantities)}")
+        found: Floats = self.quantities[name](self.engine, list(zip(self.times, self.states.tolist(), strict=True)))
+        return found
 
     @cached_property
     def mechanism(self) -> Any:
@@ -258,6 +266,7 @@ def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
             dict(zip(contacts, batch.runs.peaks[k, :, 0].tolist(), strict=True)),
             engine,
             batch.runs.reports[k, :kept],
+            batch.quantities,
         )
         # What a function forgets to return would become no number, silently.
         found.append(float(function(run)))

@@ -13,7 +13,7 @@ from osimlite.sweep.runner import Runner
 from tests.sweep.test_controls import pulled
 
 
-def measured(model, *measures, vary=None, row=(0.31,), **choices):
+def measured(model, *measures, vary=None, row=(0.345,), **choices):
     block = Runner(plan(model, vary or {"x": (0.0, 1.0)}, measures=measures, **choices)).run(np.array([row]))
     assert block.status == ["done"], block.reasons
     return [float(block.measures[name][0]) for name in measures]
@@ -37,7 +37,7 @@ def test_they_are_of_the_columns_of_a_simulation():
     }
     found = measured(model, *(f"{what}({name})" for name in names for what in ("max", "min", "end")), to=0.055)
     with Simulation(model, "compiled") as simulation:
-        run = simulation.run(0.055, initial={"x": 0.31}, report_interval=0.01)
+        run = simulation.run(0.055, initial={"x": 0.345}, report_interval=0.01)
     wanted = [number for of in names.values() for number in (of(run).max(), of(run).min(), of(run)[-1])]
     assert found == pytest.approx(wanted, rel=1e-12, abs=1e-300)
 
@@ -71,17 +71,37 @@ def test_places_of_bodies_and_the_mass_center(walker, engine):
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("start(x)", 0.31),
+        ("start(x)", 0.345),
         ("integral(2*time)", 0.25),
         ("mean(time)", 0.25),
         ("integral(1)/max(time)", 1.0),
-        ("-start(x)^2 + (3 - 2.5e0)*4", 2.0 - 0.31**2),
+        ("-start(x)^2 + (3 - 2.5e0)*4", 2.0 - 0.345**2),
         ("max(abs(time - 0.5)) / sqrt(4)", 0.25),
         ("end(x/speed/x) - end(x/speed)/end(x)", 0.0),
     ],
 )
 def test_arithmetic(text, value):
     assert measured(pulled(), text, to=0.5, accuracy=1e-2) == [pytest.approx(value, abs=1e-12)]
+
+
+def effort(run):
+    """What a function can look at."""
+    assert len(run.times) == 6
+    with pytest.raises(SettingError, match="a run has no 'mu/activatio'; did you mean 'mu/activation'"):
+        run.history("mu/activatio")
+    return float((run.history("mu/activation") * run.history("mu")).sum())
+
+
+def test_functions_look_at_the_same():
+    (found,) = (
+        Runner(plan(pulled(), {"x": (0.0, 1.0)}, measures=(effort,), to=0.05, report_interval=0.01))
+        .run(np.array([[0.345]]))
+        .measures.values()
+    )
+    with Simulation(pulled(), "compiled") as simulation:
+        run = simulation.run(0.05, initial={"x": 0.345}, report_interval=0.01)
+    wanted = (run.auxiliary["/forceset/mu/activation"] * run.forces["mu"]).sum()
+    assert wanted > 0.0 and found[0] == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_run_that_is_stopped_is_looked_at_up_to_its_end(walker):
