@@ -20,8 +20,8 @@ from zlib import crc32
 from osimlite import __version__
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file, stamped
+from osimlite.lint import measures
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
-from osimlite.lint.measures import can_measure
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -137,7 +137,7 @@ def key_of(file: str, config: Config) -> str:
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
         _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
-        [(path, stamped(path)) for path in config.classes], config.target_version, can_measure(),
+        [(path, stamped(path)) for path in config.classes], config.target_version, measures.absent(),
     )  # fmt: skip
     return blake2b(repr(setting).encode(errors="surrogateescape"), digest_size=16).hexdigest()
 

@@ -21,21 +21,31 @@ if TYPE_CHECKING:
 MEASURES = "measures"
 """What rules are about that need them."""
 
+FEW = 12
+"""Wraps of a model; with more it is worth to compile."""
+
 _MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
 
 
-class Pose(NamedTuple):
-    """The default pose but for one coordinate (rad or m); the default pose itself if that has no name."""
+class Value(NamedTuple):
+    """A value of a coordinate, rad or m."""
 
-    coordinate: str = ""
-    value: float = 0.0
-    is_angle: bool = False
+    coordinate: str
+    value: float
+    is_angle: bool
 
     def __str__(self) -> str:
-        if not self.coordinate:
-            return "in the default pose"
-        value = f"{degrees(self.value):.4g} deg" if self.is_angle else f"{self.value:.4g} m"
-        return f"at '{self.coordinate}' = {value}"
+        size = f"{degrees(self.value):.4g} deg" if self.is_angle else f"{self.value:.4g} m"
+        return f"'{self.coordinate}' = {size}"
+
+
+class Pose(NamedTuple):
+    """The default pose, but for some coordinates."""
+
+    values: tuple[Value, ...] = ()
+
+    def __str__(self) -> str:
+        return f"at {listed(map(str, self.values))}" if self.values else "in the default pose"
 
 
 class Wrapping(NamedTuple):
@@ -80,7 +90,7 @@ class MovingPoint(NamedTuple):
     Attributes:
         owner: path of what has the point.
         point: its name.
-        pose: the end of the range.
+        end: of the range.
         beyond: by how much the coordinate is outside what the functions are given for there (rad or m), 0 if inside.
         moved: how far they let the point move on that way, m.
         rate: of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1.
@@ -88,7 +98,7 @@ class MovingPoint(NamedTuple):
 
     owner: str
     point: str
-    pose: Pose
+    end: Value
     beyond: float
     moved: float
     rate: float
@@ -143,17 +153,15 @@ def has_measures(subject: Subject) -> bool:
     return any(next(subject.named(name), None) is not None for name in _MEASURED)
 
 
-def can_measure() -> bool:
-    """Whether all is installed that this takes."""
-    return not _missing()
-
-
 def unmeasured(subject: Subject) -> str:
     """Measure a model; why that cannot be done, if it cannot."""
-    if not can_measure():
-        return f"that needs {listed(_missing())}; run: pip install 'osimlite[sim]'"
+    compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
+    missing = [name for name in ("numpy", "numba") if name in absent() and (compiles or name == "numpy")]
+    if missing:
+        return f"that needs {listed(missing)}; run: pip install 'osimlite[sim]'"
     try:
-        subject.kept[MEASURES] = import_module("osimlite.measuring").measured(subject.model)
+        measured = import_module("osimlite.measuring").measured
+        subject.kept[MEASURES] = measured(subject.model, compiles=compiles)
     except OsimliteError as error:
         return error.message
     return ""
@@ -165,5 +173,6 @@ def measures_of(subject: Subject) -> Measures:
 
 
 @cache
-def _missing() -> list[str]:
-    return [name for name in ("numpy", "numba") if find_spec(name) is None]
+def absent() -> tuple[str, ...]:
+    """What is not installed of the libraries that this takes."""
+    return tuple(name for name in ("numpy", "numba") if find_spec(name) is None)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 
-import numpy as np
-
 from osimlite.lint.measures import LengthOnSurface, Measures, Pose
 from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
@@ -15,21 +13,33 @@ from osimlite.measuring.sweeps import Sweep, lengths, sweeps
 from osimlite.measuring.wrapping import wrappings
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.engines.linking import AT_HAND
 from osimlite.simulation.paths import Paths
 
+MIDDLE = 0.5
+"""Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
 
-def measured(model: Model) -> Measures:
+
+def measured(model: Model, *, compiles: bool) -> Measures:
     """Measure the paths and muscles of a model.
+
+    Args:
+        model: what is measured.
+        compiles: whether machine code is made that is in no file yet, which takes longer than to do without for a
+            model that has few surfaces.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
         ModelError: something makes no sense.
         SimulationError: the constraints allow no default pose.
     """
-    paths = Paths(model)
+    code = None if compiles else AT_HAND
+    paths = Paths(model, code=code)
     start = paths.mechanism.default_state()[0]
     looked_at = [*sweeps(paths, start)]
     default = lengths(paths, start)
+    has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
     starts, reaches = [], []
     places = {name: place for place, name in enumerate(paths.names)}
     for fibers in fibers_of(model, paths.mechanism):
@@ -40,7 +50,7 @@ def measured(model: Model) -> Measures:
         reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
     return Measures(
         1 + sum(len(sweep.poses) for sweep in looked_at),
-        [*wrappings(model, paths, start, looked_at)],
+        [*wrappings(Paths(model, "geodesic", code), paths, start, looked_at)] if has_surfaces else [],
         [*jumps(paths, looked_at)],
         [*_on_surfaces(paths, start, looked_at)],
         [*moving_points(paths)],
@@ -62,10 +72,11 @@ def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator
 
 
 def _ends(looked_at: list[Sweep], default: Array, place: int) -> tuple[tuple[float, Pose], tuple[float, Pose]]:
-    """Where a path is shortest and where it is longest, of all that was looked at."""
+    """Where a path is shortest and where it is longest, by default and in the middle of the ranges."""
     found = [(float(default[place]), Pose())]
     for sweep in looked_at:
-        row = sweep.lengths[:, place]
-        if not np.isnan(row).all():
-            found += [(float(row[k]), sweep.pose(sweep.values[k])) for k in (np.nanargmin(row), np.nanargmax(row))]
+        low, high = sweep.info.range
+        for value, length in zip(sweep.values, sweep.lengths[:, place], strict=True):
+            if round(abs((value - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE:
+                found.append((float(length), sweep.pose(value)))
     return min(found, key=lambda item: item[0]), max(found, key=lambda item: item[0])

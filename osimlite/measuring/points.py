@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.lint.measures import MovingPoint, Pose
+from osimlite.lint.measures import MovingPoint, Value
 from osimlite.multibody.functions import Scaled
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
@@ -30,7 +30,7 @@ def moving_points(paths: Paths) -> Iterator[MovingPoint]:
                 yield MovingPoint(
                     name,
                     point.name,
-                    Pose(info.name, end, info.motion_type == "rotational"),
+                    Value(info.name, end, info.motion_type == "rotational"),
                     abs(end - inside),
                     float(np.linalg.norm(place - _at(point, inside)[0])),
                     float(np.linalg.norm(rate)),

@@ -10,7 +10,7 @@ from math import pi
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.lint.measures import Pose
+from osimlite.lint.measures import Pose, Value
 from osimlite.multibody.linear import stacked
 from osimlite.multibody.parts import CoordinateInfo
 from osimlite.multibody.spatial import Array
@@ -33,12 +33,14 @@ class Sweep:
         place: of the coordinate in the mechanism.
         poses: values of all coordinates (k, n), those of this one increasing; as far as constraints allow.
         lengths: of all paths there (k, p), m.
+        is_tied: whether a constraint moves others with the coordinate.
     """
 
     paths: Paths
     place: int
     poses: Array
     lengths: Array
+    is_tied: bool
 
     @property
     def values(self) -> Array:
@@ -51,9 +53,13 @@ class Sweep:
         """The coordinate."""
         return self.paths.mechanism.coordinates[self.place]
 
+    def value(self, value: float) -> Value:
+        """A value of the coordinate, with its name."""
+        return Value(self.info.name, float(value), self.info.motion_type == "rotational")
+
     def pose(self, value: float) -> Pose:
         """What people call the pose at a value of the coordinate."""
-        return Pose(self.info.name, float(value), self.info.motion_type == "rotational")
+        return Pose((self.value(value),))
 
     def at(self, value: float) -> Array:
         """Values (n,) of all coordinates at one of this, along straight lines between the poses."""
@@ -84,7 +90,7 @@ def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
                 poses.append(paths.mechanism.assemble(q, kept=(place,)) if tied[place] else q)
         rows = np.array([lengths(paths, q) for q in poses])
         if len(rows) > 1 and np.ptp(rows, axis=0).max(initial=0.0) > STILL:
-            yield Sweep(paths, place, np.array(poses), rows)
+            yield Sweep(paths, place, np.array(poses), rows, bool(tied[place]))
 
 
 def _tied(paths: Paths, start: Array) -> Array:

@@ -8,30 +8,41 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.lint.measures import Pose, Wrapping
-from osimlite.measuring.sweeps import Sweep, lengths
+from osimlite.measuring.sweeps import STILL, Sweep, lengths
 from osimlite.multibody.spatial import Array
-from osimlite.schema.model import Model
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.paths import Paths
 
+TOGETHER = 64
+"""Poses with values of all coordinates within their ranges, at random but always the same."""
 
-def wrappings(model: Model, paths: Paths, start: Array, looked_at: Sequence[Sweep]) -> Iterator[Wrapping]:
+
+def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]) -> Iterator[Wrapping]:
     """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most."""
-    routes = {k: route for k, route in enumerate(paths.routes.values()) if isinstance(route, ThroughPoints)}
-    wrapped = [k for k, route in routes.items() if any(surface.law for surface in route.surfaces)]
-    if not wrapped:
-        return
-    geodesic = Paths(model, "geodesic")
-    default = lengths(paths, start) - _lengths(geodesic, start)
-    errors = [sweep.lengths - [_lengths(geodesic, q) for q in sweep.poses] for sweep in looked_at]
-    for k in wrapped:
-        worst, pose = float(default[k]), Pose()
-        for sweep, rows in zip(looked_at, errors, strict=True):
-            value = int(np.argmax(np.nan_to_num(np.abs(rows[:, k]))))
-            if abs(rows[value, k]) > abs(worst):
-                worst, pose = float(rows[value, k]), sweep.pose(sweep.values[value])
-        surfaces = tuple(surface.tangent.name for surface in routes[k].surfaces if surface.law)
-        yield Wrapping(paths.names[k], surfaces, float(default[k]), worst, pose)
+    default = _excess(geodesic, paths, start)
+    swept = [sweep.lengths - [_lengths(geodesic, q) for q in sweep.poses] for sweep in looked_at]
+    free = [sweep for sweep in looked_at if not sweep.is_tied]
+    parts = np.random.default_rng(0).random((TOGETHER, len(free)))
+    values = [low + parts[:, k] * (high - low) for k, (low, high) in enumerate(sweep.info.range for sweep in free)]
+    together = np.tile(start, (TOGETHER, 1))
+    together[:, [sweep.place for sweep in free]] = np.array(values).reshape(len(free), TOGETHER).T
+    excesses = np.array([_excess(geodesic, paths, q) for q in together])
+    for k, (name, route) in enumerate(paths.routes.items()):
+        surfaces = route.surfaces if isinstance(route, ThroughPoints) else ()
+        around = tuple(surface.tangent.name for surface in surfaces if surface.law)
+        if around:
+            found = [(float(default[k]), Pose())]
+            for sweep, rows in zip(looked_at, swept, strict=True):
+                found += [(float(row[k]), sweep.pose(value)) for value, row in zip(sweep.values, rows, strict=True)]
+            moved = [sweep for sweep in free if np.ptp(sweep.lengths[:, k]) > STILL]
+            for q, row in zip(together, excesses, strict=True):
+                found.append((float(row[k]), Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved))))
+            worst, pose = max(found, key=lambda item: np.nan_to_num(abs(item[0])))
+            yield Wrapping(name, around, float(default[k]), worst, pose)
+
+
+def _excess(geodesic: Paths, paths: Paths, q: Array) -> Array:
+    return lengths(paths, q) - _lengths(geodesic, q)
 
 
 def _lengths(paths: Paths, q: Array) -> Array:

@@ -24,6 +24,7 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.engines.linking import Code
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED, SURFACE
 from osimlite.simulation.kernels.projection import REDUNDANT
@@ -60,6 +61,7 @@ class Paths:
     Args:
         model: whose paths.
         wrapping: how they bend around surfaces.
+        code: what runs the kernels; the best that is installed if left out.
 
     Attributes:
         names: component paths of their owners, in the order of the model.
@@ -69,7 +71,7 @@ class Paths:
 
     _repr_html_ = shown_in_notebooks("paths")
 
-    def __init__(self, model: Model, wrapping: str = OPENSIM) -> None:
+    def __init__(self, model: Model, wrapping: str = OPENSIM, code: Code | None = None) -> None:
         self.mechanism = build_mechanism(model)
         builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
         owners = [
@@ -83,7 +85,7 @@ class Paths:
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
         self.routes = {element.path: element.along for element in elements}
-        self._system = _System(self.mechanism.released(), Forces(tuple(elements)))
+        self._system = _System(self.mechanism.released(), Forces(tuple(elements)), code=code)
 
     def lengths(self, q: Values) -> dict[str, float]:
         """Length of each path (m)."""

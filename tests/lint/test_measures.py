@@ -25,8 +25,8 @@ def jumping(fixtures: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def without_numba(monkeypatch):
-    monkeypatch.setattr(measures, "_missing", lambda: ["numba"])
+def without_numpy(monkeypatch):
+    monkeypatch.setattr(measures, "absent", lambda: ("numpy",))
 
 
 def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
@@ -38,11 +38,11 @@ def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
     assert subprocess.run(command, check=True, capture_output=True, text=True).stdout == "[]\n"
 
 
-def test_what_is_missing_is_told_in_one_line_and_is_no_finding(jumping, without_numba):
+def test_what_is_missing_is_told_in_one_line_and_is_no_finding(jumping, without_numpy):
     report = validate(jumping)
     assert not report.findings
     (why,) = report.unmeasured
-    assert why == f"{jumping}: that needs numba; run: pip install 'osimlite[sim]'"
+    assert why == f"{jumping}: that needs numpy; run: pip install 'osimlite[sim]'"
     for name in ("full", "concise"):
         assert render(report, name, width=200).endswith(f"Paths and muscles (OSIM63) were not measured: {why}.\n")
     assert not validate(jumping, ignore="OSIM63").unmeasured
@@ -50,13 +50,13 @@ def test_what_is_missing_is_told_in_one_line_and_is_no_finding(jumping, without_
 
 def test_the_cache_tells_it_again_and_measures_once_it_can(jumping, monkeypatch):
     with monkeypatch.context() as context:
-        context.setattr(measures, "_missing", lambda: ["numba"])
+        context.setattr(measures, "absent", lambda: ("numpy",))
         reports = [check_files([str(jumping)], Config()) for _ in range(2)]
     assert all(len(report.unmeasured) == 1 and not report.findings for report in reports)
     assert check_files([str(jumping)], Config()).codes == {"OSIM632": 2}
 
 
-def test_a_comment_is_not_called_unused_where_nobody_measured(jumping, without_numba):
+def test_a_comment_is_not_called_unused_where_nobody_measured(jumping, without_numpy):
     jumping.write_text("<!-- osimlite: ignore OSIM632 OSIM505 -->\n" + jumping.read_text().partition("\n")[2])
     (finding,) = validate(jumping).findings
     assert finding.code == "OSIM010" and "'OSIM505'" in finding.message

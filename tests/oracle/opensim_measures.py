@@ -32,7 +32,7 @@ class Beside:
     def __init__(self, file: Path) -> None:
         opensim.Logger.setLevelString("off")
         self.model = osimlite.read(file)
-        self.measures: Measures = measured(self.model)
+        self.measures: Measures = measured(self.model, compiles=True)
         self.theirs = opensim.Model(str(file))
         self.state = self.theirs.initSystem()
         self.paths, self.right = osimlite.paths(self.model), osimlite.paths(self.model, "geodesic")
@@ -43,10 +43,9 @@ class Beside:
     def at(self, pose: Pose, aside: float = 0.0) -> np.ndarray:
         """Take both to a pose; returns the values of the coordinates."""
         q = self.default.copy()
-        if pose.coordinate:
-            place = self.paths.mechanism.coordinate_index(pose.coordinate)
-            q[place] = pose.value + aside
-            q = self.paths.mechanism.assemble(q, kept=(place,))
+        places = [self.paths.mechanism.coordinate_index(value.coordinate) for value in pose.values]
+        q[places] = [value.value + aside for value in pose.values]
+        q = self.paths.mechanism.assemble(q, kept=places)
         put(self.coordinates, self.state, q, np.zeros(len(q)))
         self.theirs.realizeVelocity(self.state)
         return q
@@ -88,20 +87,18 @@ class Beside:
             points = tree.by_path[point.owner].geometry_path.path_point_set.objects
             (own,) = (item for item in points if item.name == point.point)
             theirs = opensim.MovingPathPoint.safeDownCast(self.theirs.getComponent(tree.path_of(own)))
-            value, places = point.pose.value, []
-            inward = 1.0 if value == min(self._range(point.pose)) else -1.0
+            pose, places = Pose((point.end,)), []
+            mechanism = self.paths.mechanism
+            info = mechanism.coordinates[mechanism.coordinate_index(point.end.coordinate)]
+            inward = 1.0 if point.end.value == info.range[0] else -1.0
             for aside in (0.0, inward * point.beyond, -inward * BEYOND):
-                self.at(point.pose, aside)
+                self.at(pose, aside)
                 places.append(theirs.getLocation(self.state).to_numpy())
-            self.at(point.pose)
+            self.at(pose)
             rate = np.linalg.norm(theirs.getdPointdQ(self.state).to_numpy())
             yield "OSIM634", point.owner, point.moved, float(np.linalg.norm(places[0] - places[1]))
             yield "OSIM634", point.owner, point.rate, float(rate)
             yield "OSIM634", point.owner, 0.0, float(np.linalg.norm(places[2] - places[0]))
-
-    def _range(self, pose: Pose) -> tuple[float, float]:
-        mechanism = self.paths.mechanism
-        return mechanism.coordinates[mechanism.coordinate_index(pose.coordinate)].range
 
     def _of_muscles(self) -> Iterator[tuple[str, str, float, float]]:
         for start in self.measures.starts:

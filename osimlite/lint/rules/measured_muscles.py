@@ -94,18 +94,18 @@ def fiber_limit(subject: Subject, found: Found) -> None:
     Reports muscles whose fibers in equilibrium, fully active, are as short as pennation (`maximum_pennation_angle`) or
     the curve of active force lets them be where the path is shortest; those whose fibers at rest are longer than 2
     optimal lengths where it is longest; and muscles that have no equilibrium in one of these poses. The poses are the
-    default one and nine values of each coordinate over its range, the others as in the default pose.
+    default one and five values of each coordinate in the middle half of its range, the others as in the default pose:
+    at the ends of wide ranges there are few muscles that have reached no limit.
 
     ## Why is this bad
-    A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its activation; its fibers
-    stand still there, and jump back to life on the way out. Fibers beyond twice their length are torn in life. The
-    lengths may be those of another muscle, a scaling may have forgotten them, or the range of the coordinate is wider
-    than the joint.
+    A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its activation. Fibers beyond
+    twice their length are torn in life. The lengths may be those of another muscle, a scaling may have forgotten them,
+    or the range of the coordinate is wider than the joint.
 
     ## Example
     ```xml
     <Millard2012EquilibriumMuscle name="flexor">
-        <default_fiber_length>0.08</default_fiber_length>
+        <default_fiber_length>0.065</default_fiber_length>
         <GeometryPath name="path">
             <PathPointSet>
                 <objects>
@@ -116,7 +116,7 @@ def fiber_limit(subject: Subject, found: Found) -> None:
             </PathPointSet>
         </GeometryPath>
         <max_isometric_force>500</max_isometric_force> <optimal_fiber_length>0.1</optimal_fiber_length>
-        <tendon_slack_length>0.15</tendon_slack_length>
+        <tendon_slack_length>0.165</tendon_slack_length>
     </Millard2012EquilibriumMuscle>
     ```
 

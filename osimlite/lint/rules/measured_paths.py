@@ -11,6 +11,9 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.text import listed
 
+SHOWN = 5e-6
+"""Less (m) is no error of the default pose."""
+
 OFF = Threshold("wrapping-error", 0.001, "m", "so far may OpenSim's length of a path be from that along geodesics")
 
 
@@ -20,8 +23,9 @@ def wrong_wrapping(subject: Subject, found: Found) -> None:
 
     ## What it does
     Reports paths whose length in OpenSim is a millimetre or more off that along geodesics, the shortest ways on the
-    surfaces, in the default pose or at one of nine values of each coordinate over its range, the others as in the
-    default pose. A negative number is how much too short OpenSim has the path. Paths of OSIM633 are left out.
+    surfaces, in the default pose, at one of nine values of each coordinate over its range, the others as in the default
+    pose, or in one of 64 poses in which all coordinates are anywhere in their ranges. A negative number is how much too
+    short OpenSim has the path. Paths of OSIM633 are left out.
 
     ## Why is this bad
     Around several surfaces OpenSim looks for the way in rounds, but measures straight pieces between tangent points of
@@ -96,9 +100,8 @@ def wrong_wrapping(subject: Subject, found: Found) -> None:
     for wrapping in measures.wrappings:
         if abs(wrapping.worst) >= most and wrapping.owner not in told:
             owner, surfaces = subject.tree.at(wrapping.owner), listed([f"'{name}'" for name in wrapping.surfaces])
-            default = (
-                f"{1000.0 * wrapping.default:.3g} mm in the default pose and by " if wrapping.pose.coordinate else ""
-            )
+            by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
+            default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
             found(
                 f"OpenSim's length of the path of {called(owner)} around {surfaces} is off by {default}"
                 f"{1000.0 * wrapping.worst:.3g} mm {wrapping.pose}",
@@ -325,11 +328,11 @@ def moving_point_range(subject: Subject, found: Found) -> None:
     kept = {item.name for force in limits if (item := subject.target_of(force, "coordinate")) is not None}
     worst: dict[tuple[str, str], MovingPoint] = {}
     for point in measures_of(subject).moving_points:
-        if point.moved >= made_up or (point.rate >= rate and point.pose.coordinate not in kept):
+        if point.moved >= made_up or (point.rate >= rate and point.end.coordinate not in kept):
             other = worst.setdefault((point.owner, point.point), point)
             worst[point.owner, point.point] = max(other, point, key=lambda it: (it.moved >= made_up, it.moved, it.rate))
     for point in worst.values():
-        owner, end, is_angle = subject.tree.at(point.owner), point.pose, point.pose.is_angle
+        owner, end, is_angle = subject.tree.at(point.owner), point.end, point.end.is_angle
         names = f"'{point.point}' of {called(owner)}"
         if point.moved >= made_up:
             beyond = f"{degrees(point.beyond):.3g} deg" if is_angle else f"{point.beyond:.3g} m"

@@ -46,7 +46,7 @@ def version() -> str:
 
 
 class Code(ABC):
-    """What runs the kernels; `COMPILED` and `PYTHON` are the two.
+    """What runs the kernels: `COMPILED` and `PYTHON`, and `AT_HAND`, which is one of them.
 
     Args:
         name: for people.
@@ -54,6 +54,10 @@ class Code(ABC):
 
     def __init__(self, name: str) -> None:
         self.name = name
+
+    def chosen_for(self, functions: Sequence[str]) -> Code:
+        """What runs functions of the kernels: this, unless it leaves that to others."""
+        return self
 
     @abstractmethod
     def make_ready(self, functions: Sequence[str]) -> None:
@@ -117,6 +121,16 @@ class _Compiled(Code):
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
 
 
+class _AtHand(_Compiled):
+    def chosen_for(self, functions: Sequence[str]) -> Code:
+        if has_compiler():
+            from osimlite.simulation.engines.machine_code import is_at_hand
+
+            if all(map(is_at_hand, functions)):
+                return COMPILED
+        return PYTHON
+
+
 class _Python(Code):
     def make_ready(self, functions: Sequence[str]) -> None:
         pass
@@ -137,6 +151,8 @@ class _Python(Code):
 
 
 COMPILED, PYTHON = _Compiled("machine code"), _Python("Python")
+AT_HAND = _AtHand("machine code that is in files, or Python")
+"""For those who evaluate so little that Python is sooner done than the compiler."""
 
 
 def best() -> Code:
@@ -167,12 +183,13 @@ class Program:
 
     def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
-        self.code = code
+        kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
+        functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels)))
+        self.code = code = code.chosen_for(functions)
         self._equilibria, self._responses = packed.equilibria, packed.responses
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
-        kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
-        code.make_ready(tuple(dict.fromkeys((*entries, *packed.laws, *kernels))))
+        code.make_ready(functions)
         for name in packed.laws:
             self.ints[layout.LAWS + LAW_NUMBERS[name]] = code.address(name)
         self._count = len(packed.numbers)

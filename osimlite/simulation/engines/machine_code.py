@@ -32,7 +32,7 @@ def address_of(name: str) -> int:
 
 def make_ready(names: Sequence[str]) -> None:
     """Load the code of laws, and compile what is in no file, side by side if there is much."""
-    missing = [name for name in names if name not in _addresses and not _loaded(name)]
+    missing = [name for name in names if not is_at_hand(name)]
     if not missing:
         return
     from osimlite.simulation.engines.side_by_side import Helper, cores, made, shares
@@ -52,7 +52,10 @@ def make_ready(names: Sequence[str]) -> None:
             _keep(made(name))
 
 
-def _loaded(name: str) -> bool:
+def is_at_hand(name: str) -> bool:
+    """Whether the code of a law is loaded, or in a file, from which it is loaded then."""
+    if name in _addresses:
+        return True
     from osimlite.simulation.engines.object_code import load
 
     found = load(name, digest_of(law_function(name)))
