@@ -104,7 +104,8 @@ def jumper(driven: bool = True) -> Model:
     model = Model(name="Jumper", gravity=(0.0, -9.80665, 0.0))
     model.model_visual_preferences.model_display_hints.show_wrap_geometry = False
     torso = _body(model, "torso", 50.8, (0.0, 0.32, 0.0), 3.3)
-    _draw(model, torso, "trunk", (0.0, 0.26, 0.0), Ellipsoid(radii=(0.10, 0.31, 0.16)))
+    _draw(model, torso, "trunk", (0.0, 0.28, 0.0), Ellipsoid(radii=(0.10, 0.30, 0.15)))
+    _draw(model, torso, "pelvis", (-0.02, 0.03, 0.0), Ellipsoid(radii=(0.09, 0.08, 0.13)))
     _draw(model, torso, "head", (0.02, 0.69, 0.0), Sphere(radius=0.105))
     turn = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT))
     forward = Coordinate(name="pelvis_tx", range=(-5.0, 5.0))
@@ -114,8 +115,29 @@ def jumper(driven: bool = True) -> Model:
     for side, z in SIDES:
         _add_leg(model, torso, side, z, floor)
     if driven:
-        _drive(model)
+        drive(model, CONTROLS)
     return model
+
+
+def drive(model: Model, file: Path) -> None:
+    """Add the controller that gives each muscle the excitation of a table, with straight lines between its rows.
+
+    Raises:
+        DocumentError: the file is no table.
+    """
+    with TableStream(file) as table:
+        times, rows = zip(*table, strict=True)
+    lines: list[Function] = [
+        PiecewiseLinearFunction(name=label, x=times, y=values)
+        for label, values in zip(table.columns, zip(*rows, strict=True), strict=True)
+    ]
+    model.add(
+        PrescribedController(
+            name="jump",
+            socket_actuators=tuple(f"/forceset/{label}" for label in table.columns),
+            ControlFunctions=FunctionSet(name="ControlFunctions", objects=lines),
+        )
+    )
 
 
 def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfSpace) -> None:
@@ -123,12 +145,12 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
     femur = _body(model, f"femur_{side}", 7.5, (0.0, -0.186, 0.0), 0.145)
     tibia = _body(model, f"tibia_{side}", 3.5, (0.0, -0.186, 0.0), 0.059)
     foot = _body(model, f"foot_{side}", 1.1, (0.05, -0.04, 0.0), 0.005)
-    _draw(model, femur, f"thigh_{side}", (0.0, -THIGH / 2, 0.0), Ellipsoid(radii=(0.07, THIGH / 2 + 0.03, 0.065)))
-    _draw(model, tibia, f"shank_{side}", (0.0, -SHANK / 2, 0.0), Ellipsoid(radii=(0.05, SHANK / 2 + 0.03, 0.045)))
-    _draw(model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.03, 0.04)))
+    _draw(model, femur, f"thigh_{side}", (0.0, -THIGH / 2, 0.0), Ellipsoid(radii=(0.03, THIGH / 2 + 0.02, 0.03)))
+    _draw(model, tibia, f"shank_{side}", (0.0, -SHANK / 2, 0.0), Ellipsoid(radii=(0.025, SHANK / 2 + 0.02, 0.025)))
+    _draw(model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.025, 0.035)))
     for name, coordinate, parent, child, at, low, high in (
         ("hip", "hip_flexion", torso, femur, (0.0, 0.0, z), -15.0, 120.0),
-        ("knee", "knee_angle", femur, tibia, (0.0, -THIGH, 0.0), -140.0, 0.0),
+        ("knee", "knee_angle", femur, tibia, (0.0, -THIGH, 0.0), -115.0, 0.0),
         ("ankle", "ankle_angle", tibia, foot, (0.0, -SHANK, 0.0), -45.0, 35.0),
     ):
         angle = Coordinate(
@@ -212,22 +234,5 @@ def _add_contact(model: Model, sphere: ContactSphere, floor: ContactHalfSpace) -
             name=f"{sphere.name}_force",
             contact_parameters=HuntCrossleyForce.ContactParametersSet(objects=[material]),
             transition_velocity=0.3,
-        )
-    )
-
-
-def _drive(model: Model) -> None:
-    """Add the controller that gives each muscle the excitation of the table."""
-    with TableStream(CONTROLS) as table:
-        times, rows = zip(*table, strict=True)
-    lines: list[Function] = [
-        PiecewiseLinearFunction(name=label, x=times, y=values)
-        for label, values in zip(table.columns, zip(*rows, strict=True), strict=True)
-    ]
-    model.add(
-        PrescribedController(
-            name="jump",
-            socket_actuators=tuple(f"/forceset/{label}" for label in table.columns),
-            ControlFunctions=FunctionSet(name="ControlFunctions", objects=lines),
         )
     )
