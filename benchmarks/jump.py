@@ -90,9 +90,15 @@ def learn(folder: Path, seed: int) -> tuple[dict[str, float], int]:
         if lesson.keeps:
             ranges |= found
         end = optimize(
-            plan(model, ranges, to=lesson.to), Objective(lesson.objective), folder / lesson.name, seed=seed,
-            budget=lesson.budget, popsize=16, sigma=0.25 if not found else 0.15, start={**new, **found} if found else None,
-        )  # fmt: skip
+            plan(model, ranges, to=lesson.to),
+            Objective(lesson.objective),
+            folder / lesson.name,
+            seed=seed,
+            budget=lesson.budget,
+            popsize=16,
+            sigma=0.15 if found else 0.25,
+            start={**new, **found} if found else None,
+        )
         found, runs = dict(end.values), runs + end.evaluations
         print(f"{lesson.name}: {end.value:.5g} after {end.evaluations} runs")
     return found, runs
