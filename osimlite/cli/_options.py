@@ -73,8 +73,8 @@ Controls = Annotated[
     list[str] | None,
     typer.Option(
         "--controls",
-        metavar="FILE|NAME=VALUE",
-        help="Drive actuators: a table of controls over time, or one number; may be given several times.",
+        metavar="CONTROLS",
+        help="Drive actuators: the file of a table of controls over time, or NAME=VALUE; may be given several times.",
         show_default=False,
     ),
 ]

@@ -82,7 +82,10 @@ def optimize(
     equilibrate: options.Equilibrate = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
-    """Look for the start, or the numbers, with which a model does best; writes it with them, ready to simulate.
+    """Look for the start, the controls or other numbers with which a model does best; writes it with them.
+
+    Of muscles: osimlite optimize jumper --objective 'max(center_of_mass_Y)' --maximize
+    --vary '{*}_?/control@0:0.3:4=0:1'
 
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
     """
