@@ -37,6 +37,7 @@ def muscles(
         typer.Option(min=2, help="How many values of each coordinate.", show_default="50, of two coordinates 15"),
     ] = None,
     activation: Annotated[float, typer.Option(help="Of all muscles, 0 to 1.")] = 1.0,
+    wrapping: options.Wrapping = "opensim",
     compare: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Another model, side by side: scaled, or converted.", show_default=False),
@@ -81,6 +82,7 @@ def muscles(
                 values,
                 muscle or (),
                 activation=activation,
+                wrapping=wrapping,
                 folder=path.parent,
                 progress=advance,
             )

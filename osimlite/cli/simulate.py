@@ -56,6 +56,7 @@ def simulate(
             "fixed steps.",
         ),
     ] = False,
+    wrapping: options.Wrapping = "opensim",
     skip_unsupported: options.SkipUnsupported = False,
     opensim_derivatives: Annotated[
         bool,
@@ -95,6 +96,7 @@ def simulate(
     with Simulation(
         model,
         engine,
+        wrapping=wrapping,
         skip_unsupported=skip_unsupported,
         opensim_derivatives=opensim_derivatives,
         rolling=rolling,

@@ -18,6 +18,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.paths import Paths
@@ -73,6 +74,7 @@ def muscle_curves(
     muscles: Sequence[str] = (),
     *,
     activation: float = 1.0,
+    wrapping: str = OPENSIM,
     folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> MuscleCurves:
@@ -86,6 +88,7 @@ def muscle_curves(
         values: of coordinates by name or path, rad or m; of several all combinations, the last one changing first.
         muscles: names or paths; all if there are none.
         activation: of all muscles, 0 to 1.
+        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
         folder: where the model's file is, and those that it names.
         progress: called with the number of poses done and of all.
 
@@ -93,13 +96,13 @@ def muscle_curves(
         ModelError: there is no such coordinate or muscle, or the model is no mechanism.
         UnsupportedError: a muscle, a joint or a constraint of an unknown class.
         SimulationError: no pose fulfils the constraints.
-        SettingError: the activation is not from 0 to 1.
+        SettingError: the activation is not from 0 to 1, or there is no such wrapping.
     """
     if not 0.0 <= activation <= 1.0:
         raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
     mechanism = build_mechanism(model)
     places = [mechanism.coordinate_index(name) for name in values]
-    forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
+    forces = force_elements(model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder)
     tree = model.tree()
     optimal = {tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)}
     named = _chosen(list(optimal), muscles)
@@ -114,7 +117,7 @@ def muscle_curves(
         _Muscle(found[path], System(free, Forces((found[path],), (), controls)), activation, optimal[path])
         for path in named
     ]
-    paths = Paths(model)
+    paths = Paths(model, wrapping)
     rows = list(product(*values.values()))
     poses = np.array(rows, dtype=float).reshape(len(rows), len(values))
     names = [*QUANTITIES, *(f"moment_arm_{name}" for name in values)]

@@ -65,8 +65,9 @@ LEAST = 1e-100
 """What is not divided by."""
 SAMPLES, STEPS = 16, 6
 """The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
-DEEP, BEADS, PULLS = 0.8, 16, 8
-"""From this angle (rad) on a string is pulled tight over an ellipsoid: of so many pieces, so often."""
+DEEP, BENT, BEADS, PULLS = 0.5, 0.7, 16, 8
+"""Where a line through an ellipsoid is nearer to the centre than this (squared, by radii), or the cosine between both
+ends of a path is less than this, a string is pulled tight over it on either side: of so many pieces, so often."""
 
 
 def start(p: Floats, first: Vector, second: Vector, how: float, room: Floats) -> Start:
@@ -149,8 +150,9 @@ def around_ellipsoid(
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
     found = on_section(radii, one, two, cross(out, way), room)
-    turn, _, _, _ = found
-    if p[KIND] == ELLIPSOID and (how == PULLED or (turn > DEEP and dot(out, middle) > 0.0)):
+    turn, _, sets_out, _ = found
+    is_deep = dot(middle, middle) < DEEP or dot(unit(sets_out), unit(vector(room, 0))) < BENT
+    if p[KIND] == ELLIPSOID and ((is_deep and dot(out, middle) > 0.0) or how == PULLED):
         found = shortened(p, turn, first, second, room)
         if side == 0.0:
             whole = string(room)
@@ -169,7 +171,7 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Fl
         one: an end, so scaled that the surface is the unit sphere.
         two: the other end, likewise.
         across: normal to the plane of the section; the path turns to the left about it.
-        room: filled with the beads.
+        room: filled with the direction at the end, and the beads.
     """
     normal = unit(across)
     centre = times(dot(normal, one), normal)
@@ -179,6 +181,7 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Fl
     turn = atan2(dot(across, a2), dot(a1, a2))
     if turn < -1e-6:
         turn += 2.0 * pi
+    put(room, 0, elementwise(radii, cross(normal, a2)))
     length = 0.0
     for k in range(1, BEADS):
         angle = turn * (k - 0.5) / (BEADS - 1)
