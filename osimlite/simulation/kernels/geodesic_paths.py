@@ -13,6 +13,7 @@ from __future__ import annotations
 from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
 from osimlite.simulation.kernels.cable_surfaces import (
     ARC,
+    ELLIPSOID,
     KIND,
     POINT,
     SQUARE,
@@ -31,7 +32,16 @@ from osimlite.simulation.kernels.geodesic_search import (
     start_after,
     to_ground,
 )
-from osimlite.simulation.kernels.geodesic_starts import ANY_SIDE, AS_MEANT, PULLED, SIDE, SURFACE, depth, start
+from osimlite.simulation.kernels.geodesic_starts import (
+    ANY_SIDE,
+    AS_MEANT,
+    OTHER_WAY,
+    PULLED,
+    SIDE,
+    SURFACE,
+    depth,
+    start,
+)
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
 from osimlite.simulation.kernels.path_wraps import in_surface
 from osimlite.simulation.kernels.paths import (
@@ -54,7 +64,7 @@ from osimlite.simulation.kernels.paths import (
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import direction, station
-from osimlite.simulation.kernels.vectors import Vector, put, vector
+from osimlite.simulation.kernels.vectors import Vector, minus, norm, put, vector
 
 WRAP_INTS = 4
 PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
@@ -82,7 +92,7 @@ def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
         wraps: number of wraps.
         room: length of the record without slots.
     """
-    search = room + SLOT * (most + 2)
+    search = room + SLOT * (most + 3)
     poses = search + search_room(most)
     return [room, search, poses], poses + POSE_NUMBERS * wraps
 
@@ -131,18 +141,51 @@ def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
 
 
 def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
-    """Bend the piece between two points around its surfaces; returns around how many, which then are in the slots."""
+    """Bend the piece between two points around its surfaces; returns around how many, which then are in the slots.
+
+    The shorter way around an ellipsoid is known once both are.
+    """
+    size, near, last = i[POINTS] + 2 * i[WRAPS], 0, 0
+    wraps = at(i, NODES_AT + NODE_INTS * size)
+    slots = at(wraps, WRAP_INTS * i[WRAPS])
+    chain, poses = at(found, slots[CHAIN]), at(found, slots[POSES])
+    for number in range(i[WRAPS]):
+        if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
+            near, last = near + 1, number
+    count = settle(i, p, found, one, two, near) if near > 0 else 0
+    numbers = at(p, wraps[WRAP_INTS * last + PLACES])
+    if near == 1 and count == 1 and numbers[SURFACE + KIND] == ELLIPSOID and numbers[SIDE] == 0.0:
+        spare, length = at(chain, SLOT * 3), chain_length(chain)
+        for k in range(SLOT):
+            spare[k] = chain[SLOT + k]
+        poses[POSE_NUMBERS * last + HOW] = OTHER_WAY
+        if settle(i, p, found, one, two, near) == 0 or not chain_length(chain) < length:
+            for k in range(3):
+                chain[2 * SLOT + k] = found[ORDER + size + NODE_WORK * two + PLACE + k]
+            for k in range(SLOT):
+                chain[SLOT + k] = spare[k]
+    return count
+
+
+def chain_length(chain: Floats) -> float:
+    """Length of a piece that is bent around one surface."""
+    before, after = (
+        minus(start_after(chain, 0, 1), end_before(chain, 1)),
+        minus(start_after(chain, 1, 1), end_before(chain, 2)),
+    )
+    return norm(before) + float(chain[SLOT + GEODESIC + ARC]) + norm(after)
+
+
+def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int) -> int:
+    """Put into the slots what the piece between two points bends around; returns how many there are."""
     size = i[POINTS] + 2 * i[WRAPS]
     work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
     chain, room, poses = at(found, slots[CHAIN]), at(found, slots[SEARCH]), at(found, slots[POSES])
     put(chain, 0, vector(work, NODE_WORK * one + PLACE))
     put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
-    near = 0
-    for number in range(i[WRAPS]):
-        near += 1 if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT else 0
     count, loose = 0, LOOSE if near > 1 else 0
-    for turn in range(TURNS if near > 0 else 0):
+    for turn in range(TURNS):
         changed = False
         for number in range(i[WRAPS]):
             own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)

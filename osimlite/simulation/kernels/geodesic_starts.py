@@ -5,8 +5,8 @@ surface, of all sides by where the way is shorter:
 
 - a cylinder with a side x or y: the path never goes through the half plane behind its axis, on the side that is not
   active. So it bends around the active side also where it misses the cylinder but would pass behind it;
-- a sphere or an ellipsoid with a side: the path bends outwards there, from its nearest way out as in a mirror; only a
-  great circle is a geodesic, so the path may go around the far side;
+- a sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the surface; if that is
+  not on the active side, then to the other end of the same plane, if this is nearer to what a mirror shows;
 - a torus: the path goes through the hole, and never through the plane outside of the ring.
 
 Of several pieces around one cylinder or torus only that which comes nearest to its axis, or its ring, need do so. The
@@ -30,7 +30,6 @@ from osimlite.simulation.kernels.cable_surfaces import (
     WEIGHTS,
     value,
 )
-from osimlite.simulation.kernels.closest_on_ellipsoid import closest_point
 from osimlite.simulation.kernels.pointers import Floats, at
 from osimlite.simulation.kernels.vectors import (
     Vector,
@@ -57,17 +56,20 @@ Start = tuple[float, Vector, Vector, float]
 """The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
 surface; its direction there; its length on the surface, m."""
 
-AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
+AS_MEANT, ANY_SIDE, OTHER_WAY, PULLED = 1.0, 2.0, 3.0, 4.0
 """How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; around an
-ellipsoid where a string comes to lie."""
+ellipsoid on the other side, or where a string comes to lie."""
 
 LEAST = 1e-100
 """What is not divided by."""
 SAMPLES, STEPS = 16, 6
 """The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
-DEEP, BENT, BEADS, PULLS = 0.5, 0.7, 16, 8
-"""Where a line through an ellipsoid is nearer to the centre than this (squared, by radii), or the cosine between both
-ends of a path is less than this, a string is pulled tight over it on either side: of so many pieces, so often."""
+WAYS, WORTHWHILE = 16, 1.5
+"""So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
+much deeper there."""
+BENT, BEADS, PULLS = 0.7, 16, 8
+"""If the cosine between both ends of a path is less than this, a string is pulled tight over an ellipsoid: of so many
+pieces, so often."""
 
 
 def start(p: Floats, first: Vector, second: Vector, how: float, room: Floats) -> Start:
@@ -81,14 +83,15 @@ def start(p: Floats, first: Vector, second: Vector, how: float, room: Floats) ->
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
-    """The squared distance of a piece from the axis of a cylinder, or the ring of a torus; 0 for other surfaces."""
-    if p[KIND] == CYLINDER:
-        x, y, _ = first
-        wx, wy, _ = minus(second, first)
-        part = min(max(-(x * wx + y * wy) / max(wx * wx + wy * wy, LEAST), 0.0), 1.0)
-        x, y = x + part * wx, y + part * wy
-        return x * x + y * y
-    return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS]) if p[KIND] == TORUS else 0.0
+    """How near a piece comes to the middle: squared, to the axis of a cylinder or the ring of a torus (m^2), or to the
+    centre of a sphere or an ellipsoid (by radii)."""
+    if p[KIND] == TORUS:
+        return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
+    way, weights = minus(second, first), vector(p, WEIGHTS)
+    square = dot(elementwise(weights, way), way)
+    part = min(max(-dot(elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
+    middle = along(first, part, way)
+    return dot(elementwise(weights, middle), middle) / (p[SQUARE] if p[KIND] != CYLINDER else 1.0)
 
 
 def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
@@ -124,7 +127,7 @@ def around_ellipsoid(
 ) -> Start:
     """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
 
-    The circle is in the plane of the ends and the way from the middle of the chord straight out of the surface.
+    The circle is in the plane of the ends and the direction in which the line is least deep in the surface.
     """
     weights = vector(p, WEIGHTS)
     wx, wy, wz = times(1.0 / p[SQUARE], weights)
@@ -137,30 +140,61 @@ def around_ellipsoid(
     if not dot(middle, middle) < 1.0:
         return 0.0, first, way, 0.0
     out = middle
-    if p[KIND] == ELLIPSOID:
-        a, b, c = radii
-        factor = 3.0 / (a + b + c)
-        nearest = closest_point(times(factor, radii), times(factor, elementwise(radii, middle)))
-        out = elementwise(scale, elementwise(weights, nearest))
-    if norm(cross(out, way)) < LEAST:
-        wx, wy, wz = elementwise(way, way)
-        out = replaced((0.0, 0.0, 0.0), 0 if wx <= min(wy, wz) else (1 if wy <= wz else 2), 1.0)
+    if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
+        out = way_out(radii, elementwise(radii, middle), elementwise(radii, way), how == OTHER_WAY)
+    if dot(out, out) == 0.0:
+        return 0.0, first, way, 0.0
     if side != 0.0 and not on_side(out, axis, side):
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
+    out = elementwise(scale, out)
     found = on_section(radii, one, two, cross(out, way), room)
     turn, _, sets_out, _ = found
-    is_deep = dot(middle, middle) < DEEP or dot(unit(sets_out), unit(vector(room, 0))) < BENT
-    if p[KIND] == ELLIPSOID and ((is_deep and dot(out, middle) > 0.0) or how == PULLED):
+    is_bent = dot(unit(sets_out), unit(vector(room, 0))) < BENT and (side == 0.0 or dot(out, middle) > 0.0)
+    if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
         found = shortened(p, turn, first, second, room)
-        if side == 0.0:
-            whole = string(room)
-            on_section(radii, one, two, cross(way, out), room)
-            other = shortened(p, turn, first, second, room)
-            if string(room) < whole:
-                found = other
     return found
+
+
+def way_out(radii: Vector, middle: Vector, way: Vector, other: bool) -> Vector:
+    """The direction across a line in which it is least below the widest of an ellipsoid, a unit vector.
+
+    Args:
+        radii: of the ellipsoid.
+        middle: a point of the line.
+        way: along the line.
+        other: return the next direction in which it is less so than in those beside; zeros if there is none, or if the
+            line is so much deeper there that no path is shorter.
+    """
+    x, y, z = way
+    axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
+    a = unit(cross(way, replaced((0.0, 0.0, 0.0), axis, 1.0)))
+    b = cross(unit(way), a)
+    ra, rb = elementwise(radii, a), elementwise(radii, b)
+    aa, ab, bb = dot(ra, ra), dot(ra, rb), dot(rb, rb)
+    ma, mb = dot(middle, a), dot(middle, b)
+    best = second = (inf, 0.0)
+    before, here = below(aa, ab, bb, ma, mb, -2), below(aa, ab, bb, ma, mb, -1)
+    for k in range(WAYS):
+        after = below(aa, ab, bb, ma, mb, k)
+        if here < before and here <= after:
+            found = here, 2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after))
+            if here < best[0]:
+                best, second = found, best
+            elif here < second[0]:
+                second = found
+        before, here = here, after
+    depth, angle = second if other else best
+    if other and depth > WORTHWHILE * best[0]:
+        return 0.0, 0.0, 0.0
+    return along(times(cos(angle), a), sin(angle), b)
+
+
+def below(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
+    """How far a line is below the widest of an ellipsoid in a direction across it, by products of scaled directions."""
+    c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
+    return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
 
 
 def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Floats) -> Start:
@@ -220,14 +254,6 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Float
     for k in range(one, two):
         length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
     return turn, times(0.5, plus(begin, end)), minus(end, begin), length
-
-
-def string(room: Floats) -> float:
-    """Length of the string of beads."""
-    length = 0.0
-    for k in range(BEADS):
-        length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
-    return length
 
 
 def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
