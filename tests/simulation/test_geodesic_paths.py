@@ -157,6 +157,25 @@ def test_sides():
         assert length(around(surface("Cylinder", [0.03, 1.0], side)), first, second) == pytest.approx(value, rel=1e-14)
 
 
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_a_knee_winds_on(mirrored):
+    """Across a cylinder the ways are the same, also where an end has turned past the half plane behind it."""
+    knee = wrapped({"via": (), "objects": (surface("Cylinder", [0.04, 1.0], "x"),)})
+    paths, usual = osimlite.paths(knee, wrapping="geodesic"), osimlite.paths(knee)
+    for flexion in np.linspace(0.0, 2.6, 27):
+        angle = -1.2 - flexion
+        ends = (0.05, mirrored * 0.3, 0.0), (0.06 * np.cos(angle), mirrored * 0.06 * np.sin(angle), 0.0)
+        assert length(paths, *ends) == pytest.approx(length(usual, *ends), rel=0.0, abs=1e-12)
+    assert length(paths, *ends) > 0.35
+
+
+def test_only_the_piece_nearest_to_the_axis_is_held_on_a_side():
+    ends, via = ((-0.1, 0.04, 0.0), (0.1, -0.1, 0.0)), [(0.09, 0.02, 0.0)]
+    held = around(surface("Cylinder", [0.03, 1.0], "y"), via=via)
+    straight = np.linalg.norm(np.subtract(ends[0], via[0])) + np.linalg.norm(np.subtract(ends[1], via[0]))
+    assert 0.0 <= length(held, *ends) - straight < 0.001
+
+
 def test_far_side_of_a_sphere():
     """Where OpenSim's length is negative."""
     found = length(around(surface("Sphere", [0.04], "x")), (-0.039, 0.02, 0.0), (-0.039, -0.02, 0.001))

@@ -3,8 +3,8 @@
 A straight piece of a path bends around a surface that it would go through. On which side is told by the quadrant of the
 surface, of all sides by where the way is shorter:
 
-- a cylinder with a side x or y: the path never goes through the half plane behind its axis, on the side that is not
-  active. So it bends around the active side also where it misses the cylinder but would pass behind it;
+- a cylinder with a side x or y: the path turns so that it lies on the active side, whatever angle that takes, and also
+  where it misses the cylinder but would pass behind it, whenever OpenSim bends it;
 - a sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the surface; if that is
   not on the active side, then to the other end of the same plane, if this is nearer to what a mirror shows;
 - a torus: the path goes through the hole, and never through the plane outside of the ring.
@@ -47,7 +47,9 @@ from osimlite.simulation.kernels.vectors import (
     unit,
     vector,
 )
-from osimlite.simulation.kernels.wrap_sides import on_side
+from osimlite.simulation.kernels.wrap_cylinder import closest_to_axis
+from osimlite.simulation.kernels.wrap_sides import action, on_side
+from osimlite.simulation.kernels.wrapping import MANDATORY, NONE
 
 AXIS, SIDE, HALF_LENGTH, SURFACE = 0, 1, 2, 3
 """Numbers of what a path wraps around: axis and sign of its side, half its length (of a cylinder), the surface."""
@@ -101,17 +103,24 @@ def around_cylinder(radius: float, half_length: float, first: Vector, second: Ve
     """
     px, py, pz = first
     qx, qy, qz = second
-    # Angles from the middle of the active side, which leap behind it.
-    ux, uy = (side, 0.0) if axis == 0 else (0.0, side)
-    if side == 0.0 or axis == 2:
-        side, ux, uy = 0.0, px, py
-    one = atan2(ux * py - uy * px, ux * px + uy * py)
-    sweep = atan2(ux * qy - uy * qx, ux * qx + uy * qy) - one
-    way = 1.0 if sweep >= 0.0 else -1.0
+    closest, crosses = closest_to_axis(first, second, radius)
+    if axis == 2:
+        side = 0.0
+    code = MANDATORY if crosses else NONE
+    if side != 0.0:
+        active = on_side(first, axis, side), on_side(second, axis, side)
+        code = action(*active, on_side(closest, axis, side), crosses)
+    if code == NONE:
+        return 0.0, first, second, 0.0
+    # Angles from the middle of the active side; or from the first end.
+    ux, uy = (px, py) if side == 0.0 else ((side, 0.0) if axis == 0 else (0.0, side))
+    one, two = atan2(ux * py - uy * px, ux * px + uy * py), atan2(ux * qy - uy * qx, ux * qx + uy * qy)
     far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
     line1, line2 = sqrt(max(far1 * far1 - radius * radius, 0.0)), sqrt(max(far2 * far2 - radius * radius, 0.0))
-    before = atan2(line1, radius)
-    turn = abs(sweep) - before - atan2(line2, radius)
+    before, after = atan2(line1, radius), atan2(line2, radius)
+    sweep = (two - one) % (2.0 * pi)
+    way = 1.0 if (sweep <= pi if side == 0.0 else turns_left(one, before, two, after, sweep)) else -1.0
+    turn = (sweep if way > 0.0 else 2.0 * pi - sweep) - before - after
     size = sqrt(ux * ux + uy * uy)
     c, s = cos(one + way * before) / size, sin(one + way * before) / size
     nx, ny = c * ux - s * uy, c * uy + s * ux
@@ -120,6 +129,28 @@ def around_cylinder(radius: float, half_length: float, first: Vector, second: Ve
     if abs(z) > half_length and abs(qz - slope * line2) > half_length:
         turn = 0.0
     return turn, (radius * nx, radius * ny, z), (-way * ny, way * nx, slope), radius * turn * sqrt(1.0 + slope * slope)
+
+
+def turns_left(one: float, before: float, two: float, after: float, sweep: float) -> bool:
+    """Whether a path turns to the left around a cylinder, so that it stays on the active side as in OpenSim.
+
+    It goes by that tangent of the first end which meets the active side, or if both do or none does, by that of the
+    second; if these do not tell either, the shorter way, but the longer one from behind to behind.
+
+    Args:
+        one: angle of the first end from the middle of the active side.
+        before: angle from there to its tangents.
+        two: angle of the second end.
+        after: angle from there to its tangents.
+        sweep: angle from end to end to the left, from 0 on.
+    """
+    left1, right1 = cos(one + before) >= 0.0, cos(one - before) >= 0.0
+    left2, right2 = cos(two - after) >= 0.0, cos(two + after) >= 0.0
+    if left1 != right1:
+        return left1
+    if left2 != right2:
+        return left2
+    return (sweep <= pi) == (left1 or left2)
 
 
 def around_ellipsoid(
