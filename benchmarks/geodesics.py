@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -17,7 +18,7 @@ import osimlite
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 
-SIZES = {
+SIZES: dict[str, dict[str, Any]] = {
     "Cylinder": {"radius": 0.03, "length": 9.0},
     "Sphere": {"radius": 0.04},
     "Ellipsoid": {"dimensions": (0.03, 0.05, 0.04)},
@@ -50,7 +51,7 @@ def made(kinds: list[str]) -> osimlite.Model:
         point = PathPoint(name=name, socket_parent_frame=f"/bodyset/{name}")
         force.geometry_path.path_point_set.objects.append(point)
     for number, (kind, side) in enumerate(words.split() for words in kinds):
-        place = APART if number else {}
+        place: dict[str, Any] = APART if number else {}
         surface = getattr(osimlite, f"Wrap{kind}")(name=f"w{number}", quadrant=side, **SIZES[kind], **place)
         model.ground.wrap_object_set.objects.append(surface)
         force.geometry_path.path_wrap_set.objects.append(PathWrap(name=f"w{number}", wrap_object=surface.name))

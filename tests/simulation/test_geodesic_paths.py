@@ -170,10 +170,16 @@ def test_a_knee_winds_on(mirrored):
 
 
 def test_only_the_piece_nearest_to_the_axis_is_held_on_a_side():
-    ends, via = ((-0.1, 0.04, 0.0), (0.1, -0.1, 0.0)), [(0.09, 0.02, 0.0)]
-    held = around(surface("Cylinder", [0.03, 1.0], "y"), via=via)
-    straight = np.linalg.norm(np.subtract(ends[0], via[0])) + np.linalg.norm(np.subtract(ends[1], via[0]))
-    assert 0.0 <= length(held, *ends) - straight < 0.001
+    cylinder, first, via, second = (
+        surface("Cylinder", [0.03, 1.0], "y"),
+        (-0.1, 0.04, 0.0),
+        (0.09, -0.02, 0.0),
+        (0.1, -0.1, 0.0),
+    )
+    bent, behind = length(around(cylinder), first, via), length(around(cylinder), via, second)
+    straight = np.linalg.norm(np.subtract(via, second))
+    assert behind > straight + 0.05
+    assert length(around(cylinder, via=[via]), first, second) == pytest.approx(bent + straight, rel=1e-14)
 
 
 def test_far_side_of_a_sphere():
