@@ -101,6 +101,15 @@ def corpus(shared: Path) -> list[CorpusModel]:
     return models
 
 
+@pytest.fixture
+def exact_names(tmp_path: Path) -> None:
+    """A file system that tells letter cases apart, as that of Linux does."""
+    (tmp_path / "a").touch()
+    if (tmp_path / "A").exists():
+        pytest.skip("this file system finds a name in any letter case")
+    (tmp_path / "a").unlink()
+
+
 DESCRIPTORS = Path("/proc/self/fd")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import pty
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -42,6 +41,7 @@ def test_bar(monkeypatch, stream, second, shows):
 @pytest.mark.parametrize("is_terminal", [True, False])
 def test_who_waits_for_the_compiler_is_told_once(tmp_path, is_terminal):
     pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    pty = pytest.importorskip("pty", reason="needs terminals as POSIX has them")
     ours, theirs = pty.openpty()
     script = (
         "import sys; from osimlite.cli import main; sys.argv = ['osimlite', 'build', 'dynamic-walker', '-o', '-']\n"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import select
 import signal
 import subprocess
@@ -57,6 +56,7 @@ def stiff(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
 @pytest.mark.parametrize("choice", [("--accuracy", "1e-9"), ("--fixed-step", "1e-8")])
 def test_a_long_run_tells_how_far_it_is_and_keeps_what_it_has_after_ctrl_c(stiff, engine, choice):
+    pty = pytest.importorskip("pty", reason="needs terminals as POSIX has them")
     ours, theirs = pty.openpty()
     words = ["simulate", stiff.name, "--engine", engine, *choice, "--to", "9", "--report-interval", "9", "--plot"]
     command = [sys.executable, "-m", "osimlite", *words]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -66,6 +67,7 @@ def test_what_cannot_be_shown_is_said(
     assert not list(walker.glob("a.*"))
 
 
+@pytest.mark.skipif(os.name == "nt", reason="sends signals")
 def test_the_page_is_served_until_interrupted(walker: Path) -> None:
     command = [sys.executable, "-u", "-m", "osimlite", "view", "walker.osim", "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:

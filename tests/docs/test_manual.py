@@ -55,6 +55,7 @@ def shell(tmp_path: Path) -> dict[str, str]:
     return {**os.environ, "PATH": path, "MPLBACKEND": "Agg", "COLUMNS": "100", **home}
 
 
+@pytest.mark.skipif(os.name == "nt", reason="blocks of commands are for bash")
 @pytest.mark.parametrize("page", PAGES)
 def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     for package in ("numba", "matplotlib"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from osimlite import Body, Mesh, Model, PinJoint, validate, write
 
 
-@pytest.mark.parametrize("name", ["/dev/null", "folder.vtp", "link.vtp", "Geometry"])
+@pytest.mark.parametrize("name", [os.devnull, "folder.vtp", "link.vtp", "Geometry"])
 def test_what_is_no_file_is_not_called_by_its_own_name(tmp_path: Path, name: str) -> None:
     (tmp_path / "folder.vtp").mkdir()
     (tmp_path / "Geometry").mkdir()
@@ -24,6 +25,7 @@ def test_what_is_no_file_is_not_called_by_its_own_name(tmp_path: Path, name: str
     assert finding.message == f"'{name}' of Mesh 'bone' is a folder, a device or a link to nothing, and no file"
 
 
+@pytest.mark.usefixtures("exact_names")
 def test_a_file_in_other_letter_case_is_still_pointed_out(tmp_path: Path) -> None:
     (tmp_path / "bone.VTP").write_text("")
     model = Model(name="m")

@@ -155,6 +155,7 @@ def test_files_outside_the_folders_are_refused_by_name(bones):
     assert "mesh" not in kinds(trusted) and len(visuals(trusted)) == 5
 
 
+@pytest.mark.usefixtures("exact_names")
 def test_a_file_spelled_alike_is_taken_and_reported(bones):
     urdf = to_urdf(one_body(Mesh(mesh_file="geometry\\femur.VTP"), Mesh(mesh_file="PELVIS.stl")), folder=bones)
     assert [item["filename"] for item in meshes(urdf)] == ["meshes/Femur.obj", "meshes/pelvis.stl"]
