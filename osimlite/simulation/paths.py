@@ -29,7 +29,7 @@ from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED, SURFACE
 from osimlite.simulation.kernels.projection import REDUNDANT
 from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
-from osimlite.simulation.polylines import Polylines
+from osimlite.simulation.polylines import Course, Polylines
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 
@@ -117,22 +117,23 @@ class Paths:
         return self._system.on_surfaces(self.mechanism.values(q), self.routes)
 
     def polylines(self, q: Values) -> dict[str, Array]:
-        """Corners (k, 3) in ground (m) of each path through points, from end to end, round the surfaces that it wraps.
+        """Corners (k, 3) in ground (m) of each path, from end to end, round its surfaces.
 
-        With OpenSim's wrapping these are a helix on a cylinder, a great circle on a sphere, the section of a
-        plane with an ellipsoid, a helix about the tube of a torus; corners there are 0.15 rad apart.
+        A path that is a function of coordinates has none. With OpenSim's wrapping there are a helix on a cylinder, a
+        great circle on a sphere, the section of a plane with an ellipsoid, a helix about the tube of a torus; corners
+        there are 0.15 rad apart.
         """
         state = self.mechanism.at(self.mechanism.values(q))
         corners = self._polylines.at(state.q, state.rotations[:-1], state.origins[:-1])
-        return dict(zip(self._through, corners, strict=True))
+        return dict(zip(self._traced, corners, strict=True))
 
     @cached_property
-    def _through(self) -> dict[str, ThroughPoints]:
-        return {name: route for name, route in self.routes.items() if isinstance(route, ThroughPoints)}
+    def _traced(self) -> dict[str, Course]:
+        return {name: route for name, route in self.routes.items() if isinstance(route, Course)}
 
     @cached_property
     def _polylines(self) -> Polylines:
-        return Polylines(self.mechanism, list(self._through.values()))
+        return Polylines(self.mechanism, list(self._traced.values()))
 
     def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
         """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.

@@ -4,21 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.elements.items import Placement, Places
+from osimlite.simulation.elements.items import Item, Placement, Places
 from osimlite.simulation.engines.linking import Code, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pointers import Ints
-from osimlite.simulation.kernels.wrap_curves import MOST
+
+
+@runtime_checkable
+class Course(Protocol):
+    """A path that can be traced."""
+
+    @property
+    def trace(self) -> str:
+        """Name of the law that traces it."""
+
+    @property
+    def curves(self) -> tuple[str, ...]:
+        """Names of the laws that it calls, whose addresses stand behind the item of the path."""
+
+    @property
+    def corners(self) -> int:
+        """The most corners that it is traced with."""
+
+    @property
+    def start(self) -> tuple[int, Array]:
+        """The body that it starts in, and where there (3,)."""
+
+    def items(self, places: Places) -> list[Item]:
+        """Parts, of which the last is the path's own."""
 
 
 class Polylines:
-    """Paths through points by themselves, laid out for the kernels, which take every body for a link.
+    """Paths by themselves, laid out for the kernels, which take every body for a link.
 
     Args:
         mechanism: whose bodies and coordinates they depend on.
@@ -34,7 +57,7 @@ class Polylines:
         work: length of the work vector, which begins with the links.
     """
 
-    def __init__(self, mechanism: Mechanism, routes: Sequence[ThroughPoints]) -> None:
+    def __init__(self, mechanism: Mechanism, routes: Sequence[Course]) -> None:
         bodies, freedoms = len(mechanism.bodies), len(mechanism.coordinates)
         places = Places(mechanism, {k: k for k in range(freedoms)}, [Placement(k, np.eye(4)) for k in range(bodies)])
         self.laws, self.items, self.traces = [""], list[int](), list[int]()
@@ -51,9 +74,9 @@ class Polylines:
                 self.work += item.room
             self.items.append(place)
             self.traces.append(self._law(route.trace))
-            for surface in route.surfaces:
-                ints.append(self._law(surface.curve, len(ints)))
-            self.room = max(self.room, len(route.points) + len(route.surfaces) * (2 + int(MOST)))
+            for curve in route.curves:
+                ints.append(self._law(curve, len(ints)))
+            self.room = max(self.room, route.corners)
         self.structure, self.numbers = np.array(ints, dtype=np.int64), np.array(numbers)
         self._w, self._y, self._f = np.zeros(self.work), np.zeros(2 * freedoms), np.zeros(3 * self.room)
         self._poses = self._w[: layout.LINK_WORK * bodies].reshape(bodies, layout.LINK_WORK)

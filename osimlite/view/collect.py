@@ -22,11 +22,12 @@ from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame, TwoFrameLinker
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
-from osimlite.schema.paths import GeometryPath
+from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import OPENSIM, ElementBuilder
-from osimlite.simulation.elements.geometries.paths import geometry_path
+from osimlite.simulation.elements.geometries.path import PATH
+from osimlite.simulation.polylines import Course
 from osimlite.view import surfaces
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
 
@@ -130,7 +131,7 @@ class _Collector:
                 body, point = self.mechanism.stations[path]
                 color = self.model.model_visual_preferences.model_display_hints.marker_color
                 self._add(path, "markers", body, surfaces.ball(), _stretched((_MARKER_RADIUS,) * 3, point), color)
-            case GeometryPath():
+            case AbstractGeometryPath():
                 self._path(component, path)
             case Force():
                 self._force(component, path)
@@ -214,13 +215,17 @@ class _Collector:
         visible = look.visible and look.surface_properties.representation != 0 and surface.active
         self._add(path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible)
 
-    def _path(self, path: GeometryPath, name: str) -> None:
+    def _path(self, path: AbstractGeometryPath, name: str) -> None:
         owner = self.tree.parent_of(path)
+        course = PATH.read(self.builder, owner)
+        if not isinstance(course, Course):
+            raise UnsupportedError(f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it")
         of = (self.tree.path_of(owner) if owner is not None else None) or name
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
-        course = geometry_path.read(self.builder, owner)
-        found = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
-        wraps = tuple(self.tree.path_of(surface) or "" for surface in found)
+        found: list[Component | None] = []
+        if isinstance(path, GeometryPath):
+            found = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
+        wraps = tuple(self.tree.path_of(surface) or "" for surface in found if surface is not None)
         self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps))
 
     def _force(self, force: Force, path: str) -> None:

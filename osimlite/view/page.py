@@ -20,7 +20,6 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import AxisMotion
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
@@ -147,9 +146,9 @@ def _drawn(scene: Scene) -> dict[str, Any]:
                 "radius": line.radius,
                 "visible": line.visible,
                 **(
-                    {"route": next(routes), "most": scene.polylines.room, "wraps": line.wraps}
-                    if isinstance(line.course, ThroughPoints)
-                    else {"points": [{"body": point.body, "at": point.location.tolist()} for point in line.course]}
+                    {"points": [{"body": point.body, "at": point.location.tolist()} for point in line.course]}
+                    if isinstance(line.course, tuple)
+                    else {"route": next(routes), "most": line.course.corners, "wraps": line.wraps}
                 ),
             }
             for line in scene.lines

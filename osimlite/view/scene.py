@@ -16,8 +16,7 @@ import numpy as np
 from osimlite.meshes.surface import Surface
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.polylines import Polylines
+from osimlite.simulation.polylines import Course, Polylines
 
 Color = tuple[float, float, float]
 Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "frames"]
@@ -80,7 +79,7 @@ class Line:
 
     path: str
     layer: Layer
-    course: tuple[LinePoint, ...] | ThroughPoints
+    course: tuple[LinePoint, ...] | Course
     color: Color
     radius: float = 0.004
     visible: bool = True
@@ -89,15 +88,12 @@ class Line:
     @property
     def start(self) -> LinePoint:
         """Its first point."""
-        if isinstance(self.course, ThroughPoints):
-            first = self.course.points[0]
-            return LinePoint(first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3])
-        return self.course[0]
+        return self.course[0] if isinstance(self.course, tuple) else LinePoint(*self.course.start)
 
     @property
     def body(self) -> int | None:
         """The body that all of it is fixed to, if there is one."""
-        bodies = set() if isinstance(self.course, ThroughPoints) else {point.body for point in self.course}
+        bodies = {point.body for point in self.course} if isinstance(self.course, tuple) else set()
         return bodies.pop() if len(bodies) == 1 else None
 
 
@@ -147,9 +143,9 @@ class Bodies:
         """Corners (k, 3) in ground of each line of the scene."""
         paths = iter(self.scene.polylines.at(self.q, self.rotations[:-1], self.origins[:-1]))
         return [
-            next(paths)
-            if isinstance(line.course, ThroughPoints)
-            else np.concatenate([self.points(point.body, point.location[None]) for point in line.course])
+            np.concatenate([self.points(point.body, point.location[None]) for point in line.course])
+            if isinstance(line.course, tuple)
+            else next(paths)
             for line in self.scene.lines
         ]
 
@@ -199,7 +195,7 @@ class Scene:
     @cached_property
     def polylines(self) -> Polylines:
         """The paths among the lines."""
-        return Polylines(self.mechanism, [line.course for line in self.lines if isinstance(line.course, ThroughPoints)])
+        return Polylines(self.mechanism, [line.course for line in self.lines if not isinstance(line.course, tuple)])
 
     @cached_property
     def up(self) -> Array:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.schema.contact import ContactEllipsoid, ContactSphere
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 from tests.simulation.checked import Checked
+from tests.simulation.test_cables import LEFT, RIGHT, cable, over
 
 
 def paths_over(surface, *stations, wrapping):
@@ -60,3 +62,15 @@ def test_corners_on_a_surface_are_on_it(name, wrapping):
     assert level(corners[1:-1]) == pytest.approx(1.0, abs=near)
     length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
     assert length == pytest.approx(paths.lengths({})["/forceset/p"], rel=1e-3)
+
+
+@pytest.mark.parametrize("surface", [ContactSphere(radius=0.1), ContactEllipsoid(radii=(0.1, 0.1, 0.1))])
+def test_a_cable_runs_over_what_it_touches(surface):
+    paths = osimlite.paths(cable(LEFT, over((0.0, 0.1, 0.0)), RIGHT, surface=surface.model_copy(deep=True)))
+    corners = paths.polylines({})["/forceset/s"]
+    assert len(corners) > 6 and corners[[0, -1]] == pytest.approx(np.array([(-0.3, 0.01, 0), (0.3, 0.01, 0)]))
+    assert np.linalg.norm(corners[1:-1], axis=1) == pytest.approx(0.1, abs=1e-9)
+    length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
+    assert length == pytest.approx(paths.lengths({})["/forceset/s"], rel=1e-3)
+    ends = paths.mechanism.values({"x": 3.0})
+    assert paths.polylines(ends)["/forceset/s"][-1] == pytest.approx((3.3, 0.01, 0.0))

@@ -56,6 +56,7 @@ LAW_MODULES = {
     "wrap_torus": "wrap_torus",
     "trace_path": "wrap_curves",
     "trace_geodesics": "geodesic_curves",
+    "trace_cable": "geodesic_curves",
     "trace_cylinder": "wrap_curves",
     "trace_sphere": "wrap_curves",
     "trace_ellipsoid": "wrap_curves",

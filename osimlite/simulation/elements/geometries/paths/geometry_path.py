@@ -27,6 +27,7 @@ from osimlite.simulation.kernels.geodesic_paths import slots_and_room
 from osimlite.simulation.kernels.layout import OWN
 from osimlite.simulation.kernels.path_wraps import SURFACE_WORK
 from osimlite.simulation.kernels.paths import CLAMPED, CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
+from osimlite.simulation.kernels.wrap_curves import MOST
 from osimlite.simulation.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 
 TOLERANCE = 1e-5
@@ -121,6 +122,22 @@ class ThroughPoints:
     def trace(self) -> str:
         """Name of the law that traces it."""
         return "trace_geodesics" if self.geodesic and self.surfaces else "trace_path"
+
+    @property
+    def curves(self) -> tuple[str, ...]:
+        """Names of the laws that trace it on its surfaces."""
+        return () if self.geodesic else tuple(surface.curve for surface in self.surfaces)
+
+    @property
+    def corners(self) -> int:
+        """The most corners that it is traced with."""
+        return len(self.points) + len(self.surfaces) * (1 + int(MOST))
+
+    @property
+    def start(self) -> tuple[int, Array]:
+        """The body that it starts in, and where there (3,)."""
+        first = self.points[0]
+        return first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3]
 
     def items(self, places: Places) -> list[Item]:
         """What pulls, the surfaces, and the path."""

@@ -37,6 +37,7 @@ from osimlite.simulation.kernels.cable_paths import (
 from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS
 from osimlite.simulation.kernels.layout import OWN
 from osimlite.simulation.kernels.paths import LENGTH
+from osimlite.simulation.kernels.wrap_curves import MOST
 
 FIRST_STEP = 1e-10
 """Of the first integration of a geodesic, m."""
@@ -103,6 +104,20 @@ class Cable:
     elements: tuple[Point | Obstacle, ...]
 
     coupled: ClassVar[bool] = True
+    trace: ClassVar[str] = "trace_cable"
+    curves: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def corners(self) -> int:
+        """The most corners that it is traced with."""
+        return sum(1 + int(MOST) * element.is_obstacle for element in self.elements)
+
+    @property
+    def start(self) -> tuple[int, Array]:
+        """The body that it starts in, and where there (3,)."""
+        first = self.elements[0]
+        assert isinstance(first, Point)
+        return first.body, first.runs
 
     def items(self, places: Places) -> list[Item]:
         """What pulls, and the path."""
