@@ -281,10 +281,10 @@ def step(m: Motion, t0: float, y0: Floats, f0: Floats, y1: Floats) -> float:
         counts[EVALUATIONS] += 4
         error, count_q, count_u = inf, sizes[COUNT_Q], sizes[COUNT_U]
         if merson(m, t0, t1, y0, f0, y1, errors) == OK:
-            error = error_norm(m.s, y0, errors, count_q, count_u)
+            error = error_norm(m.s, y0, errors, count_q, count_u, 0)
         # As in Simbody: what half a step would not mend, neither does the projection.
         if m.s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(m.s, m.x, m.w, t1, y0, y1, errors, accuracy, count_q, count_u)
+            error = projected_error(m.s, m.x, m.w, t1, y0, y1, errors, accuracy, count_q, count_u, 0)
         clock[1] = next_step_size(h, error, accuracy, cut)
         if error <= accuracy:
             return t1

@@ -69,8 +69,10 @@ ERROR_CONSTANT = tuple(
 """Constants of both methods: by difference its weight in the prediction, and in psi; by order h / c, the newest
 difference by d, and the error by the newest difference."""
 
-ITERATIONS, CONVERGED = 4, 0.03
+ITERATIONS, CONVERGED = 4, 0.05
 """Newton's steps at most; what the error of an iteration may be, of that of a step."""
+SLOW = 0.1
+"""How fast iterations are counted on to converge, at most."""
 RENEWED = 20
 """After so many steps the derivatives are computed anew."""
 SAFETY, SHRINK, GROW, WORTH = 0.8, 0.2, 8.0, 1.2
@@ -122,10 +124,10 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
     if iterations > 0:
         for k in range(size):
             errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
-        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
         # As in Simbody: what half a step would not mend, neither does the projection.
         if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
     if not error <= accuracy:
         refuse(size, method, h, rows, error / accuracy)
         return OK
@@ -155,7 +157,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
 def begin(s: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
     """Start with order 1, and a step that changes little."""
     size = s[STATE_SIZE]
-    speed = error_norm(s, y0, at(y0, size), int(h[COUNTED_Q]), int(h[COUNTED_U]))
+    speed = error_norm(s, y0, at(y0, size), int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
     h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
     h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
     for k in range(size):
@@ -205,9 +207,9 @@ def newton(
         for k in range(size):
             step[k] = c * f1[k] - psi[k] - d[k]
         correct(s, c, room, step)
-        length = error_norm(s, y0, step, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+        length = error_norm(s, y0, step, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
         if iteration > 0:
-            h[RATE] = max(0.3 * h[RATE], length / before)
+            h[RATE] = max(0.3 * h[RATE], length / before, SLOW)
             if length > 2.0 * before:
                 return 0
         for k in range(size):
@@ -242,7 +244,7 @@ def choose(
             continue
         for k in range(size):
             errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
-        found = reach(error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U])) / accuracy, other)
+        found = reach(error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1) / accuracy, other)
         if found > factor:
             best, factor = other, found
     factor = min(safety * factor, GROW)

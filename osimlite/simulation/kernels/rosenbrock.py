@@ -97,10 +97,10 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
             for i in range(STAGES):
                 y1[k] += ENDS[i] * stages[size * i + k]
                 errors[k] += MISSES[i] * stages[size * i + k]
-        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
         # As in Simbody: what half a step would not mend, neither does the projection.
         if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]))
+            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of the time, the step was longer than it was to be.
