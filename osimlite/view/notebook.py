@@ -34,7 +34,7 @@ FIRST_ROWS = 10
 """Rows of results that are shown."""
 
 HEIGHT = 460
-"""Of the page, pixels."""
+"""Of the page, and of a table at most, pixels."""
 
 COLORS = {"error": "#d1242f", "warning": "#b97700", "info": "#5d6b7a"}
 
@@ -150,7 +150,8 @@ def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, m
         return "<tr>" + "".join(f"<{tag} style='text-align:left'>{cell}</{tag}>" for cell in cells) + "</tr>"
 
     body = "".join(line("td", row) for row in islice(rows, most))
-    return f"<table><thead>{line('th', headings)}</thead><tbody>{body}</tbody></table>{_left(count, most)}"
+    table = f"<table><thead>{line('th', headings)}</thead><tbody>{body}</tbody></table>"
+    return f"<div style='max-height:{HEIGHT}px;overflow:auto'>{table}</div>{_left(count, most)}"
 
 
 def _left(count: int, most: int) -> str:
