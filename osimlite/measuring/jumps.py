@@ -104,5 +104,8 @@ def _changed(sweep: Sweep, name: str, route: ThroughPoints, sides: list[Array]) 
     """Names of the points and surfaces that a path runs through on one side only."""
     before, after = ({number for number, _ in sweep.paths.points(q)[name]} for q in sides)
     count = len(route.points)
-    nodes = [route.points[k] if k < count else route.surfaces[(k - count) // 2].tangent for k in sorted(before ^ after)]
-    return tuple(dict.fromkeys(node.name for node in nodes))
+    names = [
+        route.points[k].name or f"point {k + 1}" if k < count else route.surfaces[(k - count) // 2].tangent.name
+        for k in sorted(before ^ after)
+    ]
+    return tuple(dict.fromkeys(names))

@@ -36,7 +36,7 @@ def measured(model: Model, *, compiles: bool) -> Measures:
     """
     code = None if compiles else AT_HAND
     paths = Paths(model, code=code)
-    start = paths.mechanism.default_state()[0]
+    start = paths.mechanism.assemble({})
     looked_at = [*sweeps(paths, start)]
     default = lengths(paths, start)
     has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())

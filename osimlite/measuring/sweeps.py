@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from math import pi
 
@@ -82,15 +81,27 @@ def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
         low, high = info.range
         if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
             continue
-        poses = []
-        for value in np.linspace(low, high, VALUES):
-            q = start.copy()
-            q[place] = value
-            with suppress(SimulationError):
-                poses.append(paths.mechanism.assemble(q, kept=(place,)) if tied[place] else q)
+        poses = _poses(paths, start, place, np.linspace(low, high, VALUES), bool(tied[place]))
         rows = np.array([lengths(paths, q) for q in poses])
         if len(rows) > 1 and np.ptp(rows, axis=0).max(initial=0.0) > STILL:
             yield Sweep(paths, place, np.array(poses), rows, bool(tied[place]))
+
+
+def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> list[Array]:
+    """The poses with these values of a coordinate, from the default one to where constraints let it go no further."""
+    above = values >= start[place]
+    poses: list[Array] = []
+    for away in (values[above], values[~above][::-1]):
+        q = start
+        for value in away:
+            q = q.copy()
+            q[place] = value
+            try:
+                q = paths.mechanism.assemble(q, kept=(place,)) if is_tied else q
+            except SimulationError:
+                break
+            poses.append(q)
+    return sorted(poses, key=lambda q: float(q[place]))
 
 
 def _tied(paths: Paths, start: Array) -> Array:

@@ -36,7 +36,7 @@ class Beside:
         self.theirs = opensim.Model(str(file))
         self.state = self.theirs.initSystem()
         self.paths, self.right = osimlite.paths(self.model), osimlite.paths(self.model, "geodesic")
-        self.default = self.paths.mechanism.default_state()[0]
+        self.default = self.paths.mechanism.assemble({})
         infos = self.paths.mechanism.coordinates
         self.coordinates = [opensim.Coordinate.safeDownCast(self.theirs.getComponent(info.path)) for info in infos]
 
