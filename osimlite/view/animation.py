@@ -38,6 +38,9 @@ LONGEST_ARROW = 0.7
 SCENERY = 3.0
 """How many times larger than what moves something that stands still may be and still be shown whole."""
 
+STEEPEST = 0.5
+"""Cosine between the vertical of the picture and the normal of a half space from which on it is ground, no wall."""
+
 Progress = Callable[[int, int], None]
 
 
@@ -167,10 +170,18 @@ class _Film:
         return np.maximum(moving, still) if (still <= SCENERY * moving.max()).all() else moving
 
     def _corners(self, number: int) -> Iterator[tuple[bool, Array]]:
-        """Whether it moves, and points (k, 2), of everything that is drawn."""
-        for body, points in self.scene.extent(self.poses[number]):
+        """Whether it moves, and points (k, 2), of everything that is drawn; of ground, what is below the focus."""
+        pose, focus = self.poses[number], self.focus[number]
+        for body, points in self.scene.extent(pose):
             if len(points):
                 yield body < -1 or bool(self.moving[body]), self.flat(points)
+        for item in self.scene.drawn():
+            if item.path in self.scene.half_spaces:
+                placed = pose.matrix(item.body, item.matrix)
+                inward = placed[:3, 0]
+                if abs(inward @ self.up) > STEEPEST * np.linalg.norm(inward):
+                    below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (inward @ self.up)
+                    yield False, self.flat(below[None])
 
 
 def _moving(poses: list[Bodies]) -> Array:

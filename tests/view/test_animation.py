@@ -104,6 +104,20 @@ def test_what_stands_still_is_shown_if_it_is_not_too_large():
     assert (np.abs(pelvis - film.flat(film.focus)[0]) < film.reach).all()
 
 
+def test_ground_stays_in_the_picture_of_a_jump():
+    """But not where it is so far down that nothing could be seen of what moves."""
+    motion = stroll()
+    level = motion.values[0] * (np.array(motion.coordinates) != "platform_rz")
+    up = np.outer(motion.times, np.array(motion.coordinates) == "Pelvis_ty")
+    jump, drop = (
+        _Film(dynamic_walker(), dataclasses.replace(motion, values=level + speed * up), 25, 1.0, "xy")
+        for speed in (1.0, 40.0)
+    )
+    highest = jump.flat(jump.focus)[-1, 1]
+    assert jump.reach[1] == pytest.approx(highest - 0.025, abs=1e-3)
+    assert drop.reach[1] < 0.8 < jump.reach[1]
+
+
 def test_a_model_without_shapes_is_a_stick_figure(tmp_path):
     model = dynamic_walker()
     for body in model.body_set.objects:
