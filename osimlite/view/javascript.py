@@ -35,6 +35,8 @@ CALLED: dict[Any, str] = {
     math.isnan: "Number.isNaN",
 }
 """Functions that have another name; the others of `math` have theirs in `Math`."""
+MODULO = "const modulo = (a, b) => { const r = a % b; return r !== 0 && (r < 0) !== (b < 0) ? r + b : r; };"
+"""The remainder, which in Python has the sign of the divisor."""
 RESERVED = frozenset(
     (
         "case",
@@ -71,7 +73,7 @@ def as_javascript(laws: Sequence[Kernel], others: Sequence[Kernel] = ()) -> str:
     texts = "\n".join(_text(function) for function in every if function not in POINTERS)
     numbered = ", ".join(("null", *map(_name, laws)))
     named = "".join(f", {function.__name__}: {_name(function)}" for function in others)
-    return f"(() => {{\n{texts}\nconst laws = [{numbered}];\nreturn {{ laws{named} }};\n}})()"
+    return f"(() => {{\n{MODULO}\n{texts}\nconst laws = [{numbered}];\nreturn {{ laws{named} }};\n}})()"
 
 
 POINTERS: dict[Any, Callable[..., str]] = {
@@ -183,6 +185,8 @@ class _Writer:
                 return _local(name) if name in self.own or name in self.given else self.constant(node)
             case ast.BinOp(left=left, op=ast.FloorDiv(), right=right):
                 return f"Math.floor({self.of(left)} / {self.of(right)})"
+            case ast.BinOp(left=left, op=ast.Mod(), right=right):
+                return f"modulo({self.of(left)}, {self.of(right)})"
             case ast.BinOp(left=left, op=op, right=right) if type(op) in BINARY:
                 return f"({self.of(left)} {BINARY[type(op)]} {self.of(right)})"
             case ast.UnaryOp(op=op, operand=operand) if type(op) in SIGNS:

@@ -19,7 +19,7 @@ def branches(a: float, b: float) -> float:
     """Every kind of expression."""
     low, high = (a, b) if a <= b else (b, a)
     if not 0.0 < low < 10.0 or high == 7.0:
-        return -low // 2 + (high - 1.0) ** 2 / TABLE[1]
+        return -low // 2 + low % 0.75 + 4.0 % -high + (high - 1.0) ** 2 / TABLE[1]
     elif low != high and (a > 1.0 or b > 1.0):
         low, high = high, low
         return sqrt(abs(low)) + max(low, 3.0 * high) - min(low, high, 0.5)
