@@ -10,6 +10,8 @@ A surface inside which a point of the piece lies bends it nowhere, as in OpenSim
 
 from __future__ import annotations
 
+from math import inf
+
 from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
 from osimlite.simulation.kernels.cable_surfaces import (
     ARC,
@@ -40,6 +42,7 @@ from osimlite.simulation.kernels.geodesic_starts import (
     SIDE,
     SURFACE,
     depth,
+    open_side,
     start,
 )
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
@@ -64,7 +67,7 @@ from osimlite.simulation.kernels.paths import (
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import direction, station
-from osimlite.simulation.kernels.vectors import Vector, minus, norm, put, vector
+from osimlite.simulation.kernels.vectors import Vector, dot, minus, norm, put, times, vector
 
 WRAP_INTS = 4
 PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
@@ -72,14 +75,17 @@ PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
 last one that it may end at, and the first one of its PathWrap's range."""
 CHAIN, SEARCH, POSES = 0, 1, 2
 """Integers after the wraps: where in the record the slots are, room for a search, and the poses of the surfaces."""
-HOW, POSE_NUMBERS = 12, 13
+HOW, OUT, POSE_NUMBERS = 12, 13, 16
 NOT = 0.0
-"""Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand, see `start`."""
+"""Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand, see `start`, and
+towards which side."""
 
 TOUCH = 1e-10
 """The angle (rad) by which a piece turns at least around a surface that it is put on."""
 INSIDE = 1e-14
 """A point counts as inside a surface if it is so far below it, in units of its function."""
+MOST_WAYS = 4
+"""So many ways around surfaces that may be passed either way are tried."""
 LOOSE, TURNS = 3, 12
 """So many times each of several surfaces is put into a piece anew; so often surfaces may come and go."""
 
@@ -92,7 +98,7 @@ def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
         wraps: number of wraps.
         room: length of the record without slots.
     """
-    search = room + SLOT * (most + 3)
+    search = room + SLOT * (most + 2)
     poses = search + search_room(most)
     return [room, search, poses], poses + POSE_NUMBERS * wraps
 
@@ -143,37 +149,53 @@ def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
 def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     """Bend the piece between two points around its surfaces; returns around how many, which then are in the slots.
 
-    The shorter way around an ellipsoid is known once both are.
+    The shortest way around surfaces that may be passed either way is known once all are.
     """
-    size, near, last = i[POINTS] + 2 * i[WRAPS], 0, 0
-    wraps = at(i, NODES_AT + NODE_INTS * size)
+    size, near, ways = i[POINTS] + 2 * i[WRAPS], 0, 1
+    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(found, ORDER + size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
     chain, poses = at(found, slots[CHAIN]), at(found, slots[POSES])
     for number in range(i[WRAPS]):
         if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
-            near, last = near + 1, number
-    count = settle(i, p, found, one, two, near) if near > 0 else 0
-    numbers = at(p, wraps[WRAP_INTS * last + PLACES])
-    if near == 1 and count == 1 and numbers[SURFACE + KIND] == ELLIPSOID and numbers[SIDE] == 0.0:
-        spare, length = at(chain, SLOT * 3), chain_length(chain)
-        for k in range(SLOT):
-            spare[k] = chain[SLOT + k]
-        poses[POSE_NUMBERS * last + HOW] = OTHER_WAY
-        if settle(i, p, found, one, two, near) == 0 or not chain_length(chain) < length:
-            for k in range(3):
-                chain[2 * SLOT + k] = found[ORDER + size + NODE_WORK * two + PLACE + k]
-            for k in range(SLOT):
-                chain[SLOT + k] = spare[k]
+            near += 1
+    for number in range(i[WRAPS]):
+        own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
+        numbers = at(p, own[PLACES])
+        put(pose, OUT, (0.0, 0.0, 0.0))
+        may_turn = near > 1 or numbers[SURFACE + KIND] == ELLIPSOID
+        if own[FIRST] == one and pose[HOW] != NOT and numbers[SIDE] == 0.0 and may_turn and ways < MOST_WAYS:
+            out = open_side(at(numbers, SURFACE), seen(pose, work, one), seen(pose, work, two))
+            put(pose, OUT, out)
+            ways *= 2 if dot(out, out) > 0.0 else 1
+    count, best, least = 0, 0, inf
+    for way in range(ways - 1 if near > 0 else -1, -1, -1):
+        choose(i, wraps, poses, one, way)
+        count = settle(i, p, found, one, two, near)
+        length = chain_length(chain, count) if count > 0 else inf
+        if length <= least:
+            best, least = way, length
+    if best > 0:
+        choose(i, wraps, poses, one, best)
+        count = settle(i, p, found, one, two, near)
     return count
 
 
-def chain_length(chain: Floats) -> float:
-    """Length of a piece that is bent around one surface."""
-    before, after = (
-        minus(start_after(chain, 0, 1), end_before(chain, 1)),
-        minus(start_after(chain, 1, 1), end_before(chain, 2)),
-    )
-    return norm(before) + float(chain[SLOT + GEODESIC + ARC]) + norm(after)
+def choose(i: Ints, wraps: Ints, poses: Floats, one: int, way: int) -> None:
+    """Set on which side a piece passes each surface that may be passed either way, by the bits of a number."""
+    for number in range(i[WRAPS]):
+        pose = at(poses, POSE_NUMBERS * number)
+        if wraps[WRAP_INTS * number + FIRST] == one and norm(vector(pose, OUT)) > 0.0:
+            pose[HOW] = OTHER_WAY if way % 2 == 1 else AS_MEANT
+            way //= 2
+
+
+def chain_length(chain: Floats, count: int) -> float:
+    """Length of a piece that is bent around so many surfaces."""
+    length = norm(minus(start_after(chain, 0, count), end_before(chain, 1)))
+    for k in range(1, count + 1):
+        line = minus(start_after(chain, k, count), end_before(chain, k + 1))
+        length += chain[SLOT * k + GEODESIC + ARC] + norm(line)
+    return length
 
 
 def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int) -> int:
@@ -251,10 +273,11 @@ def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room
     """Put a surface into that piece of the chain which it turns most, if there is one."""
     place, most = 0, TOUCH
     point = way = (0.0, 0.0, 0.0)
+    side_out = times(-1.0 if pose[HOW] == OTHER_WAY else 1.0, vector(pose, OUT))
     arc = 0.0
     for k in range(count + 1):
         first, second = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
-        turn, meets, along, length = start(p, first, second, pose[HOW], room)
+        turn, meets, along, length = start(p, first, second, pose[HOW], side_out, room)
         if turn > most:
             place, most, point, way, arc = k + 1, turn, meets, along, length
     if place == 0:

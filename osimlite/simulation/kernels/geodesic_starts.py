@@ -49,7 +49,7 @@ from osimlite.simulation.kernels.vectors import (
 )
 from osimlite.simulation.kernels.wrap_cylinder import closest_to_axis
 from osimlite.simulation.kernels.wrap_sides import action, on_side
-from osimlite.simulation.kernels.wrapping import MANDATORY, NONE
+from osimlite.simulation.kernels.wrapping import NONE
 
 AXIS, SIDE, HALF_LENGTH, SURFACE = 0, 1, 2, 3
 """Numbers of what a path wraps around: axis and sign of its side, half its length (of a cylinder), the surface."""
@@ -69,19 +69,50 @@ SAMPLES, STEPS = 16, 6
 WAYS, WORTHWHILE = 16, 1.5
 """So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
 much deeper there."""
+DEEP = 0.5
+"""Where a line through a surface is nearer to the middle than this (squared, by radii), it may be bent either way."""
 BENT, BEADS, PULLS = 0.7, 16, 8
 """If the cosine between both ends of a path is less than this, a string is pulled tight over an ellipsoid: of so many
 pieces, so often."""
 
 
-def start(p: Floats, first: Vector, second: Vector, how: float, room: Floats) -> Start:
-    """Where a straight piece between two points begins to bend around what the numbers tell of."""
+def start(p: Floats, first: Vector, second: Vector, how: float, side_out: Vector, room: Floats) -> Start:
+    """Where a straight piece between two points begins to bend around what the numbers tell of.
+
+    Args:
+        p: the numbers.
+        first: where the piece begins.
+        second: where it ends.
+        how: it may be bent.
+        side_out: towards the side on which it passes a surface without a side, zeros if that is open.
+        room: for a string of beads.
+    """
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
-    if surface[KIND] == CYLINDER:
-        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, axis, 0.0 if how == ANY_SIDE else side)
     if surface[KIND] == TORUS:
         return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
-    return around_ellipsoid(surface, first, second, axis, side, how, room)
+    if surface[KIND] == CYLINDER:
+        if side != 0.0:
+            is_held = how != ANY_SIDE and axis < 2
+            side_out = replaced((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
+        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, side_out)
+    return around_ellipsoid(surface, first, second, axis, side, how, side_out, room)
+
+
+def open_side(p: Floats, first: Vector, second: Vector) -> Vector:
+    """From the middle of a surface towards a line that goes through it, so deep that the other way may be the shorter.
+
+    Zeros if it does not.
+    """
+    way, weights = minus(second, first), vector(p, WEIGHTS)
+    part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
+    middle = along(first, part, way)
+    out = elementwise(weights, middle)
+    if p[KIND] == TORUS or not 0.0 < part < 1.0 or not dot(out, middle) < DEEP * p[SQUARE]:
+        return 0.0, 0.0, 0.0
+    if p[KIND] == ELLIPSOID:
+        x, y, z = weights
+        return way_out((sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), middle, way, False)
+    return out if dot(out, out) > LEAST else cross(way, (0.0, 0.0, 1.0))
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
@@ -96,30 +127,28 @@ def depth(p: Floats, first: Vector, second: Vector) -> float:
     return dot(elementwise(weights, middle), middle) / (p[SQUARE] if p[KIND] != CYLINDER else 1.0)
 
 
-def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, axis: int, side: float) -> Start:
+def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, side_out: Vector) -> Start:
     """The start on a cylinder about z: a straight line once the cylinder is rolled out.
 
     As in OpenSim there is none if the path would meet and leave the cylinder beyond its ends.
     """
     px, py, pz = first
     qx, qy, qz = second
+    ux, uy, _ = side_out
     closest, crosses = closest_to_axis(first, second, radius)
-    if axis == 2:
-        side = 0.0
-    code = MANDATORY if crosses else NONE
-    if side != 0.0:
-        active = on_side(first, axis, side), on_side(second, axis, side)
-        code = action(*active, on_side(closest, axis, side), crosses)
-    if code == NONE:
+    is_open = ux == 0.0 and uy == 0.0
+    active = dot(side_out, first) >= 0.0, dot(side_out, second) >= 0.0
+    if (NONE if is_open and not crosses else action(*active, dot(side_out, closest) >= 0.0, crosses)) == NONE:
         return 0.0, first, second, 0.0
     # Angles from the middle of the active side; or from the first end.
-    ux, uy = (px, py) if side == 0.0 else ((side, 0.0) if axis == 0 else (0.0, side))
+    if is_open:
+        ux, uy = px, py
     one, two = atan2(ux * py - uy * px, ux * px + uy * py), atan2(ux * qy - uy * qx, ux * qx + uy * qy)
     far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
     line1, line2 = sqrt(max(far1 * far1 - radius * radius, 0.0)), sqrt(max(far2 * far2 - radius * radius, 0.0))
     before, after = atan2(line1, radius), atan2(line2, radius)
     sweep = (two - one) % (2.0 * pi)
-    way = 1.0 if (sweep <= pi if side == 0.0 else turns_left(one, before, two, after, sweep)) else -1.0
+    way = 1.0 if (sweep <= pi if is_open else turns_left(one, before, two, after, sweep)) else -1.0
     turn = (sweep if way > 0.0 else 2.0 * pi - sweep) - before - after
     size = sqrt(ux * ux + uy * uy)
     c, s = cos(one + way * before) / size, sin(one + way * before) / size
@@ -154,7 +183,14 @@ def turns_left(one: float, before: float, two: float, after: float, sweep: float
 
 
 def around_ellipsoid(
-    p: Floats, first: Vector, second: Vector, axis: int, side: float, how: float, room: Floats
+    p: Floats,
+    first: Vector,
+    second: Vector,
+    axis: int,
+    side: float,
+    how: float,
+    side_out: Vector,
+    room: Floats,
 ) -> Start:
     """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
 
@@ -175,6 +211,11 @@ def around_ellipsoid(
         out = way_out(radii, elementwise(radii, middle), elementwise(radii, way), how == OTHER_WAY)
     if dot(out, out) == 0.0:
         return 0.0, first, way, 0.0
+    if dot(side_out, out) < 0.0:
+        other = (0.0, 0.0, 0.0)
+        if p[KIND] == ELLIPSOID:
+            other = way_out(radii, elementwise(radii, middle), elementwise(radii, way), True)
+        out = other if dot(side_out, other) > 0.0 else times(-1.0, out)
     if side != 0.0 and not on_side(out, axis, side):
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
@@ -303,7 +344,7 @@ def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: 
     rx, ry, _ = inwards = unit((-x, -y, 0.0))
     centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
     one, two = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
-    turn, point, way, length = around_cylinder(tube, inf, one, two, 0, 0.0 if how == ANY_SIDE else 1.0)
+    turn, point, way, length = around_cylinder(tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0))
     return turn, along(back(point, inwards, tangent), 1.0, centre), back(way, inwards, tangent), length
 
 
