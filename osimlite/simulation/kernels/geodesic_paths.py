@@ -170,13 +170,13 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     count, best, least = 0, 0, inf
     for way in range(ways - 1 if near > 0 else -1, -1, -1):
         choose(i, wraps, poses, one, way)
-        count = settle(i, p, found, one, two, near)
+        count = settle(i, p, found, one, two, near, way == 0)
         length = chain_length(chain, count) if count > 0 else inf
         if length <= least:
             best, least = way, length
     if best > 0:
         choose(i, wraps, poses, one, best)
-        count = settle(i, p, found, one, two, near)
+        count = settle(i, p, found, one, two, near, False)
     return count
 
 
@@ -198,8 +198,11 @@ def chain_length(chain: Floats, count: int) -> float:
     return length
 
 
-def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int) -> int:
-    """Put into the slots what the piece between two points bends around; returns how many there are."""
+def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, is_last: bool) -> int:
+    """Put into the slots what the piece between two points bends around; returns how many there are.
+
+    None if no geodesics are found, and this is not the last way that is tried.
+    """
     size = i[POINTS] + 2 * i[WRAPS]
     work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
@@ -222,10 +225,12 @@ def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int) -> 
             break
         if turn >= loose and not smooth(chain, count, room):
             # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is.
-            for k in range(1, count + 1):
+            for k in range(1, count + 1 if is_last else 1):
                 poses[POSE_NUMBERS * int(chain[SLOT * k + OWNER]) + HOW] = PULLED
             put(chain, SLOT, vector(chain, SLOT * (count + 1)))
             count = 0
+            if not is_last:
+                break
     return count
 
 

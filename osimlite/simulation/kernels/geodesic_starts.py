@@ -69,8 +69,6 @@ SAMPLES, STEPS = 16, 6
 WAYS, WORTHWHILE = 16, 1.5
 """So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
 much deeper there."""
-DEEP = 0.5
-"""Where a line through a surface is nearer to the middle than this (squared, by radii), it may be bent either way."""
 BENT, BEADS, PULLS = 0.7, 16, 8
 """If the cosine between both ends of a path is less than this, a string is pulled tight over an ellipsoid: of so many
 pieces, so often."""
@@ -99,15 +97,12 @@ def start(p: Floats, first: Vector, second: Vector, how: float, side_out: Vector
 
 
 def open_side(p: Floats, first: Vector, second: Vector) -> Vector:
-    """From the middle of a surface towards a line that goes through it, so deep that the other way may be the shorter.
-
-    Zeros if it does not.
-    """
+    """From the middle of a surface towards a line that goes through it; zeros if it does not."""
     way, weights = minus(second, first), vector(p, WEIGHTS)
     part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
     middle = along(first, part, way)
     out = elementwise(weights, middle)
-    if p[KIND] == TORUS or not 0.0 < part < 1.0 or not dot(out, middle) < DEEP * p[SQUARE]:
+    if p[KIND] == TORUS or not 0.0 < part < 1.0 or not dot(out, middle) < p[SQUARE]:
         return 0.0, 0.0, 0.0
     if p[KIND] == ELLIPSOID:
         x, y, z = weights
