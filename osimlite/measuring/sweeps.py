@@ -76,15 +76,15 @@ def lengths(paths: Paths, q: Array) -> Array:
 
 def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
     """A sweep of each coordinate that changes the length of a path."""
-    tied = _tied(paths, start)
+    are_tied = tied(paths, start)
     for place, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
         if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
             continue
-        poses = _poses(paths, start, place, np.linspace(low, high, VALUES), bool(tied[place]))
+        poses = _poses(paths, start, place, np.linspace(low, high, VALUES), bool(are_tied[place]))
         rows = np.array([lengths(paths, q) for q in poses])
         if len(rows) > 1 and np.ptp(rows, axis=0).max(initial=0.0) > STILL:
-            yield Sweep(paths, place, np.array(poses), rows, bool(tied[place]))
+            yield Sweep(paths, place, np.array(poses), rows, bool(are_tied[place]))
 
 
 def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> list[Array]:
@@ -92,9 +92,8 @@ def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool)
     above = values >= start[place]
     poses: list[Array] = []
     for away in (values[above], values[~above][::-1]):
-        q = start
         for value in away:
-            q = q.copy()
+            q = start.copy()
             q[place] = value
             try:
                 q = paths.mechanism.assemble(q, kept=(place,)) if is_tied else q
@@ -104,12 +103,12 @@ def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool)
     return sorted(poses, key=lambda q: float(q[place]))
 
 
-def _tied(paths: Paths, start: Array) -> Array:
+def tied(paths: Paths, start: Array) -> Array:
     """Whether each coordinate (n,) is in the equations of a constraint."""
     constraints = paths.mechanism.constraints
     if not constraints:
         return np.zeros(len(start), dtype=bool)
     state = paths.mechanism.at(start)
     rows, _ = stacked([item.velocity_equations(state) for item in constraints])
-    tied: Array = np.abs(rows).max(axis=0) > 0.0
-    return tied
+    found: Array = np.abs(rows).max(axis=0) > 0.0
+    return found

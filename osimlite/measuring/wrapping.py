@@ -17,6 +17,10 @@ TOGETHER = 64
 """Poses with values of all coordinates within their ranges, at random but always the same."""
 
 
+ASIDE, NEAR = 1e-7, 1e-4
+"""How far (rad or m) beside a pose a length is computed again, and by how much (m) it may differ there."""
+
+
 def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]) -> Iterator[Wrapping]:
     """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most."""
     default = _excess(geodesic, paths, start)
@@ -31,14 +35,24 @@ def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[S
         surfaces = route.surfaces if isinstance(route, ThroughPoints) else ()
         around = tuple(surface.tangent.name for surface in surfaces if surface.law)
         if around:
-            found = [(float(default[k]), Pose())]
+            found = [(float(default[k]), Pose(), start)]
             for sweep, rows in zip(looked_at, swept, strict=True):
-                found += [(float(row[k]), sweep.pose(value)) for value, row in zip(sweep.values, rows, strict=True)]
+                poses = map(sweep.pose, sweep.values)
+                found += [(float(row[k]), pose, q) for row, pose, q in zip(rows, poses, sweep.poses, strict=True)]
             moved = [sweep for sweep in free if np.ptp(sweep.lengths[:, k]) > STILL]
             for q, row in zip(together, excesses, strict=True):
-                found.append((float(row[k]), Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved))))
-            worst, pose = max(found, key=lambda item: np.nan_to_num(abs(item[0])))
+                told, pose = start.copy(), Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved))
+                told[[sweep.place for sweep in moved]] = [value.value for value in pose.values]
+                found.append((float(row[k]), pose, told))
+            found.sort(key=lambda item: -np.nan_to_num(abs(item[0])))
+            certain = (item for item in found if _is_certain(geodesic, paths, k, item[0], item[2]))
+            worst, pose, _ = next(certain, found[-1])
             yield Wrapping(name, around, float(default[k]), worst, pose)
+
+
+def _is_certain(geodesic: Paths, paths: Paths, path: int, excess: float, q: Array) -> bool:
+    """Whether a path is as much too long right beside a pose; if not, rounding decides, or what nobody is told of."""
+    return all(abs(_excess(geodesic, paths, q + aside)[path] - excess) < NEAR for aside in (-ASIDE, ASIDE))
 
 
 def _excess(geodesic: Paths, paths: Paths, q: Array) -> Array:

@@ -20,6 +20,7 @@ from osimlite.lint.measures import Measures, Pose
 from osimlite.measuring import measured
 from osimlite.measuring.jumps import ASIDE
 from osimlite.measuring.muscles import REST
+from osimlite.measuring.sweeps import tied
 from tests.oracle.opensim_runs import put
 
 BEYOND = 0.05
@@ -63,7 +64,7 @@ class Beside:
         yield from self._of_muscles()
 
     def _of_paths(self) -> Iterator[tuple[str, str, float, float]]:
-        for wrapping in self.measures.wrappings:
+        for wrapping in filter(self.is_free, self.measures.wrappings):
             q = self.at(wrapping.pose)
             yield (
                 "OSIM631",
@@ -71,15 +72,20 @@ class Beside:
                 wrapping.worst,
                 self.length(wrapping.owner) - self.right.lengths(q)[wrapping.owner],
             )
-        for jump in self.measures.jumps:
+        for jump in filter(self.is_free, self.measures.jumps):
             lengths = []
             for aside in (-ASIDE, ASIDE):
                 self.at(jump.pose, aside)
                 lengths.append(self.length(jump.owner))
             yield "OSIM632", jump.owner, jump.size, abs(lengths[1] - lengths[0])
-        for item in self.measures.on_surfaces:
+        for item in filter(self.is_free, self.measures.on_surfaces):
             q = self.at(item.pose)
             yield "OSIM633", item.owner, self.paths.lengths(q)[item.owner], self.length(item.owner)
+
+    def is_free(self, item: Any) -> bool:
+        """Whether constraints move nothing with the pose: how OpenSim would bring it about is another question."""
+        places = [self.paths.mechanism.coordinate_index(value.coordinate) for value in item.pose.values]
+        return not tied(self.paths, self.default)[places].any()
 
     def _of_points(self) -> Iterator[tuple[str, str, float, float]]:
         tree = self.model.tree()
