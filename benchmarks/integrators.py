@@ -1,6 +1,6 @@
 """What an error costs: osimlite's integrators and OpenSim's on muscle-driven models, in processor time.
 
-    python benchmarks/integrators.py [--svg FILE] [--cpodes] [NAME=FILE ...]
+    python benchmarks/integrators.py [--picture FILE] [--cpodes] [NAME=FILE ...]
 
 Without files: models of the shared corpus, if that stands beside the repository; the first with DeGrooteFregly2016
 muscles and elastic tendons too. Muscles start in equilibrium, are excited by 0.05 to 0.25, and move the model for
@@ -57,7 +57,7 @@ class Run(NamedTuple):
 def main() -> None:
     opensim.Logger.setLevelString("off")
     words = sys.argv[1:]
-    picture = Path(words.pop(words.index("--svg") + 1)) if "--svg" in words else None
+    picture = Path(words.pop(words.index("--picture") + 1)) if "--picture" in words else None
     table = Table(title=f"{TO:g} s of motion at an error of {ERROR:g}: processor time, ms (evaluations)")
     found: dict[str, dict[str, list[Run]]] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -69,7 +69,10 @@ def main() -> None:
             costs = [at_error(row) for row in runs.values()]
             ours = min(cost[0] for name, cost in zip(runs, costs, strict=True) if not name.startswith("OpenSim"))
             theirs = min(cost[0] for name, cost in zip(runs, costs, strict=True) if name.startswith("OpenSim"))
-            told = [f"{1e3 * seconds:.3g}" + f" ({count:.0f})" * (count > 0) for seconds, count in costs]
+            told = [
+                f"{1e3 * seconds:.{0 if seconds > 0.1 else 1}f}" + f" ({count:.0f})" * (count > 0)
+                for seconds, count in costs
+            ]
             table.add_row(name, *told, f"{theirs / ours:.0f}")
             Console(stderr=True).print(name, runs)
     Console(width=160).print(table)
@@ -205,8 +208,10 @@ def draw(found: dict[str, dict[str, list[Run]]], path: Path) -> None:
     """A work-precision diagram for each model."""
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(1, len(found), figsize=(3.4 * len(found), 3.6), layout="constrained", squeeze=False)
-    for axis, (name, runs) in zip(axes[0], found.items(), strict=True):
+    rows = (len(found) + 3) // 3
+    figure, axes = pyplot.subplots(rows, 3, figsize=(9.6, 3.4 * rows), layout="constrained", squeeze=False)
+    places = list(axes.flat)
+    for axis, (name, runs) in zip(places, found.items(), strict=False):
         for method, row in runs.items():
             good = [item for item in row if item.error < 10.0]
             axis.loglog(
@@ -219,8 +224,10 @@ def draw(found: dict[str, dict[str, list[Run]]], path: Path) -> None:
         axis.axhline(ERROR, color="0.8", zorder=0)
         axis.set_title(name, fontsize=9)
         axis.set_xlabel(f"processor time for {TO:g} s, ms")
-    axes[0][0].set_ylabel("error at the end")
-    axes[0][0].legend(fontsize=7)
+        axis.set_ylabel("error at the end")
+    for axis in places[len(found) :]:
+        axis.axis("off")
+    places[len(found)].legend(*places[0].get_legend_handles_labels(), loc="center")
     figure.savefig(path)
 
 

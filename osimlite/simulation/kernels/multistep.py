@@ -11,6 +11,7 @@ its prediction, by Newton's iteration; its linear equations are those of
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import inf, sqrt
 
 from osimlite.simulation.kernels.condensation import condense, correct, linearise, product
@@ -31,19 +32,10 @@ from osimlite.simulation.kernels.merson import ERRORS
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.states import is_finite
 
-ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED = (
-    MEMORY,
-    MEMORY + 1,
-    MEMORY + 2,
-    MEMORY + 3,
-    MEMORY + 4,
-    MEMORY + 5,
-    MEMORY + 6,
-)
+ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED, MATRICES = range(MEMORY, MEMORY + 8)
 """Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none; for how many steps
-their derivatives have served; how fast iterations converge; how many steps were refused in turn."""
-MATRICES = MEMORY + 7
-"""Place of three matrices (8, 8) that change the step, and of a column."""
+their derivatives have served; how fast iterations converge; how many steps were refused in turn; place of three
+matrices (8, 8) that change the step, and of a column."""
 WIDTH = 8
 HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
 
@@ -59,13 +51,12 @@ _SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in rang
 _ADAMS = (1.0, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480, 5257 / 17280)
 PREDICTED = (*_ONES, 0.0, *_ADAMS[:-1])
 GIVEN = _SUMS + _ONES
-ALPHA = tuple((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)) + tuple(
-    1.0 / g for g in _ADAMS
-)
+ALPHA = (*((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)), *(1.0 / g for g in _ADAMS))
 DIFFERENCE = _ONES + ALPHA[WIDTH:]
-ERROR_CONSTANT = tuple(
-    kappa * total + 1.0 / (order + 1.0) for order, (kappa, total) in enumerate(zip(_KAPPA, _SUMS, strict=True))
-) + tuple((low - g) * a for low, g, a in zip((0.0, *_ADAMS), _ADAMS, _ONES, strict=False))
+ERROR_CONSTANT = (
+    *(kappa * total + 1.0 / (k + 1.0) for k, (kappa, total) in enumerate(zip(_KAPPA, _SUMS, strict=True))),
+    *(1.0, *(before - g for before, g in pairwise(_ADAMS))),
+)
 """Constants of both methods: by difference its weight in the prediction, and in psi; by order h / c, the newest
 difference by d, and the error by the newest difference."""
 
@@ -92,7 +83,7 @@ def adams(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> 
 
 
 def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int, method: int) -> int:
-    """The same by either."""
+    """The same by either: BDF or ADAMS."""
     size = s[STATE_SIZE]
     h = at(w, place)
     rows, room = at(h, HEAD), at(h, HEAD + STATES * size)
