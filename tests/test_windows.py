@@ -5,7 +5,7 @@ from __future__ import annotations
 import ntpath
 import os
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
@@ -26,7 +26,7 @@ class Results:
 
 
 def simulated(folder: Path) -> None:
-    _write(cast(Any, None), cast(Trajectory, Results()), folder, plot=False, animate=False)
+    _write(cast(Trajectory, Results()), folder)
 
 
 @pytest.mark.usefixtures("windows_files")

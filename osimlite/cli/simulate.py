@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +13,6 @@ from osimlite.cli._console import Facts, complain
 from osimlite.cli._progress import motion_bar, progress_bar
 
 if TYPE_CHECKING:
-    from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
 LIVE_STEP = 1e-3
@@ -130,11 +129,19 @@ def simulate(
             how = "stopped" if is_failure else "interrupted"
             # After many steps, it takes a while to work out what is written.
             complain(f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'")
-            _told(trajectory, _write(model, trajectory, results, plot=False, animate=False)).show()
+            _told(trajectory, _write(trajectory, results)).show()
             if is_failure:
                 raise
             raise typer.Exit(130) from None
-        files = _write(model, trajectory, results, plot=plot, animate=animate)
+
+        def film(path: Path) -> Path:
+            from osimlite.view.animation import animate as draw
+
+            folders = options.mesh_folders(file, None)
+            with progress_bar("drawing", None) as bar:
+                return draw(model, trajectory, path, folders=folders, file=file, wrapping=wrapping, progress=bar)
+
+        files = _write(trajectory, results, plot=plot, film=film if animate else None)
         _told(trajectory, files).show()
         simulation.hold()
 
@@ -146,7 +153,9 @@ SOME = {
 """What not every simulation writes: --plot and --animate draw pictures."""
 
 
-def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, animate: bool) -> list[Path]:
+def _write(
+    trajectory: Trajectory, folder: Path, *, plot: bool = False, film: Callable[[Path], Path] | None = None
+) -> list[Path]:
     """Write everything beside its place first, so that a failure leaves nothing behind."""
     import shutil
     import tempfile
@@ -166,11 +175,8 @@ def _write(model: Model, trajectory: Trajectory, folder: Path, *, plot: bool, an
             from osimlite.view.plots import plot_simulation
 
             written += plot_simulation(trajectory, beside)
-        if animate:
-            from osimlite.view.animation import animate as draw
-
-            with progress_bar("drawing", None) as progress:
-                written.append(draw(model, trajectory, beside / "animation.gif", progress=progress))
+        if film is not None:
+            written.append(film(beside / "animation.gif"))
         for path in written:
             put_in_place(path, folder / path.name)
         # Files of an earlier simulation would be taken for those of this one.

@@ -16,11 +16,12 @@ from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order
 from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw
 from osimlite.view.pushes import Pushes
-from osimlite.view.scene import Bodies
+from osimlite.view.scene import Bodies, Scene
 
 Plane = Literal["xy", "yz", "xz"]
 
@@ -54,6 +55,8 @@ def animate(
     plane: Plane = "xy",
     size: tuple[int, int] = (640, 480),
     folders: Sequence[Path] = (),
+    file: Path | None = None,
+    wrapping: str = OPENSIM,
     progress: Progress | None = None,
 ) -> Path:
     """Draw a motion as an animated GIF.
@@ -69,12 +72,15 @@ def animate(
         speed: seconds of motion per second of film.
         plane: the plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along -Y.
         size: width and height in pixels.
-        folders: where the model's mesh files are looked for.
+        folders: where the model's mesh files are looked for besides the folder of `file`.
+        file: that the model was read from, if there is one.
+        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
         progress: called with the number of frames done and of all frames.
 
     Raises:
         MissingDependency: pillow is not installed.
         OsimliteError: the motion has no moments, or an argument is out of range.
+        SettingError: there is no such wrapping.
     """
     if not 1 <= fps <= 50:
         raise OsimliteError(f"a GIF shows 1 to 50 frames per second, not {fps}")
@@ -83,7 +89,10 @@ def animate(
     if len(trajectory.times) == 0:
         raise OsimliteError("the motion has no moments; nothing can be drawn")
     image = require("PIL.Image", extra="view", purpose="an animation")
-    film = _Film(model, trajectory, fps, speed, plane, folders)
+    scene = build_scene(
+        model, build_mechanism(model), MeshFolders(None if file is None else file.parent, folders), wrapping
+    )
+    film = _Film(scene, trajectory, fps, speed, plane)
     painter = _Painter(film, size)
     frames = []
     for number in range(len(film.times)):
@@ -115,14 +124,11 @@ def _encoded(frames: list[Any], fps: int, image: Any) -> bytes:
 class _Film:
     """The motion at the moments of the film, and how much of space it takes."""
 
-    def __init__(
-        self, model: Model, motion: Motion, fps: int, speed: float, plane: Plane, folders: Sequence[Path] = ()
-    ) -> None:
+    def __init__(self, scene: Scene, motion: Motion, fps: int, speed: float, plane: Plane) -> None:
         if plane not in _AXES:
             raise OsimliteError(f"a picture shows the plane 'xy', 'yz' or 'xz', not '{plane}'")
         self.right, self.up = _AXES[plane]
-        self.mechanism = build_mechanism(model)
-        self.scene = build_scene(model, self.mechanism, MeshFolders(None, folders))
+        self.scene, self.mechanism = scene, scene.mechanism
         recorded = np.asarray(motion.times, dtype=float)
         count = int(np.floor((recorded[-1] - recorded[0]) * fps / speed + 1e-9)) + 1
         self.times = recorded[0] + np.arange(count) * speed / fps

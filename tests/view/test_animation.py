@@ -9,15 +9,21 @@ import pytest
 from osimlite.errors import MissingDependency, OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
+from osimlite.schema.geometry import Mesh
 from osimlite.schema.model import Model
 from osimlite.view import animate
 from osimlite.view.animation import _Film, _hex, _round_down
+from osimlite.view.collect import build_scene
 from osimlite.view.picture import FORCE
 from tests.view.motions import Recorded, stroll
 
 Image = pytest.importorskip("PIL.Image")
 
 SMALL = (320, 240)
+
+
+def scene_of(model):
+    return build_scene(model, build_mechanism(model))
 
 
 def frames(path):
@@ -68,7 +74,7 @@ def test_slow_motion_has_more_frames(tmp_path):
 
 def test_the_camera_follows_the_mass_centre_of_what_moves():
     mechanism = build_mechanism(dynamic_walker())
-    film = _Film(dynamic_walker(), stroll(), 25, 1.0, "xy")
+    film = _Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
     names = [body.name for body in mechanism.bodies]
     assert [name for name, moves in zip(names, film.moving, strict=False) if not moves] == ["Platform"]
     for number in (0, 7):
@@ -78,7 +84,7 @@ def test_the_camera_follows_the_mass_centre_of_what_moves():
 
 
 def test_all_that_moves_is_in_the_picture():
-    film = _Film(dynamic_walker(), stroll(), 25, 1.0, "xy")
+    film = _Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
     seen = 0
     for pose, focus in zip(film.poses, film.flat(film.focus), strict=True):
         for item in film.scene.drawn():
@@ -97,7 +103,7 @@ def test_what_stands_still_is_shown_if_it_is_not_too_large():
     model = dynamic_walker()
     del model.body_set.objects[0].attached_geometry[:]
     motion = dataclasses.replace(motion, values=motion.values[0] + 0.5 * np.outer(motion.times, knee))
-    film = _Film(model, motion, 25, 1.0, "xy")
+    film = _Film(scene_of(model), motion, 25, 1.0, "xy")
     names = [body.name for body in film.mechanism.bodies]
     assert [name for name, moves in zip(names, film.moving, strict=False) if moves] == ["RightShank"]
     pelvis = film.flat(film.poses[0].origins[[names.index("Pelvis")]])[0]
@@ -110,7 +116,7 @@ def test_ground_stays_in_the_picture_of_a_jump():
     level = motion.values[0] * (np.array(motion.coordinates) != "platform_rz")
     up = np.outer(motion.times, np.array(motion.coordinates) == "Pelvis_ty")
     jump, drop = (
-        _Film(dynamic_walker(), dataclasses.replace(motion, values=level + speed * up), 25, 1.0, "xy")
+        _Film(scene_of(dynamic_walker()), dataclasses.replace(motion, values=level + speed * up), 25, 1.0, "xy")
         for speed in (1.0, 40.0)
     )
     highest = jump.flat(jump.focus)[-1, 1]
@@ -126,6 +132,18 @@ def test_a_model_without_shapes_is_a_stick_figure(tmp_path):
     with_sticks = next(frames(path))[0]
     del model.contact_geometry_set.objects[:], model.force_set.objects[:]
     assert (with_sticks.max(axis=2) < 70).sum() > 300
+
+
+def test_meshes_beside_the_file_are_drawn(tmp_path):
+    (tmp_path / "sheet.obj").write_text("v -1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    model, motion = dynamic_walker(), stroll(2)
+    pelvis = model.body_set.objects[1]
+    del pelvis.attached_geometry[:]
+    pelvis.attach(Mesh(mesh_file="sheet.obj"))
+    options = {"size": SMALL, "fps": 2}
+    (without, _), *_ = frames(animate(model, motion, tmp_path / "a.gif", **options))
+    (found, _), *_ = frames(animate(model, motion, tmp_path / "b.gif", file=tmp_path / "walker.osim", **options))
+    assert (without != found).any(axis=2).sum() > 1000
 
 
 def test_a_model_without_coordinates_has_a_film_too(tmp_path):
