@@ -106,6 +106,7 @@ class Paths:
         """What each path through points runs through, from end to end: numbers, and places (3,) in ground (m).
 
         Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k and n + 2 k + 1.
+        Along geodesics k counts the surfaces of its route, of which there is one for each piece that may be bent.
         """
         return self._system.nodes(self.mechanism.values(q), self.routes)
 

@@ -191,3 +191,20 @@ def test_far_side_of_a_sphere():
 def test_unknown_wrapping():
     with pytest.raises(SettingError, match="'geodesic'"):
         osimlite.paths(wrapped({"via": (), "objects": ()}), wrapping="geodesics")
+
+
+def test_a_simulation_runs_along_geodesics():
+    """Its first acceleration is that of the moment arms."""
+    model = wrapped({"via": (), "objects": (surface("Cylinder", [0.03, 1.0]),)})
+    paths, ends = osimlite.paths(model, wrapping="geodesic"), {"A3": -0.1, "A4": 0.01, "B3": 0.12, "B5": 0.08}
+    pulled = {
+        wrapping: osimlite.simulate(
+            model, 1e-6, "compiled", wrapping=wrapping, initial=ends, controls={"p": 1.0}, accuracy=1e-9
+        )
+        for wrapping in ("geodesic", "opensim")
+    }
+    place = paths.mechanism.coordinate_index("B5")
+    arm = paths.moment_arms(ends)[PATH][paths.mechanism.coordinates[place].path]
+    assert pulled["geodesic"].summary["settings"]["wrapping"] == "geodesic"
+    assert pulled["geodesic"].speeds[-1][place] / 1e-6 == pytest.approx(arm, rel=1e-6)
+    assert pulled["opensim"].speeds[-1][place] / 1e-6 != pytest.approx(arm, rel=1e-4)
