@@ -15,6 +15,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from osimlite._require import require
 from osimlite.errors import OsimliteError
 from osimlite.text import counted
 
@@ -122,11 +123,12 @@ def optimum(item: Optimum) -> str:
 
 def _space(item: Model, motion: Trajectory | None = None) -> str:
     """The page of the viewer, or why there is none."""
-    from osimlite.view.shown import Shown
-
     file = None if item.layout is None else item.layout.file
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
     try:
+        require("numpy", extra="view", purpose="the picture")
+        from osimlite.view.shown import Shown
+
         shown = Shown.of(item, None if motion is None else motion.mechanism, folders, motion=motion)
         packed = base64.b64encode(gzip.compress(shown.page_text().encode(), 6, mtime=0)).decode()
     except OsimliteError as error:

@@ -43,6 +43,20 @@ def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1.parquet", "2.parquet", "3.parquet"]
 
 
+def test_results_are_tables_and_show_themselves(made, tmp_path):
+    for package in ("pandas", "xarray"):
+        pytest.importorskip(package, reason=f"needs {package} (extra 'frame')")
+    outcome = sweep(made, samples(made.variables, "sobol", 12, 5), tmp_path / "r.parquet")
+    table, frame, data = outcome.to_arrow(), outcome.to_frame(), outcome.to_xarray()
+    assert table.num_rows == 12 and frame.index.name == "run" and data.sizes == {"run": 12}
+    assert frame["distance"].tolist() == table["distance"].to_pylist() == data["distance"].values.tolist()
+    html = outcome._repr_html_()
+    assert "12 runs" in html and "and 2 more" in html and f"{frame['distance'][0]:.6g}" in html
+    outcome.path.write_bytes(b"PAR1")
+    with pytest.raises(OsimliteError, match="damaged"):
+        outcome.to_frame()
+
+
 def test_processes_of_bullet_too(walker, tmp_path):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.2, engine="bullet")

@@ -73,10 +73,17 @@ def test_findings_are_a_table_the_worst_first():
     assert "and 200 more" in many and many.count("<tr>") == notebook.MOST_ROWS + 1
 
 
-def test_findings_need_no_arrays():
-    code = "import sys; sys.modules['numpy'] = None; from osimlite.lint import Report; print(Report()._repr_html_())"
+def test_findings_and_trees_need_no_arrays():
+    code = """
+import sys
+sys.modules["numpy"] = None
+import osimlite
+from osimlite.lint import Report
+print(Report()._repr_html_(), osimlite.Model(name="bare")._repr_html_())
+"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "0 errors" in done.stdout
+    assert "0 errors" in done.stdout and "<b>bare</b>" in done.stdout
+    assert "no picture: the picture needs numpy" in done.stdout
 
 
 def test_paths_are_a_table_of_lengths_and_moment_arms():
