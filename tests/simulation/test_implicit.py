@@ -117,6 +117,18 @@ def test_a_block_hangs_on_a_muscle(case, method):
         assert np.abs(found.auxiliary[path] - values).max() < 2e-5, path
 
 
+@pytest.mark.parametrize(("number", "method"), [("m0001", "bdf"), ("m0001", "rosenbrock"), ("m0005", "adams")])
+def test_real_models_move(number, method, corpus):
+    """An arm and a gait model."""
+    (path,) = (model.path for model in corpus if model.id == number)
+    with Simulation(osimlite.read(path), "compiled", equilibrate=True) as simulation:
+        exact = simulation.run(0.05, accuracy=1e-8)
+        found = simulation.run(0.05, accuracy=1e-5, integrator=method)
+    assert np.abs(found.values - exact.values).max() < 1e-4
+    assert np.abs(found.speeds - exact.speeds).max() < 1e-2
+    assert found.summary["evaluations"] < exact.summary["evaluations"] / 2
+
+
 def test_a_stiff_muscle_needs_few_evaluations():
     with Simulation(hanging("dgf_default", 0.02, 1.0), "compiled", equilibrate=True) as simulation:
         counts = {
