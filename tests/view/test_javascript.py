@@ -9,7 +9,9 @@ from math import sqrt
 import numpy as np
 import pytest
 
+from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.pointers import at
+from osimlite.simulation.kernels.table import LAW_MODULES, law_function
 from osimlite.view.javascript import as_javascript
 
 TABLE = 3, 4
@@ -91,3 +93,10 @@ def test_what_is_not_known_is_an_error():
     for function in (held, called):
         with pytest.raises(NotImplementedError, match=function.__name__):
             as_javascript([], [function])
+
+
+def test_all_kernels_of_paths_are_translated():
+    parts = "path", "wrap", "geodesic", "cable"
+    names = [name for name, module in LAW_MODULES.items() if any(part in module for part in parts)]
+    assert {"wrapped_path", "geodesic_path", "cable_path", "pull_points"} <= set(names)
+    assert "Math.atan2" in as_javascript([law_function(name) for name in names], [pull_path])
