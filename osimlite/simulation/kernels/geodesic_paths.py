@@ -3,9 +3,11 @@
 Between two neighbouring points each PathWrap whose range holds both bends the path where that touches, whatever it does
 between other points. So its surface stands in the path once for each point that a bent piece may begin at. A piece is
 bent around one surface at a time, until this changes little; then all geodesics are corrected at once, as those of a
-cable, until lines go over into them without a bend. What is found depends on the pose alone.
+cable, until lines go over into them without a bend. Where surfaces may be passed on either side, all ways around two of
+them are tried. What is found depends on the pose alone.
 
-A surface inside which a point of the piece lies bends it nowhere, as in OpenSim.
+A surface inside which a point of the piece lies bends it nowhere, as in OpenSim. A piece for which no geodesics are
+found goes straight on; none such is known but where a point lies on a surface.
 """
 
 from __future__ import annotations

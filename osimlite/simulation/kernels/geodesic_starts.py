@@ -59,8 +59,8 @@ Start = tuple[float, Vector, Vector, float]
 surface; its direction there; its length on the surface, m."""
 
 AS_MEANT, ANY_SIDE, OTHER_WAY, PULLED = 1.0, 2.0, 3.0, 4.0
-"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; around an
-ellipsoid on the other side, or where a string comes to lie."""
+"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; on the other
+of two open sides; around an ellipsoid where a string comes to lie."""
 
 LEAST = 1e-100
 """What is not divided by."""
