@@ -220,8 +220,10 @@ def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, is_
                 place = place_of(chain, count, number)
                 if place > 0 and (turn < loose or not chain[SLOT * place + GEODESIC + ARC] > 0.0):
                     take_out(chain, count, place)
-                    count, place, changed = count - 1, 0, True
-                if place == 0 and put_in(at(p, own[PLACES]), pose, chain, count, number, room):
+                    count, changed = count - 1, True
+                # What was left is met again, if at all, once the rest is smooth; in the end nothing is.
+                may_meet = turn < loose or (place == 0 and turn < TURNS - 2)
+                if may_meet and put_in(at(p, own[PLACES]), pose, chain, count, number, room):
                     count, changed = count + 1, True
         if not changed and turn != loose:
             break
