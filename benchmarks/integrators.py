@@ -226,7 +226,7 @@ def draw(found: dict[str, dict[str, list[Run]]], path: Path) -> None:
                 markersize=3,
             )
         axis.axhline(ERROR, color="0.8", zorder=0)
-        axis.set_title(fill(name, 40), fontsize=9)
+        axis.set_title(fill(name, 32), fontsize=9)
         axis.set_xlabel(f"processor time for {TO:g} s, ms")
         axis.set_ylabel("error at the end")
     for axis in places[len(found) :]:
