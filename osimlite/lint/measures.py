@@ -164,6 +164,9 @@ def unmeasured(subject: Subject) -> str:
         subject.kept[MEASURES] = measured(subject.model, compiles=compiles)
     except OsimliteError as error:
         return error.message
+    except (ArithmeticError, ValueError) as error:
+        # Numbers that other rules have something to say of.
+        return f"a number of it is beyond what can be computed with ({error})"
     return ""
 
 

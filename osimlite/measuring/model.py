@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 
+import numpy as np
+
+from osimlite.errors import SimulationError
 from osimlite.lint.measures import LengthOnSurface, Measures, Pose
 from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
 from osimlite.measuring.points import moving_points
-from osimlite.measuring.sweeps import Sweep, lengths, sweeps
+from osimlite.measuring.sweeps import Sweep, sweeps
 from osimlite.measuring.wrapping import wrappings
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -21,6 +24,7 @@ MIDDLE = 0.5
 """Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
 
 
+@np.errstate(all="ignore")
 def measured(model: Model, *, compiles: bool) -> Measures:
     """Measure the paths and muscles of a model.
 
@@ -32,13 +36,13 @@ def measured(model: Model, *, compiles: bool) -> Measures:
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
         ModelError: something makes no sense.
-        SimulationError: the constraints allow no default pose.
+        SimulationError: the constraints allow no default pose, or there are no lengths in it.
     """
     code = None if compiles else AT_HAND
     paths = Paths(model, code=code)
     start = paths.mechanism.assemble({})
+    default = np.array(list(paths.lengths(start).values()))
     looked_at = [*sweeps(paths, start)]
-    default = lengths(paths, start)
     has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
     starts, reaches = [], []
     places = {name: place for place, name in enumerate(paths.names)}
@@ -64,7 +68,11 @@ def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator
     told = set()
     swept = ((sweep.pose(value), q) for sweep in looked_at for value, q in zip(sweep.values, sweep.poses, strict=True))
     for pose, q in chain([(Pose(), start)], swept):
-        for name, on_surfaces in paths.lengths_on_surfaces(q).items():
+        try:
+            found = paths.lengths_on_surfaces(q)
+        except SimulationError:
+            continue
+        for name, on_surfaces in found.items():
             for surface, length in on_surfaces.items():
                 if not length >= 0.0 and (name, surface) not in told:
                     told.add((name, surface))
@@ -77,6 +85,6 @@ def _ends(looked_at: list[Sweep], default: Array, place: int) -> tuple[tuple[flo
     for sweep in looked_at:
         low, high = sweep.info.range
         for value, length in zip(sweep.values, sweep.lengths[:, place], strict=True):
-            if round(abs((value - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE:
+            if length == length and round(abs((value - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE:
                 found.append((float(length), sweep.pose(value)))
     return min(found, key=lambda item: item[0]), max(found, key=lambda item: item[0])

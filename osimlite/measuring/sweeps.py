@@ -70,8 +70,11 @@ class Sweep:
 
 
 def lengths(paths: Paths, q: Array) -> Array:
-    """Lengths (p,) of all paths, m."""
-    return np.array(list(paths.lengths(q).values()))
+    """Lengths (p,) of all paths, m; NaN where they cannot be computed."""
+    try:
+        return np.array(list(paths.lengths(q).values()))
+    except SimulationError:
+        return np.full(len(paths.names), np.nan)
 
 
 def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
@@ -83,7 +86,7 @@ def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
             continue
         poses = _poses(paths, start, place, np.linspace(low, high, VALUES), bool(are_tied[place]))
         rows = np.array([lengths(paths, q) for q in poses])
-        if len(rows) > 1 and np.ptp(rows, axis=0).max(initial=0.0) > STILL:
+        if len(rows) > 1 and np.nan_to_num(np.ptp(rows, axis=0)).max(initial=0.0) > STILL:
             yield Sweep(paths, place, np.array(poses), rows, bool(are_tied[place]))
 
 

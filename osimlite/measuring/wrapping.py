@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from osimlite.errors import SimulationError
 from osimlite.lint.measures import Pose, Wrapping
 from osimlite.measuring.sweeps import STILL, Sweep, lengths
 from osimlite.multibody.spatial import Array
@@ -24,7 +23,7 @@ ASIDE, NEAR = 1e-7, 1e-4
 def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]) -> Iterator[Wrapping]:
     """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most."""
     default = _excess(geodesic, paths, start)
-    swept = [sweep.lengths - [_lengths(geodesic, q) for q in sweep.poses] for sweep in looked_at]
+    swept = [sweep.lengths - [lengths(geodesic, q) for q in sweep.poses] for sweep in looked_at]
     free = [sweep for sweep in looked_at if not sweep.is_tied]
     parts = np.random.default_rng(0).random((TOGETHER, len(free)))
     values = [low + parts[:, k] * (high - low) for k, (low, high) in enumerate(sweep.info.range for sweep in free)]
@@ -56,11 +55,4 @@ def _is_certain(geodesic: Paths, paths: Paths, path: int, excess: float, q: Arra
 
 
 def _excess(geodesic: Paths, paths: Paths, q: Array) -> Array:
-    return lengths(paths, q) - _lengths(geodesic, q)
-
-
-def _lengths(paths: Paths, q: Array) -> Array:
-    try:
-        return lengths(paths, q)
-    except SimulationError:
-        return np.full(len(paths.names), np.nan)
+    return lengths(paths, q) - lengths(geodesic, q)

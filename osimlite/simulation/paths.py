@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite._lazy import shown_in_notebooks
+from osimlite.errors import SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.kinematics import Kinematics, kinematics
@@ -271,6 +272,10 @@ class _System(System):
 
     def _evaluated(self, q: Array, u: Array) -> None:
         y = self.state.pack(q.tolist(), u.tolist())
-        status = self.realize(0.0, y, layout.FORCE_STAGE)
+        try:
+            status = self.realize(0.0, y, layout.FORCE_STAGE)
+        except (ArithmeticError, ValueError) as failure:
+            # Kernels as Python raise what machine code computes as no number.
+            raise SimulationError(f"the paths cannot be computed: {failure}") from failure
         if status != layout.OK:
             raise self.refusal(status, 0.0, y)

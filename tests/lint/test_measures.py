@@ -70,6 +70,17 @@ def test_a_model_that_cannot_be_computed_is_named_with_the_reason(fixtures):
     assert why.startswith("m.osim: ") and "ScrewJoint" in why
 
 
+def test_numbers_beyond_what_is_computed_with_are_no_traceback(fixtures):
+    text = (fixtures / "lint" / "OSIM633" / "fail-01-example.osim").read_text()
+    text = text.replace("WrapSphere", "WrapEllipsoid").replace(
+        "<radius>0.04</radius>", "<dimensions>1e-300 1 1</dimensions>"
+    )
+    report = validate(Source(text.encode()))
+    assert [why.partition(" (")[0] for why in report.unmeasured] == [
+        "the model: a number of it is beyond what can be computed with"
+    ]
+
+
 def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
     text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text()
     (one, two) = validate(Source(text.encode())).findings
