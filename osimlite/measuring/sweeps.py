@@ -15,8 +15,9 @@ from osimlite.multibody.parts import CoordinateInfo
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
-VALUES = 9
-"""Of each coordinate."""
+VALUES, TIED_VALUES, TIED_POSES = 9, 5, 40
+"""Of each coordinate; of each that constraints tie to others, whose poses take long to find; and how many of these
+poses are found at most."""
 WIDEST = 4.0 * pi
 """A wider range (rad or m) stands for none."""
 STILL = 1e-9
@@ -79,15 +80,19 @@ def lengths(paths: Paths, q: Array) -> Array:
 
 def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
     """A sweep of each coordinate that changes the length of a path."""
-    are_tied = tied(paths, start)
+    are_tied, left = tied(paths, start), TIED_POSES
     for place, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
         if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
             continue
-        poses = _poses(paths, start, place, np.linspace(low, high, VALUES), bool(are_tied[place]))
+        is_tied = bool(are_tied[place])
+        if is_tied and left < TIED_VALUES:
+            continue
+        left -= is_tied * TIED_VALUES
+        poses = _poses(paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied)
         rows = np.array([lengths(paths, q) for q in poses])
         if len(rows) > 1 and np.nan_to_num(np.ptp(rows, axis=0)).max(initial=0.0) > STILL:
-            yield Sweep(paths, place, np.array(poses), rows, bool(are_tied[place]))
+            yield Sweep(paths, place, np.array(poses), rows, is_tied)
 
 
 def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> list[Array]:

@@ -86,7 +86,8 @@ class Shown:
         mechanism = build_mechanism(model) if mechanism is None else mechanism
         places = MeshFolders(None if file is None else file.parent, folders)
         scene = build_scene(model, mechanism, places, wrapping)
-        config = Config(mesh_paths=tuple(str(folder.resolve()) for folder in places.searched))
+        # What is measured of paths and muscles takes longer than a page to open.
+        config = Config(ignore=("OSIM63",), mesh_paths=tuple(str(folder.resolve()) for folder in places.searched))
         findings = validate(model if file is None else file, config=config).findings
         remarks = []
         if scene.remarks:
