@@ -127,6 +127,8 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
                 if odd := suspect_value(info, name, part):
                     raise SettingError(f"--coordinate: {odd} (if not, write {part.strip()}rad)")
             low, high = (in_units_of(mechanism, name, part) for part in parts)
+        if equals and low > high:
+            raise SettingError(f"--coordinate takes the lower end of the range first, got '{word}'")
         if not (isfinite(low) and isfinite(high) and low < high):
             raise SettingError(f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1")
         found[name] = [low + (high - low) * k / (points - 1) for k in range(points)]

@@ -136,6 +136,9 @@ def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, A
     if not isinstance(given, str | Path | StoTable):
         raise SettingError(f"controls are a mapping of names, a table or a file, not {given!r}")
     table = given if isinstance(given, StoTable) else read_controls(given)
+    for place, label in enumerate(table.columns):
+        if label in table.columns[:place]:
+            raise SettingError(f"the table of controls has two columns '{label}'; leave one out")
     return {label: (table.times, table.rows[:, place]) for place, label in enumerate(table.columns)}
 
 

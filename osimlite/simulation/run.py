@@ -149,7 +149,9 @@ class Simulation:
             _check_step(fixed_step, to)
         check_integrator(chosen.integrator)
         if fixed_step is not None and chosen.integrator != MERSON:
-            raise SettingError(f"a fixed step goes without the integrator '{chosen.integrator}'; take one of them")
+            raise SettingError(
+                f"the integrator '{chosen.integrator}' chooses its steps; leave it out, or the fixed step"
+            )
         if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):

@@ -77,7 +77,7 @@ def test_pictures(file):
     [
         (("--coordinate", "y"), "y"),
         (("--coordinate", "x=1"), "--coordinate takes NAME=LOW:HIGH"),
-        (("--coordinate", "x=2:1"), "no range to sweep"),
+        (("--coordinate", "x=2:1"), "the lower end of the range first"),
         (("--muscle", "/forceset/mo"), "no muscle '/forceset/mo'; did you mean '/forceset/mu'"),
         (("-o", "arm.txt"), ".csv or .parquet"),
         (("--plot",), "--plot needs a --coordinate"),

@@ -79,7 +79,7 @@ def victims(models: list[CorpusModel], folder: Path) -> list[Path]:
 def test_the_verdict_on_edited_models_is_that_of_opensim(corpus, opensim_says, tmp_path):
     taken = [path for path in victims(corpus, tmp_path) if opensim_says(path) is None]
     texts = [Text(path.read_bytes().decode("utf-8", "replace")) for path in taken]
-    before = [Counter((f.code, f.message) for f in validate(path).errors) for path in taken]
+    before = [Counter((f.code, f.message) for f in validate(path, ignore="OSIM63").errors) for path in taken]
     draw = random.Random(int(os.environ.get("OSIMLITE_SEED", "1")))
     counts: Counter[str] = Counter()
     wrong = []
@@ -95,7 +95,7 @@ def test_the_verdict_on_edited_models_is_that_of_opensim(corpus, opensim_says, t
             continue
         counts["edits"] += 1
         counts["refused"] += message is not None
-        errors = new_errors(validate(path), before[number])
+        errors = new_errors(validate(path, ignore="OSIM63"), before[number])
         claims = [finding for finding in errors if claims_refusal(finding)]
         if message is not None and not errors:
             counts["missed"] += 1

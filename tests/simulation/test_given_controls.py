@@ -13,7 +13,7 @@ from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.controller_types import PrescribedController, SynergyController, SynergyVector
 from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.reporters import TableSource__double_
-from osimlite.simulation import Simulation, read_sto, write_sto
+from osimlite.simulation import Simulation, StoTable, read_sto, write_sto
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
 from osimlite.simulation.given_controls import driven
 from osimlite.simulation.system import System
@@ -122,6 +122,10 @@ def test_the_kernel_alone(model, code):
         (
             {"second": 1.0, "/forceset/second": 2.0},
             "'/forceset/second' is controlled twice, by its name and by its path; leave one out",
+        ),
+        (
+            StoTable("Controls", np.array((0.0, 1.0)), ("second", "second"), np.zeros((2, 2))),
+            "the table of controls has two columns 'second'; leave one out",
         ),
         ({"second": float("nan")}, "the control of 'second' is nan; give a number"),
         (

@@ -338,13 +338,13 @@ def moving_point_range(subject: Subject, found: Found) -> None:
             beyond = f"{degrees(point.beyond):.3g} deg" if is_angle else f"{point.beyond:.3g} m"
             found(
                 f"the functions of the place of {names} end {beyond} before the range of '{end.coordinate}': OpenSim "
-                f"lets it move on by {1000.0 * point.moved:.3g} mm, to its place {end}",
+                f"lets it move on by {1000.0 * point.moved:.3g} mm, to its place at {end}",
                 owner,
             )
         else:
             found(
                 f"beyond the range of '{end.coordinate}', which nothing keeps it in, {names} rests and OpenSim goes on "
-                f"as if it moved, by {1000.0 * point.rate:.3g} mm per {'rad' if is_angle else 'm'} {end}",
+                f"as if it moved, by {1000.0 * point.rate:.3g} mm per {'rad' if is_angle else 'm'} at {end}",
                 owner,
                 severity=INFO,
             )

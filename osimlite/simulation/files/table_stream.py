@@ -9,6 +9,7 @@ from pathlib import Path
 from osimlite.errors import DocumentError
 from osimlite.files import open_file
 from osimlite.tables import LONGEST_HEADER, StorageHeader, suffixes
+from osimlite.text import counted
 
 _NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 """How programs on Windows wrote what is no number."""
@@ -72,7 +73,7 @@ class TableStream:
                 row = self._odd(text, number)
             if len(row) != size:
                 raise DocumentError(
-                    f"the row has {len(row)} numbers and needs {size}",
+                    f"the row has {counted(len(row), 'number')} and needs {size}",
                     file=self.file,
                     line=number,
                     column=len(line.rstrip()) + 1 if len(row) < size else start_of_word(text, size),

@@ -59,7 +59,7 @@ def test_older_layout(tmp_path):
         ("nothing\n", None, "endheader"),
         ("t\nendheader\n", 2, "before its column labels"),
         ("t\nendheader\nx\ty\n", 3, "must be 'time'"),
-        ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, "1 numbers and needs 2"),
+        ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, "1 number and needs 2"),
         ("t\nendheader\ntime\ta\n0\tone\n", 4, "no number"),
     ],
 )
@@ -74,7 +74,7 @@ def test_faults_are_placed(tmp_path, text, line, words):
 @pytest.mark.parametrize(
     ("text", "line", "column", "words"),
     [
-        ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, 2, "1 numbers and needs 2"),
+        ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, 2, "1 number and needs 2"),
         ("t\nendheader\ntime\ta\n\n0\t1 22\n", 5, 5, "3 numbers and needs 2"),
         ("t\nendheader\ntime\ta\n0\t one\n", 4, 4, "'one' is no number"),
         ("t\nDataType=Vec3\nendheader\ntime\ta\n0\t1,2\n", 5, 6, "3 numbers and needs 4"),
