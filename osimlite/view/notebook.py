@@ -111,7 +111,7 @@ def runs(item: Outcome) -> str:
     rows = table.slice(0, FIRST_ROWS).to_pylist()
     cells = ([_number(value) for value in row.values()] for row in rows)
     words = f"<div>{counted(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
-    return words + _table(table.column_names, cells, table.num_rows, FIRST_ROWS)
+    return words + _table([escape(name) for name in table.column_names], cells, table.num_rows, FIRST_ROWS)
 
 
 def optimum(item: Optimum) -> str:
