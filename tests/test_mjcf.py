@@ -207,8 +207,9 @@ def test_an_edited_file_is_driven(tmp_path):
     assert driver.data.time == pytest.approx(0.003)
 
 
-NEARLY = {"m0163": 1e-3, "m0466": 1e-3}
-"""Relative errors of models with a shoulder that a constraint nearly holds twice, and with a helper of 1 g."""
+NEARLY = {"m0163": 3e-3, "m0466": 1e-3}
+"""Relative errors of models with a shoulder that a constraint nearly holds twice (5e-4 with Python 3.11, 1.2e-3 with
+the later numpy of 3.13), and with a helper of 1 g."""
 
 
 @pytest.mark.filterwarnings("ignore")
