@@ -36,12 +36,8 @@ def missing_mass(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     mass = Body.field_specs()["mass"]
@@ -63,12 +59,8 @@ def impossible_inertia(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     slack = subject.config.value_of(SLACK)
@@ -101,12 +93,8 @@ def inertia_not_positive(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.003 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.003 0 0</inertia> </Body>
     ```
     """
     slack = subject.config.value_of(SLACK)
@@ -135,12 +123,8 @@ def no_inertia(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     inertia = Body.field_specs()["inertia"]
@@ -185,12 +169,8 @@ def mass_out_of_proportion(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>100000 100000 20000 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> <inertia>100000 100000 20000 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     heaviest, widest = subject.config.value_of(MASS), subject.config.value_of(GYRATION)

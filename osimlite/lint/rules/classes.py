@@ -33,16 +33,12 @@ def unknown_class(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
+    - <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
+    + <MarkerSet>
+    +     <objects>
+    +         <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    +     </objects>
+    + </MarkerSet>
     ```
     """
     for note, owner in subject.notes_of("unknown-class"):
@@ -69,16 +65,12 @@ def wrong_class(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
+    - <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
+    + <MarkerSet>
+    +     <objects>
+    +         <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    +     </objects>
+    + </MarkerSet>
     ```
     """
     for note, owner in subject.notes_of("wrong-class"):
@@ -106,18 +98,11 @@ def wrong_part_name(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh">
-        <FrameGeometry name="axes"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
-        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh">
-        <FrameGeometry name="frame_geometry"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
-        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
+      <Body name="thigh">
+    -     <FrameGeometry name="axes"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
+    +     <FrameGeometry name="frame_geometry"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
+          <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+      </Body>
     ```
     """
     for note, owner in subject.notes_of("unknown-tag"):
@@ -148,18 +133,12 @@ def missing_wrapper(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <MarkerSet>
-        <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-    </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
+      <MarkerSet>
+    -     <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    +     <objects>
+    +         <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    +     </objects>
+      </MarkerSet>
     ```
     """
     reported = set()

@@ -28,28 +28,16 @@ def contact_without_partner(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>heel</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
+      <HuntCrossleyForce name="foot_ground">
+          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+              <objects>
+                  <HuntCrossleyForce::ContactParameters>
+    -                 <geometry>heel</geometry> <stiffness>1e6</stiffness>
+    +                 <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+                  </HuntCrossleyForce::ContactParameters>
+              </objects>
+          </HuntCrossleyForce::ContactParametersSet>
+      </HuntCrossleyForce>
     ```
     """
     for force, holders, uses in _contact_lists(subject):
@@ -75,28 +63,16 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>heel heel floor</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
+      <HuntCrossleyForce name="foot_ground">
+          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+              <objects>
+                  <HuntCrossleyForce::ContactParameters>
+    -                 <geometry>heel heel floor</geometry> <stiffness>1e6</stiffness>
+    +                 <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+                  </HuntCrossleyForce::ContactParameters>
+              </objects>
+          </HuntCrossleyForce::ContactParametersSet>
+      </HuntCrossleyForce>
     ```
     """
     for force, _, uses in _contact_lists(subject):
@@ -131,21 +107,16 @@ def unused_contact_geometry(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
-    ```
-
-    ## Use instead
-    ```xml
-    <HuntCrossleyForce name="toe_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>toe floor</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
-    <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
+    + <HuntCrossleyForce name="toe_ground">
+    +     <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+    +         <objects>
+    +             <HuntCrossleyForce::ContactParameters>
+    +                 <geometry>toe floor</geometry> <stiffness>1e6</stiffness>
+    +             </HuntCrossleyForce::ContactParameters>
+    +         </objects>
+    +     </HuntCrossleyForce::ContactParametersSet>
+    + </HuntCrossleyForce>
+      <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
     ```
     """
     surfaces = list(subject.each(ContactGeometry))

@@ -31,20 +31,12 @@ def inverted_range(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>0 -2.1</range> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>-2.1 0</range> </Coordinate> </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+    -     <coordinates> <Coordinate name="knee_angle"> <range>0 -2.1</range> </Coordinate> </coordinates>
+    +     <coordinates> <Coordinate name="knee_angle"> <range>-2.1 0</range> </Coordinate> </coordinates>
+      </PinJoint>
     ```
     """
     for coordinate in subject.each(Coordinate):
@@ -74,24 +66,14 @@ def default_outside_range(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+          <coordinates>
+    -         <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
+    +         <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
+          </coordinates>
+      </PinJoint>
     ```
     """
     for coordinate in subject.each(Coordinate):
@@ -122,25 +104,17 @@ def prescribed_without_function(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <prescribed>true</prescribed> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+    -     <coordinates> <Coordinate name="knee_angle"> <prescribed>true</prescribed> </Coordinate> </coordinates>
+    +     <coordinates>
+    +         <Coordinate name="knee_angle">
+    +             <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
+    +             <prescribed>true</prescribed>
+    +         </Coordinate>
+    +     </coordinates>
+      </PinJoint>
     ```
     """
     for coordinate in subject.each(Coordinate):
@@ -166,20 +140,12 @@ def degrees_for_radians(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>-120 0</range> </Coordinate> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle"> <range>-2.0943951 0</range> </Coordinate> </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+    -     <coordinates> <Coordinate name="knee_angle"> <range>-120 0</range> </Coordinate> </coordinates>
+    +     <coordinates> <Coordinate name="knee_angle"> <range>-2.0943951 0</range> </Coordinate> </coordinates>
+      </PinJoint>
     ```
     """
     turns, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)

@@ -44,44 +44,24 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <coordinates>ankle_angel</coordinates>
-                <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <coordinates>ankle_angle</coordinates>
-                <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <CustomJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+          <SpatialTransform>
+              <TransformAxis name="rotation1">
+                  <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+              </TransformAxis>
+              <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+              <TransformAxis name="translation1">
+    -             <coordinates>ankle_angel</coordinates>
+    +             <coordinates>ankle_angle</coordinates>
+                  <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
+              </TransformAxis>
+          </SpatialTransform>
+      </CustomJoint>
     ```
     """
     for joint in subject.named("CustomJoint"):
@@ -118,43 +98,23 @@ def axis_without_coordinate(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-            <TransformAxis name="translation1">
-                <coordinates>ankle_angle</coordinates>
-                <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
-            </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <CustomJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+          <SpatialTransform>
+              <TransformAxis name="rotation1">
+                  <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+              </TransformAxis>
+              <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+              <TransformAxis name="translation1">
+    +             <coordinates>ankle_angle</coordinates>
+                  <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
+              </TransformAxis>
+          </SpatialTransform>
+      </CustomJoint>
     ```
     """
     for joint in subject.named("CustomJoint"):
@@ -183,36 +143,20 @@ def collinear_axes(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 0 1</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <CustomJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+          <SpatialTransform>
+              <TransformAxis name="rotation1">
+                  <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+              </TransformAxis>
+    -         <TransformAxis name="rotation2"> <axis>0 0 1</axis> </TransformAxis>
+    +         <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+          </SpatialTransform>
+      </CustomJoint>
     ```
     """
     for joint in subject.named("CustomJoint"):
@@ -247,36 +191,20 @@ def idle_coordinate(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <Constant name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <CustomJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-        <SpatialTransform>
-            <TransformAxis name="rotation1">
-                <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-            </TransformAxis>
-            <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-            <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-        </SpatialTransform>
-    </CustomJoint>
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <CustomJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+          <SpatialTransform>
+              <TransformAxis name="rotation1">
+    -             <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <Constant name="function" />
+    +             <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
+              </TransformAxis>
+              <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
+              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
+          </SpatialTransform>
+      </CustomJoint>
     ```
     """
     for joint in subject.named("CustomJoint"):

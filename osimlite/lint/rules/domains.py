@@ -32,12 +32,8 @@ def not_finite(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <gravity>0 NaN 0</gravity>
-    ```
-
-    ## Use instead
-    ```xml
-    <gravity>0 -9.80665 0</gravity>
+    - <gravity>0 NaN 0</gravity>
+    + <gravity>0 -9.80665 0</gravity>
     ```
     """
     for item, spec, value in _reals(subject):
@@ -75,18 +71,11 @@ def impossible_value(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
-        <transition>0</transition>
-    </CoordinateLimitForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
-        <transition>5</transition>
-    </CoordinateLimitForce>
+      <CoordinateLimitForce name="stop">
+          <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
+    -     <transition>0</transition>
+    +     <transition>5</transition>
+      </CoordinateLimitForce>
     ```
     """
     for item, spec, value, verdict in outside(subject):
@@ -108,12 +97,8 @@ def doubtful_value(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>
-    ```
-
-    ## Use instead
-    ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.05</radius> </ContactSphere>
+    - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>
+    + <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.05</radius> </ContactSphere>
     ```
     """
     for item, spec, value, verdict in outside(subject):
@@ -140,16 +125,10 @@ def unknown_choice(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame>
-        <Appearance> <SurfaceProperties> <representation>7</representation> </SurfaceProperties> </Appearance>
-        <radius>0.05</radius> </ContactSphere>
-    ```
-
-    ## Use instead
-    ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame>
-        <Appearance> <SurfaceProperties> <representation>3</representation> </SurfaceProperties> </Appearance>
-        <radius>0.05</radius> </ContactSphere>
+      <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame>
+    -     <Appearance> <SurfaceProperties> <representation>7</representation> </SurfaceProperties> </Appearance>
+    +     <Appearance> <SurfaceProperties> <representation>3</representation> </SurfaceProperties> </Appearance>
+          <radius>0.05</radius> </ContactSphere>
     ```
     """
     for cls, items in subject.by_class.items():

@@ -30,14 +30,10 @@ def missing_mesh(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <attached_geometry> <Mesh name="bone"> <mesh_file>no_such_bone.vtp</mesh_file> </Mesh>
-        </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <attached_geometry> <Cylinder name="bone"> <radius>0.02</radius> <half_height>0.2</half_height>
-        </Cylinder> </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+      <Body name="thigh"> <attached_geometry>
+    -     <Mesh name="bone"> <mesh_file>no_such_bone.vtp</mesh_file> </Mesh>
+    +     <Cylinder name="bone"> <radius>0.02</radius> <half_height>0.2</half_height> </Cylinder>
+      </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     items: list[tuple[Object, str, str]] = [(mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)]
@@ -82,16 +78,12 @@ def included_file(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <MarkerSet file="markers.xml" />
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
+    - <MarkerSet file="markers.xml" />
+    + <MarkerSet>
+    +     <objects>
+    +         <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    +     </objects>
+    + </MarkerSet>
     ```
     """
     for note in subject.notes:
@@ -151,19 +143,12 @@ def missing_data_file(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    <PrescribedController name="drive">
-        <socket_actuators>/forceset/motor</socket_actuators> <controls_file>no_such_controls.sto</controls_file>
-    </PrescribedController>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    <PrescribedController name="drive">
-        <socket_actuators>/forceset/motor</socket_actuators>
-        <FunctionSet name="ControlFunctions"> <objects> <Constant name="motor" /> </objects> </FunctionSet>
-    </PrescribedController>
+      <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+      <PrescribedController name="drive">
+    -     <socket_actuators>/forceset/motor</socket_actuators> <controls_file>no_such_controls.sto</controls_file>
+    +     <socket_actuators>/forceset/motor</socket_actuators>
+    +     <FunctionSet name="ControlFunctions"> <objects> <Constant name="motor" /> </objects> </FunctionSet>
+      </PrescribedController>
     ```
     """
     tags = {

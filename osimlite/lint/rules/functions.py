@@ -40,34 +40,19 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function>
-                    <SimmSpline> <x>0 0.5 0.5 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
-                </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function>
-                    <SimmSpline> <x>0 0.5 0.6 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
-                </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+          <coordinates>
+              <Coordinate name="knee_angle">
+                  <prescribed_function>
+    -                 <SimmSpline> <x>0 0.5 0.5 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
+    +                 <SimmSpline> <x>0 0.5 0.6 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
+                  </prescribed_function>
+                  <prescribed>true</prescribed>
+              </Coordinate>
+          </coordinates>
+      </PinJoint>
     ```
     """
     for function in _tabulated(subject):
@@ -108,30 +93,19 @@ def unequal_points(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function> <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4</y> </SimmSpline> </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function> <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4 -1</y> </SimmSpline> </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+          <coordinates>
+              <Coordinate name="knee_angle">
+                  <prescribed_function>
+    -                 <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4</y> </SimmSpline>
+    +                 <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4 -1</y> </SimmSpline>
+                  </prescribed_function>
+                  <prescribed>true</prescribed>
+              </Coordinate>
+          </coordinates>
+      </PinJoint>
     ```
     """
     for function in _tabulated(subject):
@@ -160,30 +134,17 @@ def too_few_points(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function> <SimmSpline> <x>0</x> <y>-1</y> </SimmSpline> </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function> <Constant> <value>-1</value> </Constant> </prescribed_function>
-                <prescribed>true</prescribed>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+          <coordinates>
+              <Coordinate name="knee_angle">
+    -             <prescribed_function> <SimmSpline> <x>0</x> <y>-1</y> </SimmSpline> </prescribed_function>
+    +             <prescribed_function> <Constant> <value>-1</value> </Constant> </prescribed_function>
+                  <prescribed>true</prescribed>
+              </Coordinate>
+          </coordinates>
+      </PinJoint>
     ```
     """
     for function in _tabulated(subject):
@@ -213,32 +174,18 @@ def coefficient_count(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function>
-                    <LinearFunction> <coefficients></coefficients> </LinearFunction>
-                </prescribed_function>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function>
-                    <LinearFunction> <coefficients>0 -0.2</coefficients> </LinearFunction>
-                </prescribed_function>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+          <coordinates>
+              <Coordinate name="knee_angle">
+                  <prescribed_function>
+    -                 <LinearFunction> <coefficients></coefficients> </LinearFunction>
+    +                 <LinearFunction> <coefficients>0 -0.2</coefficients> </LinearFunction>
+                  </prescribed_function>
+              </Coordinate>
+          </coordinates>
+      </PinJoint>
     ```
     """
     for function in subject.each(LinearFunction):
@@ -298,34 +245,20 @@ def missing_function(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function>
-                    <MultiplierFunction> <scale>2</scale> </MultiplierFunction>
-                </prescribed_function>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates>
-            <Coordinate name="knee_angle">
-                <prescribed_function>
-                    <MultiplierFunction>
-                        <function> <Constant> <value>-0.1</value> </Constant> </function> <scale>2</scale>
-                    </MultiplierFunction>
-                </prescribed_function>
-            </Coordinate>
-        </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+          <coordinates>
+              <Coordinate name="knee_angle">
+                  <prescribed_function>
+    -                 <MultiplierFunction> <scale>2</scale> </MultiplierFunction>
+    +                 <MultiplierFunction>
+    +                     <function> <Constant> <value>-0.1</value> </Constant> </function> <scale>2</scale>
+    +                 </MultiplierFunction>
+                  </prescribed_function>
+              </Coordinate>
+          </coordinates>
+      </PinJoint>
     ```
     """
     for force in subject.named("PrescribedForce"):

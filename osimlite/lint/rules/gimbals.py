@@ -28,30 +28,17 @@ def gimbal_lock(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <GimbalJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates>
-            <Coordinate name="ankle_rx" />
-            <Coordinate name="ankle_ry"> <default_value>1.5707963267948966</default_value> </Coordinate>
-            <Coordinate name="ankle_rz" />
-        </coordinates>
-    </GimbalJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <GimbalJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-        <coordinates>
-            <Coordinate name="ankle_rx" />
-            <Coordinate name="ankle_ry"> <default_value>1.57</default_value> </Coordinate>
-            <Coordinate name="ankle_rz" />
-        </coordinates>
-    </GimbalJoint>
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <GimbalJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates>
+              <Coordinate name="ankle_rx" />
+    -         <Coordinate name="ankle_ry"> <default_value>1.5707963267948966</default_value> </Coordinate>
+    +         <Coordinate name="ankle_ry"> <default_value>1.57</default_value> </Coordinate>
+              <Coordinate name="ankle_rz" />
+          </coordinates>
+      </GimbalJoint>
     ```
     """
     for joint in subject.each(Joint):

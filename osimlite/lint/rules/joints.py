@@ -25,19 +25,13 @@ def joint_to_itself(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <WeldJoint name="strange">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-    </WeldJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-    <WeldJoint name="ankle">
-        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-        <socket_child_frame>/bodyset/foot</socket_child_frame>
-    </WeldJoint>
+    - <WeldJoint name="strange">
+    + <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    + <WeldJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+    -     <socket_child_frame>/bodyset/shank</socket_child_frame>
+    +     <socket_child_frame>/bodyset/foot</socket_child_frame>
+      </WeldJoint>
     ```
     """
     for link in skeleton(subject).links:
@@ -63,20 +57,12 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle" /> <Coordinate name="knee_twist" /> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle" /> </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+    -     <coordinates> <Coordinate name="knee_angle" /> <Coordinate name="knee_twist" /> </coordinates>
+    +     <coordinates> <Coordinate name="knee_angle" /> </coordinates>
+      </PinJoint>
     ```
     """
     for custom in subject.named("CustomJoint"):
@@ -135,21 +121,13 @@ def shared_coordinate_name(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
-    </PinJoint>
-    <CoordinateLimitForce name="knee_limit"> <coordinate>hip_flexion</coordinate> </CoordinateLimitForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="knee">
-        <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-        <coordinates> <Coordinate name="knee_angle" /> </coordinates>
-    </PinJoint>
+      <PinJoint name="knee">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+          <socket_child_frame>/bodyset/shank</socket_child_frame>
+    -     <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+    +     <coordinates> <Coordinate name="knee_angle" /> </coordinates>
+      </PinJoint>
+    - <CoordinateLimitForce name="knee_limit"> <coordinate>hip_flexion</coordinate> </CoordinateLimitForce>
     ```
     """
     first: dict[str, Coordinate] = {}
@@ -181,26 +159,17 @@ def ground_as_child(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PlanarJoint name="ground_pelvis">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
-        <socket_child_frame>/ground</socket_child_frame>
-        <coordinates>
-            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" />
-            <Coordinate name="pelvis_ty"> <default_value>-1</default_value> </Coordinate>
-        </coordinates>
-    </PlanarJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PlanarJoint name="ground_pelvis">
-        <socket_parent_frame>/ground</socket_parent_frame>
-        <socket_child_frame>/bodyset/pelvis</socket_child_frame>
-        <coordinates>
-            <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" />
-            <Coordinate name="pelvis_ty"> <default_value>1</default_value> </Coordinate>
-        </coordinates>
-    </PlanarJoint>
+      <PlanarJoint name="ground_pelvis">
+    -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+    -     <socket_child_frame>/ground</socket_child_frame>
+    +     <socket_parent_frame>/ground</socket_parent_frame>
+    +     <socket_child_frame>/bodyset/pelvis</socket_child_frame>
+          <coordinates>
+              <Coordinate name="pelvis_rz" /> <Coordinate name="pelvis_tx" />
+    -         <Coordinate name="pelvis_ty"> <default_value>-1</default_value> </Coordinate>
+    +         <Coordinate name="pelvis_ty"> <default_value>1</default_value> </Coordinate>
+          </coordinates>
+      </PlanarJoint>
     ```
     """
     for link in skeleton(subject).links:
@@ -226,30 +195,19 @@ def stray_joint_frame(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="hip">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
-        <socket_child_frame>/bodyset/thigh</socket_child_frame>
-        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
-        <frames>
-            <PhysicalOffsetFrame name="shank_offset">
-                <socket_parent>/bodyset/shank</socket_parent>
-            </PhysicalOffsetFrame>
-        </frames>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <PinJoint name="hip">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
-        <socket_child_frame>thigh_offset</socket_child_frame>
-        <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
-        <frames>
-            <PhysicalOffsetFrame name="thigh_offset">
-                <socket_parent>/bodyset/thigh</socket_parent>
-            </PhysicalOffsetFrame>
-        </frames>
-    </PinJoint>
+      <PinJoint name="hip">
+          <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+    -     <socket_child_frame>/bodyset/thigh</socket_child_frame>
+    +     <socket_child_frame>thigh_offset</socket_child_frame>
+          <coordinates> <Coordinate name="hip_flexion" /> </coordinates>
+          <frames>
+    -         <PhysicalOffsetFrame name="shank_offset">
+    -             <socket_parent>/bodyset/shank</socket_parent>
+    +         <PhysicalOffsetFrame name="thigh_offset">
+    +             <socket_parent>/bodyset/thigh</socket_parent>
+              </PhysicalOffsetFrame>
+          </frames>
+      </PinJoint>
     ```
     """
     bones = skeleton(subject)

@@ -35,12 +35,8 @@ def unknown_attribute(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
+    - <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
     ```
     """
     for note, owner in subject.notes_of("unknown-attribute"):
@@ -100,12 +96,8 @@ def stray_text(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     source = subject.source
@@ -144,12 +136,8 @@ def defaults_block(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
+    - <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
     ```
     """
     model, source = subject.model, subject.source
@@ -188,34 +176,30 @@ def force_outside_set(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <components>
-        <PathSpring name="band">
-            <GeometryPath name="path">
-                <PathPointSet>
-                    <objects>
-                        <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                        <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                    </objects>
-                </PathPointSet>
-            </GeometryPath>
-            <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-        </PathSpring>
-    </components>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="band">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+    - <components>
+    -     <PathSpring name="band">
+    -         <GeometryPath name="path">
+    -             <PathPointSet>
+    -                 <objects>
+    -                     <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+    -                     <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+    -                 </objects>
+    -             </PathPointSet>
+    -         </GeometryPath>
+    -         <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    -     </PathSpring>
+    - </components>
+    + <PathSpring name="band">
+    +     <GeometryPath name="path">
+    +         <PathPointSet>
+    +             <objects>
+    +                 <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+    +                 <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+    +             </objects>
+    +         </PathPointSet>
+    +     </GeometryPath>
+    +     <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+    + </PathSpring>
     ```
     """
     places: dict[int, list[Component]] = {}
@@ -249,46 +233,25 @@ def not_upgradable(subject: Subject, found: Found) -> None:
 
     ## Example
     ```document
-    <OpenSimDocument Version="30000">
-        <Model name="post">
-            <BodySet>
-                <objects>
-                    <Body name="ground"> <mass>0</mass> <Joint /> </Body>
-                    <Body name="post">
-                        <mass>1</mass> <mass_center>0 0 0</mass_center>
-                        <inertia_xx>0.1</inertia_xx> <inertia_yy>0.1</inertia_yy> <inertia_zz>0.1</inertia_zz>
-                        <Joint>
-                            <WeldJoint name="weld">
-                                <parent_body>ground</parent_body> <location_in_parent>0 one 0</location_in_parent>
-                            </WeldJoint>
-                        </Joint>
-                    </Body>
-                </objects>
-            </BodySet>
-        </Model>
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```document
-    <OpenSimDocument Version="30000">
-        <Model name="post">
-            <BodySet>
-                <objects>
-                    <Body name="ground"> <mass>0</mass> <Joint /> </Body>
-                    <Body name="post">
-                        <mass>1</mass> <mass_center>0 0 0</mass_center>
-                        <inertia_xx>0.1</inertia_xx> <inertia_yy>0.1</inertia_yy> <inertia_zz>0.1</inertia_zz>
-                        <Joint>
-                            <WeldJoint name="weld">
-                                <parent_body>ground</parent_body> <location_in_parent>0 1 0</location_in_parent>
-                            </WeldJoint>
-                        </Joint>
-                    </Body>
-                </objects>
-            </BodySet>
-        </Model>
-    </OpenSimDocument>
+      <OpenSimDocument Version="30000">
+          <Model name="post">
+              <BodySet>
+                  <objects>
+                      <Body name="ground"> <mass>0</mass> <Joint /> </Body>
+                      <Body name="post">
+                          <mass>1</mass> <mass_center>0 0 0</mass_center>
+                          <inertia_xx>0.1</inertia_xx> <inertia_yy>0.1</inertia_yy> <inertia_zz>0.1</inertia_zz>
+                          <Joint>
+                              <WeldJoint name="weld">
+    -                             <parent_body>ground</parent_body> <location_in_parent>0 one 0</location_in_parent>
+    +                             <parent_body>ground</parent_body> <location_in_parent>0 1 0</location_in_parent>
+                              </WeldJoint>
+                          </Joint>
+                      </Body>
+                  </objects>
+              </BodySet>
+          </Model>
+      </OpenSimDocument>
     ```
     """
     told = {note.number for note in subject.notes if note.kind == "child-in-value"}

@@ -26,24 +26,14 @@ def marker_units(table: Table, found: Found) -> None:
 
     ## Example
     ```trc
-    PathFileType→4→(X/Y/Z)→walk.trc
-    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
-    100→100→1→2→m→100→1→1
-    Frame#→Time→knee→→→hip→→→
-    →→X1→Y1→Z1→X2→Y2→Z2
+      PathFileType→4→(X/Y/Z)→walk.trc
+      DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    - 100→100→1→2→m→100→1→1
+    + 100→100→1→2→mm→100→1→1
+      Frame#→Time→knee→→→hip→→→
+      →→X1→Y1→Z1→X2→Y2→Z2
 
-    1→0.01→617.2→1055.2→170.7→639.6→1400.1→158.1
-    ```
-
-    ## Use instead
-    ```trc
-    PathFileType→4→(X/Y/Z)→walk.trc
-    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
-    100→100→1→2→mm→100→1→1
-    Frame#→Time→knee→→→hip→→→
-    →→X1→Y1→Z1→X2→Y2→Z2
-
-    1→0.01→617.2→1055.2→170.7→639.6→1400.1→158.1
+      1→0.01→617.2→1055.2→170.7→639.6→1400.1→158.1
     ```
     """
     units = table.entries.get("Units")
@@ -84,25 +74,16 @@ def marker_gap(table: Table, found: Found) -> None:
 
     ## Example
     ```trc
-    PathFileType→4→(X/Y/Z)→walk.trc
-    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
-    100→100→1→2→m→100→1→1
-    Frame#→Time→knee→→→hip→→→
-    →→X1→Y1→Z1→X2→Y2→Z2
+      PathFileType→4→(X/Y/Z)→walk.trc
+      DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+    - 100→100→1→2→m→100→1→1
+    + 100→100→2→2→m→100→1→2
+      Frame#→Time→knee→→→hip→→→
+      →→X1→Y1→Z1→X2→Y2→Z2
 
-    1→0.01→0.6→0.5→0.1→0→0→0
-    ```
-
-    ## Use instead
-    ```trc
-    PathFileType→4→(X/Y/Z)→walk.trc
-    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
-    100→100→2→2→m→100→1→2
-    Frame#→Time→knee→→→hip→→→
-    →→X1→Y1→Z1→X2→Y2→Z2
-
-    1→0.01→0.6→0.5→0.1→→→
-    2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
+    - 1→0.01→0.6→0.5→0.1→0→0→0
+    + 1→0.01→0.6→0.5→0.1→→→
+    + 2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
     ```
     """
     for fault in table.rows.of("zero", "part"):
@@ -125,26 +106,15 @@ def frame_number(table: Table, found: Found) -> None:
 
     ## Example
     ```trc
-    PathFileType→4→(X/Y/Z)→walk.trc
-    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
-    100→100→2→2→m→100→1→2
-    Frame#→Time→knee→→→hip→→→
-    →→X1→Y1→Z1→X2→Y2→Z2
+      PathFileType→4→(X/Y/Z)→walk.trc
+      DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+      100→100→2→2→m→100→1→2
+      Frame#→Time→knee→→→hip→→→
+      →→X1→Y1→Z1→X2→Y2→Z2
 
-    1→0.01→0.6→0.5→0.1→0.6→0.9→0.1
-    4→0.02→0.6→0.5→0.1→0.6→0.9→0.1
-    ```
-
-    ## Use instead
-    ```trc
-    PathFileType→4→(X/Y/Z)→walk.trc
-    DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
-    100→100→2→2→m→100→1→2
-    Frame#→Time→knee→→→hip→→→
-    →→X1→Y1→Z1→X2→Y2→Z2
-
-    1→0.01→0.6→0.5→0.1→0.6→0.9→0.1
-    2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
+      1→0.01→0.6→0.5→0.1→0.6→0.9→0.1
+    - 4→0.02→0.6→0.5→0.1→0.6→0.9→0.1
+    + 2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
     ```
     """
     for fault in table.rows.of("frame"):

@@ -32,12 +32,8 @@ def character_reference(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <credits>Ren&#233;</credits>
-    ```
-
-    ## Use instead
-    ```xml
-    <credits>René</credits>
+    - <credits>Ren&#233;</credits>
+    + <credits>René</credits>
     ```
     """
     source = subject.source
@@ -70,12 +66,8 @@ def lenient_xml(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <credits>Anna & Bert</credits>
-    ```
-
-    ## Use instead
-    ```xml
-    <credits>Anna &amp; Bert</credits>
+    - <credits>Anna & Bert</credits>
+    + <credits>Anna &amp; Bert</credits>
     ```
     """
     source = subject.source
@@ -158,18 +150,11 @@ def text_outside_root(subject: Subject, found: Found) -> None:
 
     ## Example
     ```document
-    scaled by Anna, 2021
-    <OpenSimDocument Version="40600">
-        <Model name="empty" />
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```document
-    <!-- scaled by Anna, 2021 -->
-    <OpenSimDocument Version="40600">
-        <Model name="empty" />
-    </OpenSimDocument>
+    - scaled by Anna, 2021
+    + <!-- scaled by Anna, 2021 -->
+      <OpenSimDocument Version="40600">
+          <Model name="empty" />
+      </OpenSimDocument>
     ```
     """
     source = subject.source
@@ -202,16 +187,10 @@ def byte_order_mark(subject: Subject, found: Found) -> None:
 
     ## Example
     ```document
-    \ufeff<OpenSimDocument Version="40600">
-        <Model name="empty" />
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```document
-    <OpenSimDocument Version="40600">
-        <Model name="empty" />
-    </OpenSimDocument>
+    - \ufeff<OpenSimDocument Version="40600">
+    + <OpenSimDocument Version="40600">
+          <Model name="empty" />
+      </OpenSimDocument>
     ```
     """
     source = subject.source
@@ -232,12 +211,8 @@ def closing_tag(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     source = subject.source

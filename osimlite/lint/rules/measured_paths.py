@@ -36,63 +36,34 @@ def wrong_wrapping(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-            <WrapObjectSet name="wrapobjectset">
-                <objects>
-                    <WrapCylinder name="high"> <translation>-0.01 -0.12 0</translation> <radius>0.04</radius>
-                        <length>0.2</length> </WrapCylinder>
-                    <WrapCylinder name="low"> <translation>-0.01 -0.28 0</translation> <radius>0.04</radius>
-                        <length>0.2</length> </WrapCylinder>
-                </objects>
-            </WrapObjectSet>
-        </Body>
-        <PathSpring name="spring">
-            <GeometryPath name="path">
-                <PathPointSet>
-                    <objects>
-                        <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                        <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                            <location>0 -0.4 0</location> </PathPoint>
-                    </objects>
-                </PathPointSet>
-                <PathWrapSet>
-                    <objects>
-                        <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
-                        <PathWrap name="around_low"> <wrap_object>low</wrap_object> </PathWrap>
-                    </objects>
-                </PathWrapSet>
-            </GeometryPath>
-            <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-        </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-            <WrapObjectSet name="wrapobjectset">
-                <objects>
-                    <WrapCylinder name="high"> <translation>-0.01 -0.12 0</translation> <radius>0.04</radius>
-                        <length>0.2</length> </WrapCylinder>
-                </objects>
-            </WrapObjectSet>
-        </Body>
-        <PathSpring name="spring">
-            <GeometryPath name="path">
-                <PathPointSet>
-                    <objects>
-                        <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                        <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                            <location>0 -0.4 0</location> </PathPoint>
-                    </objects>
-                </PathPointSet>
-                <PathWrapSet>
-                    <objects>
-                        <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
-                    </objects>
-                </PathWrapSet>
-            </GeometryPath>
-            <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-        </PathSpring>
+      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+              <WrapObjectSet name="wrapobjectset">
+                  <objects>
+                      <WrapCylinder name="high"> <translation>-0.01 -0.12 0</translation> <radius>0.04</radius>
+    -                     <length>0.2</length> </WrapCylinder>
+    -                 <WrapCylinder name="low"> <translation>-0.01 -0.28 0</translation> <radius>0.04</radius>
+                          <length>0.2</length> </WrapCylinder>
+                  </objects>
+              </WrapObjectSet>
+          </Body>
+          <PathSpring name="spring">
+              <GeometryPath name="path">
+                  <PathPointSet>
+                      <objects>
+                          <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                          <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                              <location>0 -0.4 0</location> </PathPoint>
+                      </objects>
+                  </PathPointSet>
+                  <PathWrapSet>
+                      <objects>
+                          <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
+    -                     <PathWrap name="around_low"> <wrap_object>low</wrap_object> </PathWrap>
+                      </objects>
+                  </PathWrapSet>
+              </GeometryPath>
+              <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+          </PathSpring>
     ```
     """
     most, measures = subject.config.value_of(OFF), measures_of(subject)
@@ -130,40 +101,22 @@ def path_jump(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <ConditionalPathPoint name="b">
-                        <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.05 -0.2 0</location>
-                        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 -1</range>
-                    </ConditionalPathPoint>
-                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <ConditionalPathPoint name="b">
-                        <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.05 -0.2 0</location>
-                        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 0</range>
-                    </ConditionalPathPoint>
-                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <ConditionalPathPoint name="b">
+                          <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.05 -0.2 0</location>
+    -                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 -1</range>
+    +                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 0</range>
+                      </ConditionalPathPoint>
+                      <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     for jump in measures_of(subject).jumps:
@@ -192,60 +145,32 @@ def length_of_wrap(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-        <WrapObjectSet name="wrapobjectset">
-            <objects>
-                <WrapSphere name="condyle">
-                    <quadrant>x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
-                </WrapSphere>
-            </objects>
-        </WrapObjectSet>
-    </Body>
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                        <location>-0.039 -0.18 0</location> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                        <location>-0.039 -0.22 0.001</location> </PathPoint>
-                </objects>
-            </PathPointSet>
-            <PathWrapSet>
-                <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
-            </PathWrapSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-        <WrapObjectSet name="wrapobjectset">
-            <objects>
-                <WrapSphere name="condyle">
-                    <quadrant>-x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
-                </WrapSphere>
-            </objects>
-        </WrapObjectSet>
-    </Body>
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                        <location>-0.039 -0.18 0</location> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                        <location>-0.039 -0.22 0.001</location> </PathPoint>
-                </objects>
-            </PathPointSet>
-            <PathWrapSet>
-                <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
-            </PathWrapSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+          <WrapObjectSet name="wrapobjectset">
+              <objects>
+                  <WrapSphere name="condyle">
+    -                 <quadrant>x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
+    +                 <quadrant>-x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
+                  </WrapSphere>
+              </objects>
+          </WrapObjectSet>
+      </Body>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                          <location>-0.039 -0.18 0</location> </PathPoint>
+                      <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
+                          <location>-0.039 -0.22 0.001</location> </PathPoint>
+                  </objects>
+              </PathPointSet>
+              <PathWrapSet>
+                  <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
+              </PathWrapSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     for item in measures_of(subject).on_surfaces:
@@ -279,48 +204,26 @@ def moving_point_range(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <MovingPathPoint name="b">
-                        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
-                        <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
-                        <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
-                        <x_location> <SimmSpline> <x>-1 -0.5 0</x> <y>0.02 0.03 0.05</y> </SimmSpline> </x_location>
-                        <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
-                        <z_location> <Constant> <value>0</value> </Constant> </z_location>
-                    </MovingPathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <MovingPathPoint name="b">
-                        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
-                        <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
-                        <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
-                        <x_location> <SimmSpline> <x>-2.1 -1 0</x> <y>0.018 0.02 0.05</y> </SimmSpline> </x_location>
-                        <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
-                        <z_location> <Constant> <value>0</value> </Constant> </z_location>
-                    </MovingPathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <MovingPathPoint name="b">
+                          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                          <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
+                          <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
+                          <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
+    -                     <x_location> <SimmSpline> <x>-1 -0.5 0</x> <y>0.02 0.03 0.05</y> </SimmSpline> </x_location>
+    +                     <x_location> <SimmSpline> <x>-2.1 -1 0</x> <y>0.018 0.02 0.05</y> </SimmSpline> </x_location>
+                          <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
+                          <z_location> <Constant> <value>0</value> </Constant> </z_location>
+                      </MovingPathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)

@@ -38,20 +38,12 @@ def impossible_bounds(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <MocoPhase name="phase">
-        <state_infos>
-            <MocoVariableInfo name="/jointset/knee/knee_angle/value"> <bounds>0 -2</bounds> </MocoVariableInfo>
-        </state_infos>
-    </MocoPhase>
-    ```
-
-    ## Use instead
-    ```setup
-    <MocoPhase name="phase">
-        <state_infos>
-            <MocoVariableInfo name="/jointset/knee/knee_angle/value"> <bounds>-2 0</bounds> </MocoVariableInfo>
-        </state_infos>
-    </MocoPhase>
+      <MocoPhase name="phase">
+          <state_infos>
+    -         <MocoVariableInfo name="/jointset/knee/knee_angle/value"> <bounds>0 -2</bounds> </MocoVariableInfo>
+    +         <MocoVariableInfo name="/jointset/knee/knee_angle/value"> <bounds>-2 0</bounds> </MocoVariableInfo>
+          </state_infos>
+      </MocoPhase>
     ```
     """
     for item in chain.from_iterable(map(setup.named, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))):
@@ -119,37 +111,22 @@ def study_data(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <MocoStudy name="study">
-        <MocoProblem name="problem">
-            <MocoPhase name="phases">
-                <ModelProcessor name="model"> <filepath>leg.osim</filepath> </ModelProcessor>
-                <goals>
-                    <MocoStateTrackingGoal name="follow">
-                        <TableProcessor name="reference"> <filepath>leg.mot</filepath> </TableProcessor>
-                    </MocoStateTrackingGoal>
-                </goals>
-            </MocoPhase>
-        </MocoProblem>
-    </MocoStudy>
-    ```
-
-    ## Use instead
-    ```setup
-    <MocoStudy name="study">
-        <MocoProblem name="problem">
-            <MocoPhase name="phases">
-                <ModelProcessor name="model"> <filepath>leg.osim</filepath> </ModelProcessor>
-                <goals>
-                    <MocoStateTrackingGoal name="follow">
-                        <TableProcessor name="reference">
-                            <filepath>leg.mot</filepath>
-                            <operators> <TabOpUseAbsoluteStateNames /> </operators>
-                        </TableProcessor>
-                    </MocoStateTrackingGoal>
-                </goals>
-            </MocoPhase>
-        </MocoProblem>
-    </MocoStudy>
+      <MocoStudy name="study">
+          <MocoProblem name="problem">
+              <MocoPhase name="phases">
+                  <ModelProcessor name="model"> <filepath>leg.osim</filepath> </ModelProcessor>
+                  <goals>
+                      <MocoStateTrackingGoal name="follow">
+    -                     <TableProcessor name="reference"> <filepath>leg.mot</filepath> </TableProcessor>
+    +                     <TableProcessor name="reference">
+    +                         <filepath>leg.mot</filepath>
+    +                         <operators> <TabOpUseAbsoluteStateNames /> </operators>
+    +                     </TableProcessor>
+                      </MocoStateTrackingGoal>
+                  </goals>
+              </MocoPhase>
+          </MocoProblem>
+      </MocoStudy>
     ```
     """
     for processor in setup.named("ModelProcessor"):
@@ -239,22 +216,14 @@ def study_parts(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <MocoPhase name="phases">
-        <goals>
-            <MocoFinalTimeGoal name="goal" />
-            <MocoControlGoal name="goal" />
-        </goals>
-    </MocoPhase>
-    ```
-
-    ## Use instead
-    ```setup
-    <MocoPhase name="phases">
-        <goals>
-            <MocoFinalTimeGoal name="time" />
-            <MocoControlGoal name="effort" />
-        </goals>
-    </MocoPhase>
+      <MocoPhase name="phases">
+          <goals>
+    -         <MocoFinalTimeGoal name="goal" />
+    -         <MocoControlGoal name="goal" />
+    +         <MocoFinalTimeGoal name="time" />
+    +         <MocoControlGoal name="effort" />
+          </goals>
+      </MocoPhase>
     ```
     """
     for phase in setup.named("MocoPhase"):

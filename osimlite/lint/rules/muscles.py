@@ -33,34 +33,19 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Millard2012EquilibriumMuscle name="soleus">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-        <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.5</default_fiber_length>
-    </Millard2012EquilibriumMuscle>
-    ```
-
-    ## Use instead
-    ```xml
-    <Millard2012EquilibriumMuscle name="soleus">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-        <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.05</default_fiber_length>
-    </Millard2012EquilibriumMuscle>
+      <Millard2012EquilibriumMuscle name="soleus">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+    -     <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.5</default_fiber_length>
+    +     <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.05</default_fiber_length>
+      </Millard2012EquilibriumMuscle>
     ```
     """
     steepest, shortest, longest = (subject.config.value_of(known) for known in (PENNATION, SHORTEST, LONGEST))
@@ -101,36 +86,20 @@ def control_below_activation(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Millard2012EquilibriumMuscle name="soleus">
-        <min_control>0</min_control>
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-        <tendon_slack_length>0.3</tendon_slack_length>
-    </Millard2012EquilibriumMuscle>
-    ```
-
-    ## Use instead
-    ```xml
-    <Millard2012EquilibriumMuscle name="soleus">
-        <min_control>0.01</min_control>
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-        <tendon_slack_length>0.3</tendon_slack_length>
-    </Millard2012EquilibriumMuscle>
+      <Millard2012EquilibriumMuscle name="soleus">
+    -     <min_control>0</min_control>
+    +     <min_control>0.01</min_control>
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+          <tendon_slack_length>0.3</tendon_slack_length>
+      </Millard2012EquilibriumMuscle>
     ```
     """
     for muscle in subject.named("Muscle"):
@@ -159,34 +128,19 @@ def out_of_reach(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Millard2012EquilibriumMuscle name="soleus">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-        <tendon_slack_length>0.03</tendon_slack_length>
-    </Millard2012EquilibriumMuscle>
-    ```
-
-    ## Use instead
-    ```xml
-    <Millard2012EquilibriumMuscle name="soleus">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-        <tendon_slack_length>0.34</tendon_slack_length>
-    </Millard2012EquilibriumMuscle>
+      <Millard2012EquilibriumMuscle name="soleus">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
+    -     <tendon_slack_length>0.03</tendon_slack_length>
+    +     <tendon_slack_length>0.34</tendon_slack_length>
+      </Millard2012EquilibriumMuscle>
     ```
     """
     longest = subject.config.value_of(LONGEST)
@@ -222,63 +176,33 @@ def shared_time_constants(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <DeGrooteFregly2016Muscle name="fast">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <location>0 0.17 0</location> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <ignore_tendon_compliance>true</ignore_tendon_compliance>
-        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
-    </DeGrooteFregly2016Muscle>
-    <DeGrooteFregly2016Muscle name="slow">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <location>0 0.17 0</location> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <ignore_tendon_compliance>true</ignore_tendon_compliance>
-        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
-        <activation_time_constant>0.03</activation_time_constant>
-    </DeGrooteFregly2016Muscle>
-    ```
-
-    ## Use instead
-    ```xml
-    <DeGrooteFregly2016Muscle name="fast">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <location>0 0.17 0</location> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <ignore_tendon_compliance>true</ignore_tendon_compliance>
-        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
-    </DeGrooteFregly2016Muscle>
-    <DeGrooteFregly2016Muscle name="slow">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <location>0 0.17 0</location> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <ignore_tendon_compliance>true</ignore_tendon_compliance>
-        <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
-    </DeGrooteFregly2016Muscle>
+      <DeGrooteFregly2016Muscle name="fast">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                          <location>0 0.17 0</location> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <ignore_tendon_compliance>true</ignore_tendon_compliance>
+          <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+      </DeGrooteFregly2016Muscle>
+      <DeGrooteFregly2016Muscle name="slow">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                          <location>0 0.17 0</location> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <ignore_tendon_compliance>true</ignore_tendon_compliance>
+          <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+    -     <activation_time_constant>0.03</activation_time_constant>
+      </DeGrooteFregly2016Muscle>
     ```
     """
     first = None

@@ -33,22 +33,13 @@ def duplicate_name(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <MarkerSet>
-        <objects>
-            <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-            <Marker name="trochanter"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Marker>
-        </objects>
-    </MarkerSet>
+      <MarkerSet>
+          <objects>
+              <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    -         <Marker name="asis"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Marker>
+    +         <Marker name="trochanter"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Marker>
+          </objects>
+      </MarkerSet>
     ```
     """
     tree = subject.tree
@@ -77,12 +68,8 @@ def illegal_name(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="right_asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    + <Marker name="right_asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
     # Almost every model is done with when its names are looked at all at once.
@@ -137,12 +124,8 @@ def missing_name(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    - <Marker> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
     tree = subject.tree

@@ -27,31 +27,17 @@ def short_path(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+    +                 <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     for path in subject.each(GeometryPath):
@@ -96,33 +82,18 @@ def coincident_path_points(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+    -                 <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     nearest = subject.config.value_of(DISTANCE)
@@ -155,40 +126,22 @@ def inverted_point_range(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <ConditionalPathPoint name="b">
-                        <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 -0.1 0</location>
-                        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>0 -2</range>
-                    </ConditionalPathPoint>
-                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <ConditionalPathPoint name="b">
-                        <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 -0.1 0</location>
-                        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2 0</range>
-                    </ConditionalPathPoint>
-                    <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <ConditionalPathPoint name="b">
+                          <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 -0.1 0</location>
+    -                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>0 -2</range>
+    +                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2 0</range>
+                      </ConditionalPathPoint>
+                      <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     for point in subject.each(ConditionalPathPoint):
@@ -215,17 +168,13 @@ def unused_wrap_object(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh">
-        <WrapObjectSet>
-            <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
-        </WrapObjectSet>
-        <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh">
+    -     <WrapObjectSet>
+    -         <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
+    -     </WrapObjectSet>
+    -     <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    - </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     surfaces = list(subject.each(WrapObject))
@@ -250,48 +199,26 @@ def moving_point_coordinates(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <MovingPathPoint name="b">
-                        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
-                        <socket_y_coordinate>/jointset/hip/hip_flexion</socket_y_coordinate>
-                        <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
-                        <x_location> <Constant> <value>0.04</value> </Constant> </x_location>
-                        <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
-                        <z_location> <Constant> <value>0</value> </Constant> </z_location>
-                    </MovingPathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <MovingPathPoint name="b">
-                        <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                        <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
-                        <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
-                        <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
-                        <x_location> <Constant> <value>0.04</value> </Constant> </x_location>
-                        <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
-                        <z_location> <Constant> <value>0</value> </Constant> </z_location>
-                    </MovingPathPoint>
-                </objects>
-            </PathPointSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <MovingPathPoint name="b">
+                          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+                          <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
+    -                     <socket_y_coordinate>/jointset/hip/hip_flexion</socket_y_coordinate>
+    +                     <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
+                          <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
+                          <x_location> <Constant> <value>0.04</value> </Constant> </x_location>
+                          <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
+                          <z_location> <Constant> <value>0</value> </Constant> </z_location>
+                      </MovingPathPoint>
+                  </objects>
+              </PathPointSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     for point in subject.named("MovingPathPoint"):

@@ -32,12 +32,8 @@ def strange_gravity(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <gravity>0 -9806.65 0</gravity>
-    ```
-
-    ## Use instead
-    ```xml
-    <gravity>0 -9.80665 0</gravity>
+    - <gravity>0 -9806.65 0</gravity>
+    + <gravity>0 -9.80665 0</gravity>
     ```
     """
     model = subject.model
@@ -66,30 +62,17 @@ def friction_order(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-                    <static_friction>0.4</static_friction> <dynamic_friction>0.8</dynamic_friction>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-                    <static_friction>0.8</static_friction> <dynamic_friction>0.4</dynamic_friction>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
+      <HuntCrossleyForce name="foot_ground">
+          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+              <objects>
+                  <HuntCrossleyForce::ContactParameters>
+                      <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+    -                 <static_friction>0.4</static_friction> <dynamic_friction>0.8</dynamic_friction>
+    +                 <static_friction>0.8</static_friction> <dynamic_friction>0.4</dynamic_friction>
+                  </HuntCrossleyForce::ContactParameters>
+              </objects>
+          </HuntCrossleyForce::ContactParametersSet>
+      </HuntCrossleyForce>
     ```
     """
     for material in subject.each(HuntCrossleyContactParameters):
@@ -119,16 +102,10 @@ def limits_swapped(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>hip_flexion</coordinate> <upper_limit>-30</upper_limit> <lower_limit>90</lower_limit>
-    </CoordinateLimitForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
-    </CoordinateLimitForce>
+      <CoordinateLimitForce name="stop">
+    -     <coordinate>hip_flexion</coordinate> <upper_limit>-30</upper_limit> <lower_limit>90</lower_limit>
+    +     <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
+      </CoordinateLimitForce>
     ```
     """
     for force in subject.each(CoordinateLimitForce):
@@ -154,16 +131,10 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-170</lower_limit>
-    </CoordinateLimitForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-120</lower_limit>
-    </CoordinateLimitForce>
+      <CoordinateLimitForce name="stop">
+    -     <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-170</lower_limit>
+    +     <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-120</lower_limit>
+      </CoordinateLimitForce>
     ```
     """
     for force in subject.each(CoordinateLimitForce):
@@ -200,16 +171,10 @@ def limit_inside_range(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-2.1</lower_limit>
-    </CoordinateLimitForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateLimitForce name="stop">
-        <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-120</lower_limit>
-    </CoordinateLimitForce>
+      <CoordinateLimitForce name="stop">
+    -     <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-2.1</lower_limit>
+    +     <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-120</lower_limit>
+      </CoordinateLimitForce>
     ```
     """
     for force in subject.each(CoordinateLimitForce):

@@ -36,28 +36,16 @@ def unresolved_reference(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>floor heal</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <HuntCrossleyForce name="foot_ground">
-        <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-            <objects>
-                <HuntCrossleyForce::ContactParameters>
-                    <geometry>floor heel</geometry> <stiffness>1e6</stiffness>
-                </HuntCrossleyForce::ContactParameters>
-            </objects>
-        </HuntCrossleyForce::ContactParametersSet>
-    </HuntCrossleyForce>
+      <HuntCrossleyForce name="foot_ground">
+          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
+              <objects>
+                  <HuntCrossleyForce::ContactParameters>
+    -                 <geometry>floor heal</geometry> <stiffness>1e6</stiffness>
+    +                 <geometry>floor heel</geometry> <stiffness>1e6</stiffness>
+                  </HuntCrossleyForce::ContactParameters>
+              </objects>
+          </HuntCrossleyForce::ContactParametersSet>
+      </HuntCrossleyForce>
     ```
     """
     for broken in _broken(subject, "missing"):
@@ -84,12 +72,8 @@ def reference_to_wrong_type(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="asis"> <socket_parent_frame>/jointset/hip</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    - <Marker name="asis"> <socket_parent_frame>/jointset/hip</socket_parent_frame> </Marker>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
     for broken in _broken(subject, "wrong-type"):
@@ -117,12 +101,10 @@ def missing_reference(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="asis"> <location>0 0 0</location> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>0 0 0</location> </Marker>
+      <Marker name="asis">
+          <location>0 0 0</location>
+    +     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+      </Marker>
     ```
     """
     for broken in _broken(subject, "empty"):
@@ -158,12 +140,8 @@ def reference_form(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    - <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
     for broken in _broken(subject, "form"):
@@ -198,12 +176,8 @@ def reference_case(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    - <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
     for broken in _broken(subject, "case"):

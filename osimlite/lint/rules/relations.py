@@ -50,52 +50,28 @@ def contradicting_values(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-        <WrapObjectSet name="wrapobjectset">
-            <objects>
-                <WrapTorus name="ring"> <inner_radius>0.06</inner_radius> <outer_radius>0.04</outer_radius> </WrapTorus>
-            </objects>
-        </WrapObjectSet>
-    </Body>
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-            <PathWrapSet>
-                <objects> <PathWrap name="around"> <wrap_object>ring</wrap_object> </PathWrap> </objects>
-            </PathWrapSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-        <WrapObjectSet name="wrapobjectset">
-            <objects>
-                <WrapTorus name="ring"> <inner_radius>0.04</inner_radius> <outer_radius>0.06</outer_radius> </WrapTorus>
-            </objects>
-        </WrapObjectSet>
-    </Body>
-    <PathSpring name="spring">
-        <GeometryPath name="path">
-            <PathPointSet>
-                <objects>
-                    <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                    <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                </objects>
-            </PathPointSet>
-            <PathWrapSet>
-                <objects> <PathWrap name="around"> <wrap_object>ring</wrap_object> </PathWrap> </objects>
-            </PathWrapSet>
-        </GeometryPath>
-        <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    </PathSpring>
+      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+          <WrapObjectSet name="wrapobjectset">
+              <objects>
+    -             <WrapTorus name="ring"> <inner_radius>0.6</inner_radius> <outer_radius>0.4</outer_radius> </WrapTorus>
+    +             <WrapTorus name="ring"> <inner_radius>0.4</inner_radius> <outer_radius>0.6</outer_radius> </WrapTorus>
+              </objects>
+          </WrapObjectSet>
+      </Body>
+      <PathSpring name="spring">
+          <GeometryPath name="path">
+              <PathPointSet>
+                  <objects>
+                      <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+                      <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+                  </objects>
+              </PathPointSet>
+              <PathWrapSet>
+                  <objects> <PathWrap name="around"> <wrap_object>ring</wrap_object> </PathWrap> </objects>
+              </PathWrapSet>
+          </GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
     ```
     """
     strange = {id(item) for item, *_ in outside(subject)}
@@ -121,18 +97,11 @@ def controls_swapped(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateActuator name="motor">
-        <min_control>1</min_control> <max_control>-1</max_control>
-        <coordinate>knee_angle</coordinate> <optimal_force>100</optimal_force>
-    </CoordinateActuator>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateActuator name="motor">
-        <min_control>-1</min_control> <max_control>1</max_control>
-        <coordinate>knee_angle</coordinate> <optimal_force>100</optimal_force>
-    </CoordinateActuator>
+      <CoordinateActuator name="motor">
+    -     <min_control>1</min_control> <max_control>-1</max_control>
+    +     <min_control>-1</min_control> <max_control>1</max_control>
+          <coordinate>knee_angle</coordinate> <optimal_force>100</optimal_force>
+      </CoordinateActuator>
     ```
     """
     for actuator in subject.named("ScalarActuator"):

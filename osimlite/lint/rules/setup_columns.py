@@ -29,18 +29,11 @@ def missing_column(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg_no_knee.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+    -     <coordinates_file>leg_no_knee.mot</coordinates_file>
+    +     <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     for item, tag, table in motions(setup):

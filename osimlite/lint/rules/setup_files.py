@@ -38,18 +38,12 @@ def missing_input(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>no_such_model.osim</model_file>
-        <coordinates_file></coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+    -     <model_file>no_such_model.osim</model_file>
+    -     <coordinates_file></coordinates_file>
+    +     <model_file>leg.osim</model_file>
+    +     <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     for naming in setup.named_files("file"):
@@ -114,18 +108,11 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.osim</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+    -     <coordinates_file>leg.osim</coordinates_file>
+    +     <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     for naming in setup.named_files("file"):
@@ -163,20 +150,12 @@ def lost_output(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <results_directory>no_such/folder</results_directory>
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <results_directory>results</results_directory>
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+    -     <results_directory>no_such/folder</results_directory>
+    +     <results_directory>results</results_directory>
+          <model_file>leg.osim</model_file>
+          <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     if setup.folder is None:
@@ -236,21 +215,12 @@ def tools_differ(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <time_range>0 0.5</time_range>
-        <coordinates_file>motion.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <time_range>0 0.5</time_range>
-        <external_loads_file>leg_grf.xml</external_loads_file>
-        <coordinates_file>motion.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+          <time_range>0 0.5</time_range>
+    +     <external_loads_file>leg_grf.xml</external_loads_file>
+          <coordinates_file>motion.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     if setup.tool is None or setup.tool[1] is not setup.top or not (mine := motion_of(*setup.tool)):

@@ -32,20 +32,12 @@ def scale_factor(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <ScaleSet name="factors">
-        <objects>
-            <Scale name="thigh"> <scales>1.1 11 1.1</scales> <segment>thigh</segment> </Scale>
-        </objects>
-    </ScaleSet>
-    ```
-
-    ## Use instead
-    ```setup
-    <ScaleSet name="factors">
-        <objects>
-            <Scale name="thigh"> <scales>1.1 1.1 1.1</scales> <segment>thigh</segment> </Scale>
-        </objects>
-    </ScaleSet>
+      <ScaleSet name="factors">
+          <objects>
+    -         <Scale name="thigh"> <scales>1.1 11 1.1</scales> <segment>thigh</segment> </Scale>
+    +         <Scale name="thigh"> <scales>1.1 1.1 1.1</scales> <segment>thigh</segment> </Scale>
+          </objects>
+      </ScaleSet>
     ```
     """
     for scale in setup.named("Scale"):
@@ -90,22 +82,13 @@ def swapped_sides(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>sides.osim</model_file>
-        <marker_file>sides_swapped.trc</marker_file>
-        <time_range>0 0.02</time_range>
-        <output_motion_file>ik.mot</output_motion_file>
-    </InverseKinematicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>sides.osim</model_file>
-        <marker_file>sides.trc</marker_file>
-        <time_range>0 0.02</time_range>
-        <output_motion_file>ik.mot</output_motion_file>
-    </InverseKinematicsTool>
+      <InverseKinematicsTool name="ik">
+          <model_file>sides.osim</model_file>
+    -     <marker_file>sides_swapped.trc</marker_file>
+    +     <marker_file>sides.trc</marker_file>
+          <time_range>0 0.02</time_range>
+          <output_motion_file>ik.mot</output_motion_file>
+      </InverseKinematicsTool>
     ```
     """
     for user, table in marker_users(setup):

@@ -34,30 +34,17 @@ def load_columns(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <ExternalLoads name="loads">
-        <objects>
-            <ExternalForce name="right">
-                <applied_to_body>shank</applied_to_body>
-                <force_identifier>ground_force_v</force_identifier>
-                <point_identifier>ground_force_q</point_identifier>
-            </ExternalForce>
-        </objects>
-        <datafile>leg_grf.mot</datafile>
-    </ExternalLoads>
-    ```
-
-    ## Use instead
-    ```setup
-    <ExternalLoads name="loads">
-        <objects>
-            <ExternalForce name="right">
-                <applied_to_body>shank</applied_to_body>
-                <force_identifier>ground_force_v</force_identifier>
-                <point_identifier>ground_force_p</point_identifier>
-            </ExternalForce>
-        </objects>
-        <datafile>leg_grf.mot</datafile>
-    </ExternalLoads>
+      <ExternalLoads name="loads">
+          <objects>
+              <ExternalForce name="right">
+                  <applied_to_body>shank</applied_to_body>
+                  <force_identifier>ground_force_v</force_identifier>
+    -             <point_identifier>ground_force_q</point_identifier>
+    +             <point_identifier>ground_force_p</point_identifier>
+              </ExternalForce>
+          </objects>
+          <datafile>leg_grf.mot</datafile>
+      </ExternalLoads>
     ```
     """
     for loads in setup.named("ExternalLoads"):
@@ -123,30 +110,17 @@ def load_place(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <ExternalLoads name="loads">
-        <objects>
-            <ExternalForce name="right">
-                <applied_to_body>pelvis</applied_to_body>
-                <force_identifier>ground_force_v</force_identifier>
-                <point_identifier>ground_force_p</point_identifier>
-            </ExternalForce>
-        </objects>
-        <datafile>leg_grf.mot</datafile>
-    </ExternalLoads>
-    ```
-
-    ## Use instead
-    ```setup
-    <ExternalLoads name="loads">
-        <objects>
-            <ExternalForce name="right">
-                <applied_to_body>shank</applied_to_body>
-                <force_identifier>ground_force_v</force_identifier>
-                <point_identifier>ground_force_p</point_identifier>
-            </ExternalForce>
-        </objects>
-        <datafile>leg_grf.mot</datafile>
-    </ExternalLoads>
+      <ExternalLoads name="loads">
+          <objects>
+              <ExternalForce name="right">
+    -             <applied_to_body>pelvis</applied_to_body>
+    +             <applied_to_body>shank</applied_to_body>
+                  <force_identifier>ground_force_v</force_identifier>
+                  <point_identifier>ground_force_p</point_identifier>
+              </ExternalForce>
+          </objects>
+          <datafile>leg_grf.mot</datafile>
+      </ExternalLoads>
     ```
     """
     if setup.tree is None:

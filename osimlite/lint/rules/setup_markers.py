@@ -38,33 +38,18 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>leg.osim</model_file>
-        <marker_file>leg.trc</marker_file>
-        <output_motion_file>ik.mot</output_motion_file>
-        <IKTaskSet>
-            <objects>
-                <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
-                <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
-                <IKMarkerTask name="hip_marker"> <weight>1</weight> </IKMarkerTask>
-            </objects>
-        </IKTaskSet>
-    </InverseKinematicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>leg.osim</model_file>
-        <marker_file>leg.trc</marker_file>
-        <output_motion_file>ik.mot</output_motion_file>
-        <IKTaskSet>
-            <objects>
-                <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
-                <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
-            </objects>
-        </IKTaskSet>
-    </InverseKinematicsTool>
+      <InverseKinematicsTool name="ik">
+          <model_file>leg.osim</model_file>
+          <marker_file>leg.trc</marker_file>
+          <output_motion_file>ik.mot</output_motion_file>
+          <IKTaskSet>
+              <objects>
+                  <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                  <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+    -             <IKMarkerTask name="hip_marker"> <weight>1</weight> </IKMarkerTask>
+              </objects>
+          </IKTaskSet>
+      </InverseKinematicsTool>
     ```
     """
     for user, table in marker_users(setup):

@@ -39,24 +39,14 @@ def unknown_name(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <AnalyzeTool name="analyze">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-        <AnalysisSet name="Analyses">
-            <objects> <BodyKinematics name="bk"> <bodies>thigh shnak</bodies> </BodyKinematics> </objects>
-        </AnalysisSet>
-    </AnalyzeTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <AnalyzeTool name="analyze">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-        <AnalysisSet name="Analyses">
-            <objects> <BodyKinematics name="bk"> <bodies>thigh shank</bodies> </BodyKinematics> </objects>
-        </AnalysisSet>
-    </AnalyzeTool>
+      <AnalyzeTool name="analyze">
+          <model_file>leg.osim</model_file>
+          <coordinates_file>leg.mot</coordinates_file>
+          <AnalysisSet name="Analyses">
+    -         <objects> <BodyKinematics name="bk"> <bodies>thigh shnak</bodies> </BodyKinematics> </objects>
+    +         <objects> <BodyKinematics name="bk"> <bodies>thigh shank</bodies> </BodyKinematics> </objects>
+          </AnalysisSet>
+      </AnalyzeTool>
     ```
     """
     tree = setup.tree
@@ -184,20 +174,12 @@ def excluded_force(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <forces_to_exclude>Musles</forces_to_exclude>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <forces_to_exclude>Muscles</forces_to_exclude>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+    -     <forces_to_exclude>Musles</forces_to_exclude>
+    +     <forces_to_exclude>Muscles</forces_to_exclude>
+          <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     tree = setup.tree

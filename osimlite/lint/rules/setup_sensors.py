@@ -39,24 +39,14 @@ def sensor_without_frame(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <IMUPlacer name="placer">
-        <model_file>leg.osim</model_file>
-        <base_imu_label>thigh</base_imu_label>
-        <base_heading_axis>x</base_heading_axis>
-        <orientation_file_for_calibration>leg_imu.sto</orientation_file_for_calibration>
-        <output_model_file>calibrated.osim</output_model_file>
-    </IMUPlacer>
-    ```
-
-    ## Use instead
-    ```setup
-    <IMUPlacer name="placer">
-        <model_file>leg.osim</model_file>
-        <base_imu_label>thigh_imu</base_imu_label>
-        <base_heading_axis>x</base_heading_axis>
-        <orientation_file_for_calibration>leg_imu.sto</orientation_file_for_calibration>
-        <output_model_file>calibrated.osim</output_model_file>
-    </IMUPlacer>
+      <IMUPlacer name="placer">
+          <model_file>leg.osim</model_file>
+    -     <base_imu_label>thigh</base_imu_label>
+    +     <base_imu_label>thigh_imu</base_imu_label>
+          <base_heading_axis>x</base_heading_axis>
+          <orientation_file_for_calibration>leg_imu.sto</orientation_file_for_calibration>
+          <output_model_file>calibrated.osim</output_model_file>
+      </IMUPlacer>
     ```
     """
     for item, tag, ending, table in _orientations(setup):

@@ -28,16 +28,10 @@ def task_weight(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <IKTaskSet name="tasks">
-        <objects> <IKMarkerTask name="asis"> <weight>-5</weight> </IKMarkerTask> </objects>
-    </IKTaskSet>
-    ```
-
-    ## Use instead
-    ```setup
-    <IKTaskSet name="tasks">
-        <objects> <IKMarkerTask name="asis"> <weight>5</weight> </IKMarkerTask> </objects>
-    </IKTaskSet>
+      <IKTaskSet name="tasks">
+    -     <objects> <IKMarkerTask name="asis"> <weight>-5</weight> </IKMarkerTask> </objects>
+    +     <objects> <IKMarkerTask name="asis"> <weight>5</weight> </IKMarkerTask> </objects>
+      </IKTaskSet>
     ```
     """
     for tasks in setup.named("IKTaskSet"):
@@ -81,38 +75,21 @@ def unreachable_task(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>clamped.osim</model_file>
-        <marker_file>leg.trc</marker_file>
-        <output_motion_file>ik.mot</output_motion_file>
-        <IKTaskSet>
-            <objects>
-                <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
-                <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
-                <IKCoordinateTask name="knee_angle">
-                    <weight>1</weight> <value_type>manual_value</value_type> <value>1</value>
-                </IKCoordinateTask>
-            </objects>
-        </IKTaskSet>
-    </InverseKinematicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>clamped.osim</model_file>
-        <marker_file>leg.trc</marker_file>
-        <output_motion_file>ik.mot</output_motion_file>
-        <IKTaskSet>
-            <objects>
-                <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
-                <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
-                <IKCoordinateTask name="knee_angle">
-                    <weight>1</weight> <value_type>manual_value</value_type> <value>-1</value>
-                </IKCoordinateTask>
-            </objects>
-        </IKTaskSet>
-    </InverseKinematicsTool>
+      <InverseKinematicsTool name="ik">
+          <model_file>clamped.osim</model_file>
+          <marker_file>leg.trc</marker_file>
+          <output_motion_file>ik.mot</output_motion_file>
+          <IKTaskSet>
+              <objects>
+                  <IKMarkerTask name="asis"> <weight>1</weight> </IKMarkerTask>
+                  <IKMarkerTask name="knee_marker"> <weight>1</weight> </IKMarkerTask>
+                  <IKCoordinateTask name="knee_angle">
+    -                 <weight>1</weight> <value_type>manual_value</value_type> <value>1</value>
+    +                 <weight>1</weight> <value_type>manual_value</value_type> <value>-1</value>
+                  </IKCoordinateTask>
+              </objects>
+          </IKTaskSet>
+      </InverseKinematicsTool>
     ```
     """
     coordinates: dict[str, Any] = {} if setup.tree is None else setup.tree.of_class("Coordinate")

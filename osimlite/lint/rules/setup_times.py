@@ -41,20 +41,12 @@ def time_outside_data(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <time_range>0 9</time_range>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <time_range>0 0.5</time_range>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+    -     <time_range>0 9</time_range>
+    +     <time_range>0 0.5</time_range>
+          <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     for item in setup.having("time_range"):
@@ -155,22 +147,13 @@ def loads_end_early(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <time_range>0 0.9</time_range>
-        <external_loads_file>leg_grf.xml</external_loads_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <time_range>0 0.4</time_range>
-        <external_loads_file>leg_grf.xml</external_loads_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+    -     <time_range>0 0.9</time_range>
+    +     <time_range>0 0.4</time_range>
+          <external_loads_file>leg_grf.xml</external_loads_file>
+          <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     for item, _, first, last in _ranges(setup):
@@ -211,20 +194,12 @@ def filter_frequency(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-        <lowpass_cutoff_frequency_for_coordinates>60</lowpass_cutoff_frequency_for_coordinates>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-        <lowpass_cutoff_frequency_for_coordinates>6</lowpass_cutoff_frequency_for_coordinates>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+          <coordinates_file>leg.mot</coordinates_file>
+    -     <lowpass_cutoff_frequency_for_coordinates>60</lowpass_cutoff_frequency_for_coordinates>
+    +     <lowpass_cutoff_frequency_for_coordinates>6</lowpass_cutoff_frequency_for_coordinates>
+      </InverseDynamicsTool>
     ```
     """
     for item, tag, table in motions(setup):
@@ -254,18 +229,11 @@ def motion_in_degrees(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg_degrees.mot</coordinates_file>
-    </InverseDynamicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseDynamicsTool name="id">
-        <model_file>leg.osim</model_file>
-        <coordinates_file>leg.mot</coordinates_file>
-    </InverseDynamicsTool>
+      <InverseDynamicsTool name="id">
+          <model_file>leg.osim</model_file>
+    -     <coordinates_file>leg_degrees.mot</coordinates_file>
+    +     <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
     ```
     """
     for item, tag, table in motions(setup):

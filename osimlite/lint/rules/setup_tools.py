@@ -51,22 +51,13 @@ def tool_setting(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>leg.osim</model_file>
-        <accuracy>0.5</accuracy>
-        <marker_file>leg.trc</marker_file>
-        <output_motion_file>ik.mot</output_motion_file>
-    </InverseKinematicsTool>
-    ```
-
-    ## Use instead
-    ```setup
-    <InverseKinematicsTool name="ik">
-        <model_file>leg.osim</model_file>
-        <accuracy>1e-5</accuracy>
-        <marker_file>leg.trc</marker_file>
-        <output_motion_file>ik.mot</output_motion_file>
-    </InverseKinematicsTool>
+      <InverseKinematicsTool name="ik">
+          <model_file>leg.osim</model_file>
+    -     <accuracy>0.5</accuracy>
+    +     <accuracy>1e-5</accuracy>
+          <marker_file>leg.trc</marker_file>
+          <output_motion_file>ik.mot</output_motion_file>
+      </InverseKinematicsTool>
     ```
     """
     for of_class, tag, is_wrong, told, severity in _SETTINGS:
@@ -194,28 +185,16 @@ def scale_setting(setup: Setup, found: Found) -> None:
 
     ## Example
     ```setup
-    <MeasurementSet name="measurements">
-        <objects>
-            <Measurement name="thigh">
-                <MarkerPairSet name="pairs">
-                    <objects> <MarkerPair name="first"> <markers>asis</markers> </MarkerPair> </objects>
-                </MarkerPairSet>
-            </Measurement>
-        </objects>
-    </MeasurementSet>
-    ```
-
-    ## Use instead
-    ```setup
-    <MeasurementSet name="measurements">
-        <objects>
-            <Measurement name="thigh">
-                <MarkerPairSet name="pairs">
-                    <objects> <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair> </objects>
-                </MarkerPairSet>
-            </Measurement>
-        </objects>
-    </MeasurementSet>
+      <MeasurementSet name="measurements">
+          <objects>
+              <Measurement name="thigh">
+                  <MarkerPairSet name="pairs">
+    -                 <objects> <MarkerPair name="first"> <markers>asis</markers> </MarkerPair> </objects>
+    +                 <objects> <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair> </objects>
+                  </MarkerPairSet>
+              </Measurement>
+          </objects>
+      </MeasurementSet>
     ```
     """
     for tool in setup.named("ScaleTool"):

@@ -38,40 +38,23 @@ def degenerate_frame(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ComponentSet>
-        <objects>
-            <Station name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
-            <Station name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
-            <Station name="c">
-                <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 0.1 0</location>
-            </Station>
-            <StationDefinedFrame name="segment">
-                <socket_point_a>/componentset/a</socket_point_a> <socket_point_b>/componentset/b</socket_point_b>
-                <socket_point_c>/componentset/c</socket_point_c>
-                <socket_origin_point>/componentset/a</socket_origin_point>
-            </StationDefinedFrame>
-        </objects>
-    </ComponentSet>
-    ```
-
-    ## Use instead
-    ```xml
-    <ComponentSet>
-        <objects>
-            <Station name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
-            <Station name="b">
-                <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.1 0 0</location>
-            </Station>
-            <Station name="c">
-                <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 0.1 0</location>
-            </Station>
-            <StationDefinedFrame name="segment">
-                <socket_point_a>/componentset/a</socket_point_a> <socket_point_b>/componentset/b</socket_point_b>
-                <socket_point_c>/componentset/c</socket_point_c>
-                <socket_origin_point>/componentset/a</socket_origin_point>
-            </StationDefinedFrame>
-        </objects>
-    </ComponentSet>
+      <ComponentSet>
+          <objects>
+              <Station name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
+    -         <Station name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </Station>
+    +         <Station name="b">
+    +             <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.1 0 0</location>
+    +         </Station>
+              <Station name="c">
+                  <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 0.1 0</location>
+              </Station>
+              <StationDefinedFrame name="segment">
+                  <socket_point_a>/componentset/a</socket_point_a> <socket_point_b>/componentset/b</socket_point_b>
+                  <socket_point_c>/componentset/c</socket_point_c>
+                  <socket_origin_point>/componentset/a</socket_origin_point>
+              </StationDefinedFrame>
+          </objects>
+      </ComponentSet>
     ```
     """
     followed: set[int] = set()
@@ -143,16 +126,10 @@ def starts_in_contact(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ContactSphere name="heel">
-        <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.38 0</location> <radius>0.05</radius>
-    </ContactSphere>
-    ```
-
-    ## Use instead
-    ```xml
-    <ContactSphere name="heel">
-        <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location> <radius>0.05</radius>
-    </ContactSphere>
+      <ContactSphere name="heel">
+    -     <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.38 0</location> <radius>0.05</radius>
+    +     <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location> <radius>0.05</radius>
+      </ContactSphere>
     ```
     """
     deep, share = subject.config.value_of(DEPTH), subject.config.value_of(DEPTH_SHARE)
@@ -188,16 +165,10 @@ def lengths_in_millimetres(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="asis">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>15 20 128</location>
-    </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>0.015 0.02 0.128</location>
-    </Marker>
+      <Marker name="asis">
+    -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>15 20 128</location>
+    +     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>0.015 0.02 0.128</location>
+      </Marker>
     ```
     """
     longest = subject.config.value_of(LENGTH)
@@ -244,16 +215,10 @@ def no_direction(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PointActuator name="push">
-        <body>thigh</body> <direction>0 0 0</direction>
-    </PointActuator>
-    ```
-
-    ## Use instead
-    ```xml
-    <PointActuator name="push">
-        <body>thigh</body> <direction>1 0 0</direction>
-    </PointActuator>
+      <PointActuator name="push">
+    -     <body>thigh</body> <direction>0 0 0</direction>
+    +     <body>thigh</body> <direction>1 0 0</direction>
+      </PointActuator>
     ```
     """
     for cls, tag in (

@@ -36,12 +36,10 @@ def unknown_tag(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <mass_centre>0 -0.2 0</mass_centre> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <mass_center>0 -0.2 0</mass_center> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    -     <mass_centre>0 -0.2 0</mass_centre>
+    +     <mass_center>0 -0.2 0</mass_center>
+      </Body>
     ```
     """
     for note, owner in subject.notes_of("unknown-tag"):
@@ -133,12 +131,8 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     for note, owner in subject.notes_of("duplicate-tag"):
@@ -176,12 +170,8 @@ def element_in_value(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass><value>8</value></mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass><value>8</value></mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     for note, owner in subject.notes_of("child-in-value"):

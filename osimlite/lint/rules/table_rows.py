@@ -24,23 +24,14 @@ def no_rows(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=0
-    nColumns=2
-    endheader
-    time knee_angle
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=1
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
+      knee
+      version=1
+    - nRows=0
+    + nRows=1
+      nColumns=2
+      endheader
+      time knee_angle
+    + 0.0 0.5
     ```
     """
     if table.labels and "," not in table.labels[0].text and not table.rows.count and not table.rows.faults:
@@ -62,28 +53,16 @@ def ragged_row(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=3
-    nColumns=3
-    endheader
-    time knee hip
-    0.0 0.5 0.1
-    0.1 0.6
-    0.2 0.7 0.1
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=3
-    nColumns=3
-    endheader
-    time knee hip
-    0.0 0.5 0.1
-    0.1 0.6 0.1
-    0.2 0.7 0.1
+      knee
+      version=1
+      nRows=3
+      nColumns=3
+      endheader
+      time knee hip
+      0.0 0.5 0.1
+    - 0.1 0.6
+    + 0.1 0.6 0.1
+      0.2 0.7 0.1
     ```
     """
     rows = table.rows
@@ -141,26 +120,15 @@ def not_a_number(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 NaN
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.5
+      knee
+      version=1
+      nRows=2
+      nColumns=2
+      endheader
+      time knee_angle
+      0.0 0.5
+    - 0.1 NaN
+    + 0.1 0.5
     ```
     """
     end = table.rows.line_of(table.rows.count - 1) if table.rows.count else 0
@@ -197,28 +165,16 @@ def time_order(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=3
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
-    0.1 0.7
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=3
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
-    0.2 0.7
+      knee
+      version=1
+      nRows=3
+      nColumns=2
+      endheader
+      time knee_angle
+      0.0 0.5
+      0.1 0.6
+    - 0.1 0.7
+    + 0.2 0.7
     ```
     """
     if not table.is_markers and table.labels and table.labels[0].text.lower() != "time":
@@ -245,34 +201,19 @@ def time_gap(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=6
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
-    0.2 0.7
-    0.3 0.7
-    0.4 0.7
-    0.8 0.8
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=6
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
-    0.2 0.7
-    0.3 0.7
-    0.4 0.7
-    0.5 0.8
+      knee
+      version=1
+      nRows=6
+      nColumns=2
+      endheader
+      time knee_angle
+      0.0 0.5
+      0.1 0.6
+      0.2 0.7
+      0.3 0.7
+      0.4 0.7
+    - 0.8 0.8
+    + 0.5 0.8
     ```
     """
     rows = table.rows

@@ -32,26 +32,15 @@ def table_header(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    EndHeader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
+      knee
+      version=1
+      nRows=2
+      nColumns=2
+    - EndHeader
+    + endheader
+      time knee_angle
+      0.0 0.5
+      0.1 0.6
     ```
     """
     start, header = Position(1, 1), table.header
@@ -159,26 +148,15 @@ def table_count(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=1
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    endheader
-    time knee_angle
-    0.0 0.5
-    0.1 0.6
+      knee
+      version=1
+    - nRows=1
+    + nRows=2
+      nColumns=2
+      endheader
+      time knee_angle
+      0.0 0.5
+      0.1 0.6
     ```
     """
     rows = table.rows
@@ -227,28 +205,16 @@ def table_setting(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    inDegrees=true
-    endheader
-    time knee_angle
-    0.0 30.5
-    0.1 31.6
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=2
-    inDegrees=yes
-    endheader
-    time knee_angle
-    0.0 30.5
-    0.1 31.6
+      knee
+      version=1
+      nRows=2
+      nColumns=2
+    - inDegrees=true
+    + inDegrees=yes
+      endheader
+      time knee_angle
+      0.0 30.5
+      0.1 31.6
     ```
     """
     entries = table.entries
@@ -332,26 +298,15 @@ def column_label(table: Table, found: Found) -> None:
 
     ## Example
     ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=3
-    endheader
-    time knee_angle knee_angle
-    0.0 0.5 0.1
-    0.1 0.6 0.1
-    ```
-
-    ## Use instead
-    ```sto
-    knee
-    version=1
-    nRows=2
-    nColumns=3
-    endheader
-    time knee_angle_r knee_angle_l
-    0.0 0.5 0.1
-    0.1 0.6 0.1
+      knee
+      version=1
+      nRows=2
+      nColumns=3
+      endheader
+    - time knee_angle knee_angle
+    + time knee_angle_r knee_angle_l
+      0.0 0.5 0.1
+      0.1 0.6 0.1
     ```
     """
     labels, header = table.labels, table.header

@@ -42,12 +42,8 @@ def syntax_error(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     if subject.source is None or _conflicts(subject.source):
@@ -78,19 +74,11 @@ def unused_ignore(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh">
-        <!-- osimlite: ignore OSIM203 -->
-        <mass>8</mass>
-        <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh">
-        <mass>8</mass>
-        <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    </Body>
+      <Body name="thigh">
+    -     <!-- osimlite: ignore OSIM203 -->
+          <mass>8</mass>
+          <inertia>0.1 0.1 0.02 0 0 0</inertia>
+      </Body>
     ```
     """
     # The engine knows what was ignored, and reports it in the name of this rule.
@@ -155,16 +143,11 @@ def not_a_model(subject: Subject, found: Found) -> None:
 
     ## Example
     ```document
-    <OpenSimDokument Version="40600">
-        <Model name="empty" />
-    </OpenSimDokument>
-    ```
-
-    ## Use instead
-    ```document
-    <OpenSimDocument Version="40600">
-        <Model name="empty" />
-    </OpenSimDocument>
+    - <OpenSimDokument Version="40600">
+    + <OpenSimDocument Version="40600">
+          <Model name="empty" />
+    - </OpenSimDokument>
+    + </OpenSimDocument>
     ```
     """
     if subject.source is None:
@@ -188,16 +171,10 @@ def document_version(subject: Subject, found: Found) -> None:
 
     ## Example
     ```document
-    <OpenSimDocument>
-        <Model name="empty" />
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```document
-    <OpenSimDocument Version="40600">
-        <Model name="empty" />
-    </OpenSimDocument>
+    - <OpenSimDocument>
+    + <OpenSimDocument Version="40600">
+          <Model name="empty" />
+      </OpenSimDocument>
     ```
     """
     if subject.source is None:
@@ -258,16 +235,12 @@ def merge_conflict(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <<<<<<< HEAD
-    <credits>Anna</credits>
-    =======
-    <credits>Bert</credits>
-    >>>>>>> feature
-    ```
-
-    ## Use instead
-    ```xml
-    <credits>Anna and Bert</credits>
+    - <<<<<<< HEAD
+    - <credits>Anna</credits>
+    - =======
+    - <credits>Bert</credits>
+    - >>>>>>> feature
+    + <credits>Anna and Bert</credits>
     ```
     """
     if subject.source is not None:
@@ -289,12 +262,8 @@ def duplicate_attribute(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Marker name="hip" name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
-    ```
-
-    ## Use instead
-    ```xml
-    <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    - <Marker name="hip" name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
+    + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
     for note in subject.notes:
@@ -317,17 +286,10 @@ def second_object(subject: Subject, found: Found) -> None:
 
     ## Example
     ```document
-    <OpenSimDocument Version="40600">
-        <Model name="walker" />
-        <Model name="runner" />
-    </OpenSimDocument>
-    ```
-
-    ## Use instead
-    ```document
-    <OpenSimDocument Version="40600">
-        <Model name="walker" />
-    </OpenSimDocument>
+      <OpenSimDocument Version="40600">
+          <Model name="walker" />
+    -     <Model name="runner" />
+      </OpenSimDocument>
     ```
     """
     for note in subject.notes:

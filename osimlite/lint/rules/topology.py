@@ -27,20 +27,15 @@ def unconnected_body(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
-    <FreeJoint name="ball_free">
-        <socket_parent_frame>/ground</socket_parent_frame>
-        <socket_child_frame>/bodyset/ball</socket_child_frame>
-        <coordinates>
-            <Coordinate name="ball_rx" /> <Coordinate name="ball_ry" /> <Coordinate name="ball_rz" />
-            <Coordinate name="ball_tx" /> <Coordinate name="ball_ty" /> <Coordinate name="ball_tz" />
-        </coordinates>
-    </FreeJoint>
+      <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
+    + <FreeJoint name="ball_free">
+    +     <socket_parent_frame>/ground</socket_parent_frame>
+    +     <socket_child_frame>/bodyset/ball</socket_child_frame>
+    +     <coordinates>
+    +         <Coordinate name="ball_rx" /> <Coordinate name="ball_ry" /> <Coordinate name="ball_rz" />
+    +         <Coordinate name="ball_tx" /> <Coordinate name="ball_ty" /> <Coordinate name="ball_tz" />
+    +     </coordinates>
+    + </FreeJoint>
     ```
     """
     bones = skeleton(subject)
@@ -84,18 +79,14 @@ def closed_loop(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <WeldJoint name="strut">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
-        <socket_child_frame>/bodyset/shank</socket_child_frame>
-    </WeldJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <WeldConstraint name="strut">
-        <socket_frame1>/bodyset/pelvis</socket_frame1>
-        <socket_frame2>/bodyset/shank</socket_frame2>
-    </WeldConstraint>
+    - <WeldJoint name="strut">
+    -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+    -     <socket_child_frame>/bodyset/shank</socket_child_frame>
+    - </WeldJoint>
+    + <WeldConstraint name="strut">
+    +     <socket_frame1>/bodyset/pelvis</socket_frame1>
+    +     <socket_frame2>/bodyset/shank</socket_frame2>
+    + </WeldConstraint>
     ```
     """
     groups = _Groups()
@@ -134,21 +125,15 @@ def parallel_joints(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <PinJoint name="hip_again">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
-        <socket_child_frame>/bodyset/thigh</socket_child_frame>
-        <coordinates> <Coordinate name="hip_flexion_again" /> </coordinates>
-    </PinJoint>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="trunk"> <mass>30</mass> <inertia>1 1 1 0 0 0</inertia> </Body>
-    <PinJoint name="back">
-        <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
-        <socket_child_frame>/bodyset/trunk</socket_child_frame>
-        <coordinates> <Coordinate name="lumbar_extension" /> </coordinates>
-    </PinJoint>
+    - <PinJoint name="hip_again">
+    + <Body name="trunk"> <mass>30</mass> <inertia>1 1 1 0 0 0</inertia> </Body>
+    + <PinJoint name="back">
+          <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
+    -     <socket_child_frame>/bodyset/thigh</socket_child_frame>
+    -     <coordinates> <Coordinate name="hip_flexion_again" /> </coordinates>
+    +     <socket_child_frame>/bodyset/trunk</socket_child_frame>
+    +     <coordinates> <Coordinate name="lumbar_extension" /> </coordinates>
+      </PinJoint>
     ```
     """
     first: dict[frozenset[int], Joint] = {}
@@ -181,12 +166,8 @@ def massless_leaf(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="shank"> <mass>0</mass> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia> </Body>
+    - <Body name="shank"> <mass>0</mass> </Body>
+    + <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia> </Body>
     ```
     """
     bones = skeleton(subject)

@@ -32,14 +32,9 @@ def unreadable_value(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.2, 0</location>
-        <radius>0.05</radius> </ContactSphere>
-    ```
-
-    ## Use instead
-    ```xml
-    <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location>
-        <radius>0.05</radius> </ContactSphere>
+    - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.2, 0</location>
+    + <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location>
+          <radius>0.05</radius> </ContactSphere>
     ```
     """
     for note, owner, spec, kind in _value_notes(subject, "unreadable", "ignored", "too-few", "too-many"):
@@ -72,12 +67,8 @@ def wrong_count(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02</inertia> </Body>
+    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     for note, owner, spec, kind in _value_notes(subject, "too-many", "too-few"):
@@ -104,12 +95,8 @@ def cut_number(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8.5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    - <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+    + <Body name="thigh"> <mass>8.5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
     for note, owner, spec, _ in _value_notes(subject, "cut"):
@@ -137,12 +124,10 @@ def empty_value(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <Body name="thigh"> <mass>8</mass> <mass_center></mass_center> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
-    ```
-
-    ## Use instead
-    ```xml
-    <Body name="thigh"> <mass>8</mass> <mass_center>0 -0.2 0</mass_center> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
+    -     <mass_center></mass_center>
+    +     <mass_center>0 -0.2 0</mass_center>
+      </Body>
     ```
     """
     for note, owner, spec, kind in _value_notes(subject, "empty"):

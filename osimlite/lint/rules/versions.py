@@ -28,16 +28,12 @@ def newer_class(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateLinearStopForce name="stop">
-        <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <stiffness>100</stiffness>
-    </CoordinateLinearStopForce>
-    ```
-
-    ## Use instead
-    ```xml
-    <SpringGeneralizedForce name="stop">
-        <coordinate>knee_angle</coordinate> <stiffness>100</stiffness>
-    </SpringGeneralizedForce>
+    - <CoordinateLinearStopForce name="stop">
+    -     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <stiffness>100</stiffness>
+    - </CoordinateLinearStopForce>
+    + <SpringGeneralizedForce name="stop">
+    +     <coordinate>knee_angle</coordinate> <stiffness>100</stiffness>
+    + </SpringGeneralizedForce>
     ```
     """
     target = subject.config.target_version or NEWEST

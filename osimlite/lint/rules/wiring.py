@@ -31,22 +31,14 @@ def control_function_count(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    <PrescribedController name="drive">
-        <socket_actuators>/forceset/motor</socket_actuators>
-        <FunctionSet name="ControlFunctions"> <objects /> </FunctionSet>
-    </PrescribedController>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    <PrescribedController name="drive">
-        <socket_actuators>/forceset/motor</socket_actuators>
-        <FunctionSet name="ControlFunctions">
-            <objects> <Constant name="motor"> <value>0.1</value> </Constant> </objects>
-        </FunctionSet>
-    </PrescribedController>
+      <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+      <PrescribedController name="drive">
+          <socket_actuators>/forceset/motor</socket_actuators>
+    -     <FunctionSet name="ControlFunctions"> <objects /> </FunctionSet>
+    +     <FunctionSet name="ControlFunctions">
+    +         <objects> <Constant name="motor"> <value>0.1</value> </Constant> </objects>
+    +     </FunctionSet>
+      </PrescribedController>
     ```
     """
     for controller in subject.named("PrescribedController"):
@@ -80,20 +72,12 @@ def broken_input(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <components>
-        <TableReporter__double_ name="table">
-            <input_inputs>/jointset/knee/knee_angle|velocity</input_inputs>
-        </TableReporter__double_>
-    </components>
-    ```
-
-    ## Use instead
-    ```xml
-    <components>
-        <TableReporter__double_ name="table">
-            <input_inputs>/jointset/knee/knee_angle|speed</input_inputs>
-        </TableReporter__double_>
-    </components>
+      <components>
+          <TableReporter__double_ name="table">
+    -         <input_inputs>/jointset/knee/knee_angle|velocity</input_inputs>
+    +         <input_inputs>/jointset/knee/knee_angle|speed</input_inputs>
+          </TableReporter__double_>
+      </components>
     ```
     """
     for use in subject.uses:
@@ -126,22 +110,15 @@ def connected_twice(subject: Subject, found: Found) -> None:
 
     ## Example
     ```xml
-    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    <PrescribedController name="drive">
-        <socket_actuators>/forceset/motor /forceset/motor</socket_actuators>
-        <FunctionSet name="ControlFunctions">
-            <objects> <Constant name="a" /> <Constant name="b" /> </objects>
-        </FunctionSet>
-    </PrescribedController>
-    ```
-
-    ## Use instead
-    ```xml
-    <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    <PrescribedController name="drive">
-        <socket_actuators>/forceset/motor</socket_actuators>
-        <FunctionSet name="ControlFunctions"> <objects> <Constant name="a" /> </objects> </FunctionSet>
-    </PrescribedController>
+      <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+      <PrescribedController name="drive">
+    -     <socket_actuators>/forceset/motor /forceset/motor</socket_actuators>
+    -     <FunctionSet name="ControlFunctions">
+    -         <objects> <Constant name="a" /> <Constant name="b" /> </objects>
+    -     </FunctionSet>
+    +     <socket_actuators>/forceset/motor</socket_actuators>
+    +     <FunctionSet name="ControlFunctions"> <objects> <Constant name="a" /> </objects> </FunctionSet>
+      </PrescribedController>
     ```
     """
     seen: dict[tuple[int, str], list[tuple[Component, str]]] = {}
