@@ -5,7 +5,6 @@ A rule is a function of the subject and of `found`, which it calls once per find
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -148,8 +147,17 @@ class Rule:
 
     @property
     def page(self) -> str:
-        """What it does, why it is bad, an example and the same mended: the docstring, which marks what is mended."""
-        return _MARKED_EXAMPLE.sub(_both_examples, cleandoc(self.check.__doc__ or ""))
+        """What it does, why that is bad, an example and the same mended: the paragraphs of the docstring.
+
+        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends it.
+        """
+        summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
+        fence, *lines, end = example.splitlines()
+        fails, mended = ("\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-")
+        return (
+            f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n"
+            f"## Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{mended}\n{end}"
+        )
 
     @property
     def summary(self) -> str:
@@ -165,16 +173,6 @@ class Rule:
     def matches(self, word: str) -> bool:
         """Whether `word` is this rule's code, the beginning of it, its name or its family."""
         return bool(word) and (self.code.startswith(word.upper()) or word in (self.name, self.family, "ALL"))
-
-
-_MARKED_EXAMPLE = re.compile(r"## Example\n(```\S+\n)([-+ ] .*?)\n```", re.DOTALL)
-
-
-def _both_examples(example: re.Match[str]) -> str:
-    """An example as it fails and as it is mended, from one whose lines are marked as in a diff."""
-    lines = example[2].splitlines()
-    fails, mended = ("\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-")
-    return f"## Example\n{example[1]}{fails}\n```\n\n## Use instead\n{example[1]}{mended}\n```"
 
 
 _RULES: dict[str, Rule] = {}

@@ -28,13 +28,10 @@ MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 def missing_mass(subject: Subject, found: Found) -> None:
     """A body has no mass.
 
-    ## What it does
     Reports bodies whose mass is not given.
 
-    ## Why is this bad
     The default is NaN, so that nobody can forget it: OpenSim refuses to load the file.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -50,14 +47,11 @@ def missing_mass(subject: Subject, found: Found) -> None:
 def impossible_inertia(subject: Subject, found: Found) -> None:
     """No distribution of mass has this inertia.
 
-    ## What it does
     Reports inertias of which one principal moment is larger than the other two together, and by how much.
 
-    ## Why is this bad
     Such a body cannot exist. OpenSim computes with it all the same, and accelerations about that axis are too small.
     Often two numbers are swapped, or the inertia was scaled axis by axis.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -83,15 +77,12 @@ def impossible_inertia(subject: Subject, found: Found) -> None:
 def inertia_not_positive(subject: Subject, found: Found) -> None:
     """An inertia has a negative principal moment.
 
-    ## What it does
     Reports inertias that are negative about some axis: a negative moment, or products that are too large for the
     moments.
 
-    ## Why is this bad
     A torque about that axis turns the body the other way. OpenSim does not check, and the simulation blows up or
     quietly shows nonsense.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.003 0 0</inertia> </Body>
@@ -114,14 +105,11 @@ def inertia_not_positive(subject: Subject, found: Found) -> None:
 def no_inertia(subject: Subject, found: Found) -> None:
     """A body has mass and no inertia.
 
-    ## What it does
     Reports bodies with a mass whose inertia is zero or not given.
 
-    ## Why is this bad
     All the mass is then in one point. A joint that turns about this point has no resistance at all: accelerations
     become NaN if the body is the last of its chain (an error), and the integrator takes ever smaller steps otherwise.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -159,15 +147,12 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
 def mass_out_of_proportion(subject: Subject, found: Found) -> None:
     """A mass, or an inertia for its mass, is larger than that of any body.
 
-    ## What it does
     Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres from the mass
     center (the radius of gyration, the square root of the largest moment over the mass).
 
-    ## Why is this bad
     Most often the unit is wrong: grams for kilograms, or kg mm^2 (a million times as much) for kg m^2. The model moves
     as if its limbs were cast in lead, and no force in it fits.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>100000 100000 20000 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>

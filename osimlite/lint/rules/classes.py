@@ -22,16 +22,13 @@ from osimlite.text import nearest
 def unknown_class(subject: Subject, found: Found) -> None:
     """An object is of a class that OpenSim does not have.
 
-    ## What it does
     Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the wrong case, or of a
     plug-in. Names the nearest class that may stand there.
 
-    ## Why is this bad
     In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the object out. Of a
     plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same. With the file
     that the setting `classes` names, osimlite knows the classes of a plug-in as well.
 
-    ## Example
     ```xml
     - <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
     + <MarkerSet>
@@ -57,13 +54,10 @@ def unknown_class(subject: Subject, found: Found) -> None:
 def wrong_class(subject: Subject, found: Found) -> None:
     """An object of a known class stands where that class may not stand.
 
-    ## What it does
     Reports members of a set, or of another property, that are of a class the property does not take.
 
-    ## Why is this bad
     In a set OpenSim refuses to load the file; elsewhere it leaves the object out.
 
-    ## Example
     ```xml
     - <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
     + <MarkerSet>
@@ -90,13 +84,10 @@ def wrong_class(subject: Subject, found: Found) -> None:
 def wrong_part_name(subject: Subject, found: Found) -> None:
     """A part of an object has a name other than that of its property.
 
-    ## What it does
     Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it by its name.
 
-    ## Why is this bad
     OpenSim does not take the object and goes on with the default: everything inside is lost.
 
-    ## Example
     ```xml
       <Body name="thigh">
     -     <FrameGeometry name="axes"> <scale_factors>0.5 0.5 0.5</scale_factors> </FrameGeometry>
@@ -125,13 +116,10 @@ def wrong_part_name(subject: Subject, found: Found) -> None:
 def missing_wrapper(subject: Subject, found: Found) -> None:
     """Members of a set do not stand in its `<objects>`.
 
-    ## What it does
     Reports objects that stand directly in a set or in the object that should list them.
 
-    ## Why is this bad
     OpenSim looks for members inside `<objects>` only, and ignores these.
 
-    ## Example
     ```xml
       <MarkerSet>
     -     <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

@@ -20,13 +20,10 @@ from osimlite.schema.tree import Use
 def contact_without_partner(subject: Subject, found: Found) -> None:
     """A contact force has fewer than two surfaces.
 
-    ## What it does
     Reports contact forces that list no contact geometry, or only one, over all their parameter sets together.
 
-    ## Why is this bad
     Such a force never acts, and OpenSim does not mention it.
 
-    ## Example
     ```xml
       <HuntCrossleyForce name="foot_ground">
           <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
@@ -55,13 +52,10 @@ def contact_without_partner(subject: Subject, found: Found) -> None:
 def contact_listed_twice(subject: Subject, found: Found) -> None:
     """A contact force lists the same surface twice.
 
-    ## What it does
     Reports every mention of a contact geometry after the first within one force.
 
-    ## Why is this bad
     OpenSim counts the surface twice, and the force is doubled.
 
-    ## Example
     ```xml
       <HuntCrossleyForce name="foot_ground">
           <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
@@ -99,13 +93,10 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
 def unused_contact_geometry(subject: Subject, found: Found) -> None:
     """A contact geometry is used by nothing.
 
-    ## What it does
     Reports contact geometry that no force and no path names.
 
-    ## Why is this bad
     It has no effect; often a force was meant to list it.
 
-    ## Example
     ```xml
     + <HuntCrossleyForce name="toe_ground">
     +     <HuntCrossleyForce::ContactParametersSet name="contact_parameters">

@@ -22,14 +22,11 @@ ORIENTATION = Threshold("largest-orientation", 2 * math.pi, "rad", "a larger ang
 def inverted_range(subject: Subject, found: Found) -> None:
     """The range of a coordinate ends before it begins.
 
-    ## What it does
     Reports ranges whose first number is larger than the second; an error if the coordinate is clamped.
 
-    ## Why is this bad
     OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders and solvers that
     use the range misbehave.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -57,14 +54,11 @@ def inverted_range(subject: Subject, found: Found) -> None:
 def default_outside_range(subject: Subject, found: Found) -> None:
     """The default value of a coordinate lies outside its range.
 
-    ## What it does
     Reports such defaults; an error if the coordinate is clamped.
 
-    ## Why is this bad
     OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose that its own range
     rules out; often the range or the default is in degrees.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -96,13 +90,10 @@ def default_outside_range(subject: Subject, found: Found) -> None:
 def prescribed_without_function(subject: Subject, found: Found) -> None:
     """A coordinate is prescribed and has no function.
 
-    ## What it does
     Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
 
-    ## Why is this bad
     OpenSim switches the prescription off in silence, and the coordinate moves freely.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -130,15 +121,12 @@ def prescribed_without_function(subject: Subject, found: Found) -> None:
 def degrees_for_radians(subject: Subject, found: Found) -> None:
     """An angle looks as if it were in degrees.
 
-    ## What it does
     Reports rotational coordinates whose default value or range goes beyond five turns, in radians, and frames,
     surfaces and wrap objects that are turned by more than one.
 
-    ## Why is this bad
     Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is more than fourteen
     turns.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>

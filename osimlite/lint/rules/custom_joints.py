@@ -34,15 +34,12 @@ if TYPE_CHECKING:
 def made_up_coordinate(subject: Subject, found: Found) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
-    ## What it does
     Reports such names where OpenSim takes the model all the same; where it refuses the model, the name is reported as
     a reference that leads nowhere. It is a warning if the joint declares no coordinate at all.
 
-    ## Why is this bad
     OpenSim makes a coordinate of that name up, without a word: the joint has one degree of freedom more, its value is
     0, and the axis no longer follows the coordinate it was meant to follow.
 
-    ## Example
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
       <CustomJoint name="ankle">
@@ -89,14 +86,11 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
 def axis_without_coordinate(subject: Subject, found: Found) -> None:
     """An axis of a custom joint has a function and no coordinate for it.
 
-    ## What it does
     Reports axes that name no coordinate though their function wants a variable. Constant and linear functions do
     without.
 
-    ## Why is this bad
     OpenSim crashes, without a message.
 
-    ## Example
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
       <CustomJoint name="ankle">
@@ -135,13 +129,10 @@ def axis_without_coordinate(subject: Subject, found: Found) -> None:
 def collinear_axes(subject: Subject, found: Found) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
-    ## What it does
     Reports axes of a custom joint that are parallel to one before of the same kind, or have no length.
 
-    ## Why is this bad
     OpenSim refuses to load the file, also where an axis moves nothing. Give each unused axis a direction of its own.
 
-    ## Example
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
       <CustomJoint name="ankle">
@@ -181,15 +172,12 @@ def collinear_axes(subject: Subject, found: Found) -> None:
 def idle_coordinate(subject: Subject, found: Found) -> None:
     """A coordinate of a custom joint moves nothing.
 
-    ## What it does
     Reports coordinates that no axis uses, or only with a function that does not change with them in the default pose: a
     constant one, one with the weight 0, or one of a single variable that reads another coordinate.
 
-    ## Why is this bad
     The joint has a degree of freedom without a motion, so that the mass matrix cannot be inverted: all accelerations of
     the joint become NaN, without a message, also if the coordinate is locked or prescribed.
 
-    ## Example
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
       <CustomJoint name="ankle">

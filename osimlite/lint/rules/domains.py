@@ -22,15 +22,12 @@ from osimlite.text import listed, nearest
 def not_finite(subject: Subject, found: Found) -> None:
     """A number is NaN, or infinite where that makes no sense.
 
-    ## What it does
     Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest controls), where it is
     a way to say that there is none.
 
-    ## Why is this bad
     OpenSim accepts it in silence, and everything that is computed with the number becomes NaN: the simulation runs to
     its end without a message and without a result.
 
-    ## Example
     ```xml
     - <gravity>0 NaN 0</gravity>
     + <gravity>0 -9.80665 0</gravity>
@@ -62,14 +59,11 @@ def not_finite(subject: Subject, found: Found) -> None:
 def impossible_value(subject: Subject, found: Found) -> None:
     """A number makes OpenSim fail or compute NaN.
 
-    ## What it does
     Reports values outside their domain of which it is known that OpenSim refuses them, or computes nonsense: contact
     stiffness 0, a negative mass, a limit without transition.
 
-    ## Why is this bad
     Most of them pass in silence. A contact stiffness of 0 is 0/0 as soon as the surfaces touch.
 
-    ## Example
     ```xml
       <CoordinateLimitForce name="stop">
           <coordinate>hip_flexion</coordinate> <upper_limit>90</upper_limit> <lower_limit>-25</lower_limit>
@@ -87,15 +81,12 @@ def impossible_value(subject: Subject, found: Found) -> None:
 def doubtful_value(subject: Subject, found: Found) -> None:
     """A number is outside the values that make sense for its property.
 
-    ## What it does
     Reports numbers outside the domain that the property declares: a negative radius or dissipation, an opacity of 3;
     and numbers of 1e20 and more.
 
-    ## Why is this bad
     OpenSim computes with it all the same: a negative dissipation feeds energy into each impact, and a sphere with a
     negative radius touches nothing.
 
-    ## Example
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>
     + <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.05</radius> </ContactSphere>
@@ -117,13 +108,10 @@ def doubtful_value(subject: Subject, found: Found) -> None:
 def unknown_choice(subject: Subject, found: Found) -> None:
     """A property has a value other than those that mean something.
 
-    ## What it does
     Reports words and numbers outside the list of those that OpenSim knows for a property.
 
-    ## Why is this bad
     OpenSim takes one of the others, or refuses the model.
 
-    ## Example
     ```xml
       <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame>
     -     <Appearance> <SurfaceProperties> <representation>7</representation> </SurfaceProperties> </Appearance>

@@ -20,15 +20,12 @@ from osimlite.text import listed
 def missing_mesh(subject: Subject, found: Found) -> None:
     """A mesh file is not there.
 
-    ## What it does
     Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry` beside it, and in
     the folders that the configuration names. A file of the same name in other letter case is pointed out.
 
-    ## Why is this bad
     OpenSim draws nothing for such a mesh. A contact mesh that is missing makes it refuse the model. A name in the wrong
     case is found on Windows and macOS and missing on Linux.
 
-    ## Example
     ```xml
       <Body name="thigh"> <attached_geometry>
     -     <Mesh name="bone"> <mesh_file>no_such_bone.vtp</mesh_file> </Mesh>
@@ -67,16 +64,13 @@ def missing_mesh(subject: Subject, found: Found) -> None:
 def included_file(subject: Subject, found: Found) -> None:
     """An object is kept in another file.
 
-    ## What it does
     Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, is no
     ordinary file (a pipe, a device) or larger than the settings allow (`largest-file`), and as an error if the element
     itself holds something, or if another component names the object, which without its file has no name.
 
-    ## Why is this bad
     OpenSim reads the object from the other file, and writes that file anew when it saves the model; if it is missing,
     it goes on with an empty object. Of what stands inside an element with `file=` it reads nothing.
 
-    ## Example
     ```xml
     - <MarkerSet file="markers.xml" />
     + <MarkerSet>
@@ -134,14 +128,11 @@ def _has_content(source: Source | None, number: int) -> bool:
 def missing_data_file(subject: Subject, found: Found) -> None:
     """A file of measured loads, of controls or of a table is not there.
 
-    ## What it does
     Looks for the files of external loads, of controllers and of table sources beside the model and in the folder that
     the program was started in.
 
-    ## Why is this bad
     OpenSim refuses the model when it is connected; only a ControlSetController goes on, without any controls.
 
-    ## Example
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
       <PrescribedController name="drive">

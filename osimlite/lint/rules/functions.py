@@ -30,15 +30,12 @@ Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstant
 def unsorted_abscissae(subject: Subject, found: Found) -> None:
     """The x values of a function do not rise.
 
-    ## What it does
     Reports the first x that is smaller than the one before it, and of splines also the first that is equal to it.
 
-    ## Why is this bad
     A GCVSpline is refused. A SimmSpline divides by the difference without a word and gives values in the millions;
     piecewise functions take the wrong piece. A moment arm or a moving point is then anywhere. Where the same point
     stands twice, a SimmSpline has no slope (a warning).
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -84,14 +81,11 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
 def unequal_points(subject: Subject, found: Found) -> None:
     """A function has not as many y values as x values.
 
-    ## What it does
     Reports tabulated functions whose lists are of different length. Too many y are a warning.
 
-    ## Why is this bad
     Where y is missing OpenSim reads beyond the end of the list, whatever is in memory there; a GCVSpline is refused.
     Too many y are ignored.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -125,14 +119,11 @@ def unequal_points(subject: Subject, found: Found) -> None:
 def too_few_points(subject: Subject, found: Found) -> None:
     """A function has too few points.
 
-    ## What it does
     Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order, and piecewise
     functions without any.
 
-    ## Why is this bad
     A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns what is in memory.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -163,16 +154,13 @@ def too_few_points(subject: Subject, found: Found) -> None:
 def coefficient_count(subject: Subject, found: Found) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
-    ## What it does
     Reports linear functions without coefficients (an error), polynomials of several variables with another number than
     their dimension and order ask for (an error), and linear functions on the axis of a joint or of a coordinate
     coupler that have more or fewer than the coordinates there and a constant.
 
-    ## Why is this bad
     OpenSim crashes on an empty list, and refuses a polynomial. Otherwise it takes the first for the weights, the last
     for the constant, and drops what is between: the joint moves by another law than was written.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -234,16 +222,13 @@ _NEEDED: Final = {
 def missing_function(subject: Subject, found: Found) -> None:
     """A function is not there that OpenSim cannot do without.
 
-    ## What it does
     Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and
     empty functions of MovingPathPoints and FunctionBasedBushingForces; and PrescribedForces with other than three
     functions, or none, for the force, its point or the torque.
 
-    ## Why is this bad
     OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in multipliers; one
     that was taken out later leaves an empty multiplier.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>

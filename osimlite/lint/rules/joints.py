@@ -17,13 +17,10 @@ from osimlite.text import listed
 def joint_to_itself(subject: Subject, found: Found) -> None:
     """A joint connects a body to itself.
 
-    ## What it does
     Reports joints whose two frames are the same or are fixed to the same body.
 
-    ## Why is this bad
     OpenSim refuses the model.
 
-    ## Example
     ```xml
     - <WeldJoint name="strange">
     + <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
@@ -47,15 +44,12 @@ def joint_to_itself(subject: Subject, found: Found) -> None:
 def wrong_coordinate_count(subject: Subject, found: Found) -> None:
     """A joint has not as many coordinates as it needs.
 
-    ## What it does
     Reports joints with more or fewer coordinates than their class moves by, custom joints with a coordinate that none
     of their axes uses, and (as a warning) joints with none at all.
 
-    ## Why is this bad
     OpenSim refuses the model. Where `<coordinates>` is left out it makes coordinates up, with a name such as `_coord_0`
     and the value 0.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -111,15 +105,12 @@ def _says_none(subject: Subject, joint: Joint) -> bool:
 def shared_coordinate_name(subject: Subject, found: Found) -> None:
     """Two joints have a coordinate of the same name.
 
-    ## What it does
     Reports the second coordinate of a name, with the forces and others that look the name up. Without any it is a
     warning.
 
-    ## Why is this bad
     Forces, actuators and constraints find a coordinate by its bare name, and always find the first: two limit forces
     then act on one knee, and none on the other.
 
-    ## Example
     ```xml
       <PinJoint name="knee">
           <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
@@ -150,14 +141,11 @@ def shared_coordinate_name(subject: Subject, found: Found) -> None:
 def ground_as_child(subject: Subject, found: Found) -> None:
     """A joint has ground as its child.
 
-    ## What it does
     Reports joints whose child frame is fixed to ground.
 
-    ## Why is this bad
     It is allowed: OpenSim turns the joint round inside, and the coordinate keeps its meaning from parent to child. But
     other programs expect chains that start at ground.
 
-    ## Example
     ```xml
       <PlanarJoint name="ground_pelvis">
     -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
@@ -185,15 +173,12 @@ def ground_as_child(subject: Subject, found: Found) -> None:
 def stray_joint_frame(subject: Subject, found: Found) -> None:
     """A joint holds a frame that has nothing to do with it.
 
-    ## What it does
     Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects. It is an error if
     that body is further from ground than the joint's child.
 
-    ## Why is this bad
     OpenSim builds joints from ground outwards, and the frames of a joint with it: a frame on a body that is not there
     yet ends in a message about an invalid index. Usually a socket names the wrong frame.
 
-    ## Example
     ```xml
       <PinJoint name="hip">
           <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>

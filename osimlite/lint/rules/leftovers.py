@@ -25,15 +25,12 @@ from osimlite.text import nearest
 def unknown_attribute(subject: Subject, found: Found) -> None:
     """An element has an attribute that means nothing.
 
-    ## What it does
     Reports attributes of objects other than `name` and `file`; a warning on an element that is no object. Attributes of
     XML itself (`xmlns`, and all with a colon) are for information.
 
-    ## Why is this bad
     OpenSim ignores them: properties are elements, not attributes. Those of objects stay when a model is written, those
     of other elements are lost.
 
-    ## Example
     ```xml
     - <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
@@ -88,13 +85,10 @@ def _beside_objects(subject: Subject) -> Iterator[tuple[int, str, str]]:
 def stray_text(subject: Subject, found: Found) -> None:
     """There is text between elements.
 
-    ## What it does
     Reports text that stands beside elements, where only elements have a meaning.
 
-    ## Why is this bad
     OpenSim drops it in silence. It is often what is left of a tag: a value that lost its element, or half a comment.
 
-    ## Example
     ```xml
     - <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -126,15 +120,12 @@ def stray_text(subject: Subject, found: Found) -> None:
 def defaults_block(subject: Subject, found: Found) -> None:
     """The file has a `<defaults>` block.
 
-    ## What it does
     Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim cannot read in the
     objects that belong to tools, a CMC_Joint, is an error: it refuses to load the file.
 
-    ## Why is this bad
     Each object inside replaces the defaults of its class in the whole running program, for this file and for all that
     are loaded later. What a model means then depends on what was loaded before. Here the block counts for its own file.
 
-    ## Example
     ```xml
     - <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <fixed>true</fixed> </Marker>
@@ -166,15 +157,12 @@ def defaults_block(subject: Subject, found: Found) -> None:
 def force_outside_set(subject: Subject, found: Found) -> None:
     """Forces stand elsewhere than in the ForceSet.
 
-    ## What it does
     Reports forces, actuators and muscles among the `<components>` of the model or of another part of it, or in its
     ComponentSet: once for each such place.
 
-    ## Why is this bad
     They act. But OpenSim's lists of forces, actuators and muscles go through the ForceSet alone, so that controllers,
     probes, static optimization and CMC do not see a muscle that stands elsewhere.
 
-    ## Example
     ```xml
     - <components>
     -     <PathSpring name="band">
@@ -223,15 +211,12 @@ def force_outside_set(subject: Subject, found: Found) -> None:
 def not_upgradable(subject: Subject, found: Found) -> None:
     """OpenSim cannot bring an old document up to date.
 
-    ## What it does
     Reports what OpenSim needs while it changes a document of an older version into the current format, and finds
     missing or unreadable: a body without `<Joint>`, a transform that is not six finite numbers, a display preference
     that is no whole number, a connector without a name.
 
-    ## Why is this bad
     OpenSim refuses to load the file. `osimlite upgrade` is more lenient, and writes the current format.
 
-    ## Example
     ```document
       <OpenSimDocument Version="30000">
           <Model name="post">

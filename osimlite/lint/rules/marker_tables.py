@@ -17,14 +17,11 @@ _LARGEST, _SMALLEST = 8.0, 0.02
 def marker_units(table: Table, found: Found) -> None:
     """The units of a marker file do not fit its numbers.
 
-    ## What it does
     Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving body.
 
-    ## Why is this bad
     OpenSim takes millimetres for metres without a word: inverse kinematics ends with errors of kilometres, and a scaled
     model is a thousand times too large.
 
-    ## Example
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
       DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
@@ -64,15 +61,12 @@ def _spread(sample: list[float]) -> float | None:
 def marker_gap(table: Table, found: Found) -> None:
     """A marker is at the origin, or only a part of it is there.
 
-    ## What it does
     Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two cells are empty, and
     (for information) markers that no frame has.
 
-    ## Why is this bad
     OpenSim takes 0 0 0 for where the marker is and bends the model towards it. A marker with one empty cell is not
     seen at all in that frame.
 
-    ## Example
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
       DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
@@ -98,13 +92,10 @@ def marker_gap(table: Table, found: Found) -> None:
 def frame_number(table: Table, found: Found) -> None:
     """The frames of a marker file are not numbered one after the other.
 
-    ## What it does
     Compares the number of each frame with that of the frame before.
 
-    ## Why is this bad
     OpenSim does not look at the numbers; but frames may have been taken out or put in.
 
-    ## Example
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
       DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames

@@ -23,14 +23,11 @@ _NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 def character_reference(subject: Subject, found: Found) -> None:
     """A numeric character reference stands for a character beyond ASCII.
 
-    ## What it does
     Reports references such as `&#233;` with a number above 127.
 
-    ## Why is this bad
     OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it becomes invalid
     UTF-8, and `&#8364;` becomes another character. Write the character itself.
 
-    ## Example
     ```xml
     - <credits>Ren&#233;</credits>
     + <credits>René</credits>
@@ -55,16 +52,13 @@ def character_reference(subject: Subject, found: Found) -> None:
 def lenient_xml(subject: Subject, found: Found) -> None:
     """The text is not XML in a way that OpenSim overlooks.
 
-    ## What it does
     Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have, values of attributes
     without quotes, attributes without a blank between, and an XML declaration that is none or does not stand at the
     very beginning.
 
-    ## Why is this bad
     OpenSim's parser reads such a file, and most other XML readers refuse it. A bare `&` it leaves out: of `Anna & Bert`
     it keeps `Anna  Bert`.
 
-    ## Example
     ```xml
     - <credits>Anna & Bert</credits>
     + <credits>Anna &amp; Bert</credits>
@@ -140,15 +134,12 @@ def _control(source: Source, start: int) -> int:
 def text_outside_root(subject: Subject, found: Found) -> None:
     """There is text before or after the root element.
 
-    ## What it does
     Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an editor left behind,
     or a byte-order mark at another place than the beginning.
 
-    ## Why is this bad
     OpenSim finds no root element then and refuses the file, with a message about a node that is none. Make a comment of
     a remark: `<!-- ... -->`.
 
-    ## Example
     ```document
     - scaled by Anna, 2021
     + <!-- scaled by Anna, 2021 -->
@@ -177,15 +168,12 @@ def text_outside_root(subject: Subject, found: Found) -> None:
 def byte_order_mark(subject: Subject, found: Found) -> None:
     """The file has a byte-order mark.
 
-    ## What it does
     Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the same mark between
     elements.
 
-    ## Why is this bad
     OpenSim and XML readers pass over it. Files that are joined, cut or compared with other tools carry it to places
     where it is part of a name or a number, and nobody sees it.
 
-    ## Example
     ```document
     - \ufeff<OpenSimDocument Version="40600">
     + <OpenSimDocument Version="40600">
@@ -202,14 +190,11 @@ def byte_order_mark(subject: Subject, found: Found) -> None:
 def closing_tag(subject: Subject, found: Found) -> None:
     """There is white space in a closing tag.
 
-    ## What it does
     Reports closing tags such as `</mass >`, and those that are broken over two lines.
 
-    ## Why is this bad
     XML allows it, so that editors and other programs say nothing. OpenSim's parser does not know it and cannot load the
     file.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>

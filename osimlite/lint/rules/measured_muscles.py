@@ -18,13 +18,11 @@ OFF = Threshold(
 def start_off_equilibrium(subject: Subject, found: Found) -> None:
     """A muscle starts far from equilibrium.
 
-    ## What it does
     Reports muscles with an elastic tendon whose fibers, in the default pose and at their default activation, start more
     than 0.1 optimal fiber lengths from where they would be in equilibrium, or whose tension is off by more than 0.1
     `max_isometric_force`. A muscle without an equilibrium there is a warning. Thelen2003Muscle,
     Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle are looked at.
 
-    ## Why is this bad
     OpenSim brings muscles into equilibrium only where it is asked to (`solve_for_equilibrium_for_auxiliary_states` of
     ForwardTool, Model::equilibrateMuscles); else fibers begin with `default_fiber_length`, which is 0.1 m where a file
     does not say. The tendon is slack then or pulls with many times the muscle's strength, and the fibers snap into
@@ -32,7 +30,6 @@ def start_off_equilibrium(subject: Subject, found: Found) -> None:
     there is no equilibrium OpenSim throws an exception when it is asked for one. The fibers' length in equilibrium is a
     good default.
 
-    ## Example
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
     +     <default_fiber_length>0.128</default_fiber_length>
@@ -73,19 +70,16 @@ def start_off_equilibrium(subject: Subject, found: Found) -> None:
 def fiber_limit(subject: Subject, found: Found) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
-    ## What it does
     Reports muscles whose fibers in equilibrium, fully active, are as short as pennation (`maximum_pennation_angle`) or
     the curve of active force lets them be where the path is shortest; those whose fibers at rest are longer than 2
     optimal lengths where it is longest; and muscles that have no equilibrium in one of these poses. The poses are the
     default one and five values of each coordinate in the middle half of its range, the others as in the default pose:
     at the ends of wide ranges there are few muscles that have reached no limit.
 
-    ## Why is this bad
     A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its activation. Fibers beyond
     twice their length are torn in life. The lengths may be those of another muscle, a scaling may have forgotten them,
     or the range of the coordinate is wider than the joint.
 
-    ## Example
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
     -     <default_fiber_length>0.065</default_fiber_length>

@@ -21,20 +21,17 @@ OFF = Threshold("wrapping-error", 0.001, "m", "so far may OpenSim's length of a 
 def wrong_wrapping(subject: Subject, found: Found) -> None:
     """OpenSim computes a path around surfaces wrongly.
 
-    ## What it does
     Reports paths whose length in OpenSim is a millimetre or more off that along geodesics, the shortest ways on the
     surfaces, in the default pose, at one of nine values of each coordinate over its range, the others as in the default
     pose, or in one of 64 poses in which all coordinates are anywhere in their ranges. A negative number is how much too
     short OpenSim has the path. Paths of OSIM633 are left out.
 
-    ## Why is this bad
     Around several surfaces OpenSim looks for the way in rounds, but measures straight pieces between tangent points of
     an earlier round: paths are shorter than they can be, and their forces have a moment that nothing bears. Around one
     surface it goes another way than the shortest on an ellipsoid and a torus, and along a cylinder. The moment arm is
     not the derivative of the length then, so that the muscle's work is not what its force and its length say.
     `osimlite muscles` and `osimlite simulate` compute the right lengths with `--wrapping geodesic`.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
               <WrapObjectSet name="wrapobjectset">
@@ -87,19 +84,16 @@ JUMP = Threshold("path-jump", 0.001, "m", "so far may a path jump; less than 0.0
 def path_jump(subject: Subject, found: Found) -> None:
     """The length of a path jumps.
 
-    ## What it does
     Reports paths whose length jumps by a millimetre or more where a coordinate takes a value within its range, the
     others being as in the default pose: since a conditional point comes or goes, or since OpenSim finds another way
     around a surface. Each path is reported once, with its greatest jump. Nine values of each coordinate are looked at,
     the ends of the ranges of conditional points, and what lies between two values where the length changes otherwise
     than next to them.
 
-    ## Why is this bad
     The muscle's force jumps there, and so do accelerations: integrators take ever smaller steps, optimisations have no
     derivative, and a fiber is torn at once by as much as the path jumps. The moment arm tells nothing of it. A wrap
     surface, or a moving point, in place of the conditional point makes the length continuous.
 
-    ## Example
     ```xml
       <PathSpring name="spring">
           <GeometryPath name="path">
@@ -133,17 +127,14 @@ def path_jump(subject: Subject, found: Found) -> None:
 def length_of_wrap(subject: Subject, found: Found) -> None:
     """OpenSim computes a negative length of a path on a surface, or none.
 
-    ## What it does
     Reports wraps of which OpenSim subtracts the length of the path on the surface instead of adding it, which happens
     on the far side of a sphere whose `quadrant` is not all of it; and wraps for which it finds no points, so that the
     path goes straight through the surface, which happens where the line between the points goes through the middle of a
     sphere. Looked at are the default pose, and nine values of each coordinate over its range.
 
-    ## Why is this bad
     The path is too short, by centimetres and perhaps below zero; forces and moment arms are those of another path.
     Where a path goes through the middle of a sphere its length jumps.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
           <WrapObjectSet name="wrapobjectset">
@@ -190,19 +181,16 @@ RATE = Threshold("resting-point", 0.005, "m per rad or m", "a point that rests o
 def moving_point_range(subject: Subject, found: Found) -> None:
     """A moving path point has no place for all values of its coordinate.
 
-    ## What it does
     Reports moving points whose functions end before the range of their coordinate does, and make the point move on by a
     millimetre or more from there to the end of the range. As an info it reports those whose place would go on changing
     at an end of the range by 5 mm per radian or more, if nothing keeps the coordinate within: that is, if no
     CoordinateLimitForce acts on it and it is neither locked nor prescribed.
 
-    ## Why is this bad
     Where functions are not given OpenSim prolongs them: a spline by a straight line, a GCVSpline by a parabola or so,
     which soon leads off the bone. Outside the range of the coordinate a moving point rests in OpenSim, while the speed
     of the path, its moment arm and its work go on as if the point moved: the length and its rate contradict each other,
     and energy is not conserved. Nothing keeps a coordinate in its range in a simulation, `clamped` neither.
 
-    ## Example
     ```xml
       <PathSpring name="spring">
           <GeometryPath name="path">

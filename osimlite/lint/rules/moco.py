@@ -27,16 +27,13 @@ _ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
 def impossible_bounds(setup: Setup, found: Found) -> None:
     """Bounds of a study leave no value.
 
-    ## What it does
     Compares both ends of all bounds, bounds at the start and at the end with those of the whole phase, and the times at
     which a phase begins and ends. Points out a state or control that has bounds twice, bounds of an angle that look
     like degrees, and bounds of a time that are empty.
 
-    ## Why is this bad
     The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds the last counts,
     without a word.
 
-    ## Example
     ```setup
       <MocoPhase name="phase">
           <state_infos>
@@ -101,15 +98,12 @@ _COUNTED = ("states", "controls", "multipliers", "derivatives", "slacks", "param
 def study_data(setup: Setup, found: Found) -> None:
     """A table that a study follows, or starts from, does not fit its model.
 
-    ## What it does
     Looks for tables that are not named, for motions that do not say whether they are in degrees, for times that a table
     does not have, for columns that are no state, control, generalized force or marker of the model, and for states and
     controls that an initial guess lacks.
 
-    ## Why is this bad
     OpenSim refuses the study.
 
-    ## Example
     ```setup
       <MocoStudy name="study">
           <MocoProblem name="problem">
@@ -206,15 +200,12 @@ def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> l
 def study_parts(setup: Setup, found: Found) -> None:
     """A part of a study has a name or a target that OpenSim refuses.
 
-    ## What it does
     Looks for goals, constraints and parameters without a name or with that of another, for parameters of properties
     that a component has not or that are no numbers, for measured forces that the loads have not, and for models with
     locked coordinates or with joints whose speeds are not the rates of their coordinates.
 
-    ## Why is this bad
     OpenSim refuses the study.
 
-    ## Example
     ```setup
       <MocoPhase name="phases">
           <goals>

@@ -22,16 +22,13 @@ LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fibre sta
 def doubtful_muscle(subject: Subject, found: Found) -> None:
     """A muscle has fibres that no muscle has.
 
-    ## What it does
     Reports a pennation angle of a quarter turn or more, and a default fibre length, given in the file, that is less
     than 0.2 or more than 2 optimal lengths. Numbers that OpenSim refuses are reported as impossible values.
 
-    ## Why is this bad
     Fibres across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the optimal length a
     muscle is torn, and below a fifth it has no force; the search for equilibrium then starts far from any, and often
     the numbers belong to two different muscles.
 
-    ## Example
     ```xml
       <Millard2012EquilibriumMuscle name="soleus">
           <GeometryPath name="path">
@@ -77,14 +74,11 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
 def control_below_activation(subject: Subject, found: Found) -> None:
     """The least control of a muscle is below its least activation.
 
-    ## What it does
     Reports Thelen and Millard muscles whose `min_control` is smaller than their `minimum_activation`.
 
-    ## Why is this bad
     OpenSim refuses the model. Activation never falls below its minimum, since the equations of the muscle divide by
     it; a control that asks for less is a contradiction.
 
-    ## Example
     ```xml
       <Millard2012EquilibriumMuscle name="soleus">
     -     <min_control>0</min_control>
@@ -116,17 +110,14 @@ def control_below_activation(subject: Subject, found: Found) -> None:
 def out_of_reach(subject: Subject, found: Found) -> None:
     """The path of a muscle leaves its fibres no length that they could have.
 
-    ## What it does
     Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer than it by more than 2
     optimal fibre lengths. Paths that wrap around surfaces count as if they were straight, which is the least they can
     be; those through moving points, or points whose place cannot be told without a simulation, are not looked at.
 
-    ## Why is this bad
     A slack muscle bears no force, and fibres are torn at twice their optimal length. OpenSim finds no equilibrium of
     such muscles, or computes NaN; where it computes on, the forces are those of no muscle. Often the lengths are those
     of another muscle, or were not scaled with the bones.
 
-    ## Example
     ```xml
       <Millard2012EquilibriumMuscle name="soleus">
           <GeometryPath name="path">
@@ -165,16 +156,13 @@ def out_of_reach(subject: Subject, found: Found) -> None:
 def shared_time_constants(subject: Subject, found: Found) -> None:
     """Muscles differ in time constants that OpenSim has only once.
 
-    ## What it does
     Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`, `deactivation_time_constant` or
     `activation_dynamics_smoothing` is not that of the first one in the model, among those whose activation is a state.
 
-    ## Why is this bad
     OpenSim keeps these three for the whole process. They are those of the muscle that it computes first, also if that
     belongs to a model that was loaded before: a muscle of 30 ms that comes after one of 15 ms is activated twice as
     fast as its file says. Muscles of other classes each have their own.
 
-    ## Example
     ```xml
       <DeGrooteFregly2016Muscle name="fast">
           <GeometryPath name="path">

@@ -24,14 +24,11 @@ _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 def duplicate_name(subject: Subject, found: Found) -> None:
     """Two components beside each other have the same name.
 
-    ## What it does
     Reports the second of two siblings with one name, with the name OpenSim gives it and with those who name it.
 
-    ## Why is this bad
     OpenSim renames the second and adds a number. Everything that was meant to name it leads to the first: both feet
     then touch the ground with the same sphere.
 
-    ## Example
     ```xml
       <MarkerSet>
           <objects>
@@ -59,14 +56,11 @@ def duplicate_name(subject: Subject, found: Found) -> None:
 def illegal_name(subject: Subject, found: Found) -> None:
     """The name of a component has a character that names cannot have.
 
-    ## What it does
     Reports white space, `/`, `\\`, `*` and `+` in the names of components.
 
-    ## Why is this bad
     Names are the parts of paths; OpenSim refuses to load the file. Of files older than version 30500 it takes white
     space out of the names by itself, and not out of what refers to them: a muscle or a marker is then not found.
 
-    ## Example
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     + <Marker name="right_asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -114,15 +108,12 @@ def illegal_name(subject: Subject, found: Found) -> None:
 def missing_name(subject: Subject, found: Found) -> None:
     """A component that others name by its name has none.
 
-    ## What it does
     Reports members of sets, and coordinates, without a name or with an empty one. It is an error if something names a
     component that is missing, which may be this one.
 
-    ## Why is this bad
     OpenSim calls such a component after its class, in lower case. Nothing can name it by what the author had in mind,
     and the columns of results are called `body` or `pinjoint`.
 
-    ## Example
     ```xml
     - <Marker> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

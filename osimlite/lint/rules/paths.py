@@ -18,14 +18,11 @@ from osimlite.schema.wrapping import WrapObject
 def short_path(subject: Subject, found: Found) -> None:
     """A path has fewer than two points.
 
-    ## What it does
     Reports geometry paths with no point, or with one, muscles and springs without a path, and a
     Scholz2015GeometryPath that begins or ends with an obstacle.
 
-    ## Why is this bad
     OpenSim refuses the model.
 
-    ## Example
     ```xml
       <PathSpring name="spring">
           <GeometryPath name="path">
@@ -73,14 +70,11 @@ DISTANCE = Threshold("path-point-distance", 0.0, "m", "points of a path this nea
 def coincident_path_points(subject: Subject, found: Found) -> None:
     """Two points of a path that follow each other are in the same place.
 
-    ## What it does
     Reports a point fixed at the same place of the same frame as the point before it.
 
-    ## Why is this bad
     The piece between them has no length and no direction; if it is the whole path, the length of the muscle is 0.
     Usually one point was copied and not moved.
 
-    ## Example
     ```xml
       <PathSpring name="spring">
           <GeometryPath name="path">
@@ -118,13 +112,10 @@ def coincident_path_points(subject: Subject, found: Found) -> None:
 def inverted_point_range(subject: Subject, found: Found) -> None:
     """A conditional path point is never in the path.
 
-    ## What it does
     Reports conditional points whose range ends before it begins, and those without any.
 
-    ## Why is this bad
     The coordinate is never inside, so that the path always leaves the point out.
 
-    ## Example
     ```xml
       <PathSpring name="spring">
           <GeometryPath name="path">
@@ -160,13 +151,10 @@ def inverted_point_range(subject: Subject, found: Found) -> None:
 def unused_wrap_object(subject: Subject, found: Found) -> None:
     """No path wraps around a wrap surface.
 
-    ## What it does
     Reports wrap objects that no path names.
 
-    ## Why is this bad
     They have no effect; often a path was meant to use them.
 
-    ## Example
     ```xml
     - <Body name="thigh">
     -     <WrapObjectSet>
@@ -190,14 +178,11 @@ def unused_wrap_object(subject: Subject, found: Found) -> None:
 def moving_point_coordinates(subject: Subject, found: Found) -> None:
     """The location of a moving path point depends on more than one coordinate.
 
-    ## What it does
     Reports moving path points whose x, y and z follow different coordinates.
 
-    ## Why is this bad
     OpenSim refuses the model. Such a point moves along a curve on the bone as one joint turns, as the patellar tendon
     does with the knee; two joints would need a surface.
 
-    ## Example
     ```xml
       <PathSpring name="spring">
           <GeometryPath name="path">

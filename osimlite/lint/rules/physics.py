@@ -23,14 +23,11 @@ UNLIMITED = Threshold("unlimited-range", 4 * math.pi, "rad", "a wider range stan
 def strange_gravity(subject: Subject, found: Found) -> None:
     """Gravity is far from that of the Earth.
 
-    ## What it does
     Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that points up along Y.
 
-    ## Why is this bad
     OpenSim works in metres, kilograms and seconds, with Y up. Lengths in millimetres make a model that falls a thousand
     times too fast.
 
-    ## Example
     ```xml
     - <gravity>0 -9806.65 0</gravity>
     + <gravity>0 -9.80665 0</gravity>
@@ -52,15 +49,12 @@ def strange_gravity(subject: Subject, found: Found) -> None:
 def friction_order(subject: Subject, found: Found) -> None:
     """Static friction is smaller than dynamic friction.
 
-    ## What it does
     Reports contact materials whose static coefficient is below the dynamic one.
 
-    ## Why is this bad
     No material resists sliding more than sticking; usually the two numbers are swapped. Simbody's friction rises with
     the speed v of sliding, measured in transition velocities, as min(v, 1) (d + 2 (s - d) / (1 + v^2)), with s static
     and d dynamic: where s is less than half of d this is negative at small v, and friction pushes the way things slide.
 
-    ## Example
     ```xml
       <HuntCrossleyForce name="foot_ground">
           <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
@@ -94,13 +88,10 @@ def friction_order(subject: Subject, found: Found) -> None:
 def limits_swapped(subject: Subject, found: Found) -> None:
     """The upper limit of a limit force lies below its lower limit.
 
-    ## What it does
     Reports limit forces whose upper limit is smaller than the lower one.
 
-    ## Why is this bad
     Between the two both springs push against each other, at every pose of the joint that was meant to be free.
 
-    ## Example
     ```xml
       <CoordinateLimitForce name="stop">
     -     <coordinate>hip_flexion</coordinate> <upper_limit>-30</upper_limit> <lower_limit>90</lower_limit>
@@ -122,14 +113,11 @@ def limits_swapped(subject: Subject, found: Found) -> None:
 def limit_outside_range(subject: Subject, found: Found) -> None:
     """A limit force begins beyond the range of its coordinate.
 
-    ## What it does
     Reports limits that lie outside the range of the coordinate by more than the transition.
 
-    ## Why is this bad
     The range does not stop the motion, the limit force does; the model then moves further than its range says. Note
     that limits are in degrees and ranges in radians.
 
-    ## Example
     ```xml
       <CoordinateLimitForce name="stop">
     -     <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-170</lower_limit>
@@ -161,15 +149,12 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
 def limit_inside_range(subject: Subject, found: Found) -> None:
     """A limit force begins well inside the range of its coordinate.
 
-    ## What it does
     Reports limits inside the range of the coordinate by more than the transition and a quarter of the range. It is a
     warning if the default value of the coordinate is already beyond the limit.
 
-    ## Why is this bad
     Part of the range can only be reached against the spring. Past the limit in the default pose, the force is there
     from the first instant. Note that limits are in degrees and ranges in radians.
 
-    ## Example
     ```xml
       <CoordinateLimitForce name="stop">
     -     <coordinate>knee_angle</coordinate> <upper_limit>0</upper_limit> <lower_limit>-2.1</lower_limit>

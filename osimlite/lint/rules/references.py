@@ -26,15 +26,12 @@ if TYPE_CHECKING:
 def unresolved_reference(subject: Subject, found: Found) -> None:
     """A component names another component that does not exist.
 
-    ## What it does
     Follows every reference by OpenSim's own rule for that property and reports those that lead nowhere, with the force,
     joint or other component that holds them and the nearest name that exists.
 
-    ## Why is this bad
     OpenSim refuses the model when it is connected, and its message names neither the line nor, for a contact, the
     force. A group that names a missing member loses it in silence.
 
-    ## Example
     ```xml
       <HuntCrossleyForce name="foot_ground">
           <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
@@ -63,14 +60,11 @@ def unresolved_reference(subject: Subject, found: Found) -> None:
 def reference_to_wrong_type(subject: Subject, found: Found) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
-    ## What it does
     Reports references to something that exists and is of another kind: a joint as the parent frame, a body where a
     contact geometry belongs.
 
-    ## Why is this bad
     OpenSim says that the component does not exist, and refuses the model.
 
-    ## Example
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/jointset/hip</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -93,13 +87,10 @@ def reference_to_wrong_type(subject: Subject, found: Found) -> None:
 def missing_reference(subject: Subject, found: Found) -> None:
     """A property that must name a component names none.
 
-    ## What it does
     Reports sockets and names that are empty or not given.
 
-    ## Why is this bad
     OpenSim refuses the model when it is connected.
 
-    ## Example
     ```xml
       <Marker name="asis">
           <location>0 0 0</location>
@@ -130,15 +121,12 @@ def missing_reference(subject: Subject, found: Found) -> None:
 def reference_form(subject: Subject, found: Found) -> None:
     """A component is named by its path where a bare name belongs, or by its name where a path belongs.
 
-    ## What it does
     Reports references that would be right in another form: a bare name in a socket, a path without its leading slash,
     a path where OpenSim looks a bare name up, a path of the years before version 4 that leaves the sets out.
 
-    ## Why is this bad
     OpenSim does not search. A bare name in a socket means a child of the component itself; a path in
     `<coordinate>` of a limit force means a coordinate with slashes in its name. It refuses the model.
 
-    ## Example
     ```xml
     - <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -168,13 +156,10 @@ def reference_form(subject: Subject, found: Found) -> None:
 def reference_case(subject: Subject, found: Found) -> None:
     """A reference is right but for upper and lower case.
 
-    ## What it does
     Reports references that lead to a component once case is ignored.
 
-    ## Why is this bad
     Names are compared exactly; OpenSim refuses the model.
 
-    ## Example
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

@@ -40,15 +40,12 @@ from osimlite.schema.tree import is_a
 def contradicting_values(subject: Subject, found: Found) -> None:
     """Numbers of one object contradict each other.
 
-    ## What it does
     Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or cannot compute with
     (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of 1, `optimal_force` beside
     `max_isometric_force`), a torus without a hole, and a path given by functions that do not take its coordinates.
 
-    ## Why is this bad
     OpenSim refuses the model, and its message names neither the muscle nor the property.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
           <WrapObjectSet name="wrapobjectset">
@@ -88,14 +85,11 @@ def contradicting_values(subject: Subject, found: Found) -> None:
 def controls_swapped(subject: Subject, found: Found) -> None:
     """The least control of an actuator is above its largest.
 
-    ## What it does
     Reports actuators and muscles whose `min_control` is larger than their `max_control`.
 
-    ## Why is this bad
     No control is allowed. OpenSim simulates the model all the same; static optimization, computed muscle control and
     optimal control take the two as bounds and fail.
 
-    ## Example
     ```xml
       <CoordinateActuator name="motor">
     -     <min_control>1</min_control> <max_control>-1</max_control>

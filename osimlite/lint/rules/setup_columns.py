@@ -18,16 +18,13 @@ from osimlite.text import listed
 def missing_column(setup: Setup, found: Found) -> None:
     """A table of coordinates lacks coordinates of the model, or has none of them.
 
-    ## What it does
     Compares the columns of a table of coordinates with the coordinates of the model: inverse dynamics takes plain names
     alone, analyses take paths too. A task whose value is to come from a file needs its column there, and a table of
     states one for every state of the model.
 
-    ## Why is this bad
     OpenSim gives a coordinate without a column its default value, without a word or with a line in the log: the motion
     is another one.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>

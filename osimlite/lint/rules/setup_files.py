@@ -26,17 +26,14 @@ _SHARED = {
 def missing_input(setup: Setup, found: Found) -> None:
     """A file that a setup reads is not there, or is not named.
 
-    ## What it does
     Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is started there. What
     another setup of the project writes need not be there yet. Points out names in other letter case and names with
     backslashes, which only Windows understands.
 
-    ## Why is this bad
     OpenSim refuses the setup; where the model is missing, inverse kinematics crashes. A missing file of controls is
     told in the log only, and the tool runs without controls. A setup that names no file is a warning: it may be meant
     for a program that gives it one.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
     -     <model_file>no_such_model.osim</model_file>
@@ -99,14 +96,11 @@ def _in_other_case(naming: Naming) -> str | None:
 def input_of_another_kind(setup: Setup, found: Found) -> None:
     """A file that a setup reads holds something else than is needed.
 
-    ## What it does
     Compares the ending of a table, and the class at the top of a document, with what the property needs: a set of
     forces is no set of external loads.
 
-    ## Why is this bad
     OpenSim refuses the file.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>
@@ -141,14 +135,11 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
 def lost_output(setup: Setup, found: Found) -> None:
     """Results would be lost, or land in another place.
 
-    ## What it does
     Looks at the folder for results, of which OpenSim makes the last part only, at folders of output files that are not
     there, and at output files without a name.
 
-    ## Why is this bad
     The tool runs to its end and its results are lost, with a line in the log at most.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
     -     <results_directory>no_such/folder</results_directory>
@@ -205,15 +196,12 @@ def lost_output(setup: Setup, found: Found) -> None:
 def tools_differ(setup: Setup, found: Found) -> None:
     """A tool leaves out what another tool takes into account for the same motion.
 
-    ## What it does
     Compares a tool with all others in its folder that are given the same file of coordinates: whether they have
     measured loads, and whether they filter the motion.
 
-    ## Why is this bad
     Joint moments without the ground, or muscle forces from a motion that is not filtered, are results like any others,
     and do not fit those of the other tool.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>

@@ -22,15 +22,12 @@ _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT"
 def scale_factor(setup: Setup, found: Found) -> None:
     """A body would be scaled beyond belief.
 
-    ## What it does
     Looks for factors given by hand, and for measurements, that make a body less than half or more than twice as large.
     A measurement is the distance of its markers in the data over that in the model, in its default pose.
 
-    ## Why is this bad
     A label at another place, units that are not those of the header, or a pair of markers that the pose of the subject
     moves apart, make a model that is no longer that of a person; OpenSim says nothing.
 
-    ## Example
     ```setup
       <ScaleSet name="factors">
           <objects>
@@ -71,16 +68,13 @@ def scale_factor(setup: Setup, found: Found) -> None:
 def swapped_sides(setup: Setup, found: Found) -> None:
     """A marker of the right side was measured on the left, and its fellow on the right.
 
-    ## What it does
     Compares, for each two markers whose names differ by the side alone, the way from the left one to the right one with
     that of all other such pairs, in the data and in the model. A pair that is the other way round in four rows of five
     is told. Pairs that are more than half a metre apart in the model are left out: arms may be crossed.
 
-    ## Why is this bad
     Inverse kinematics twists legs and pelvis to bring the markers as near as it can; the errors that it reports are
     spread over all markers.
 
-    ## Example
     ```setup
       <InverseKinematicsTool name="ik">
           <model_file>sides.osim</model_file>

@@ -23,16 +23,13 @@ _NEAR = 0.4
 def load_columns(setup: Setup, found: Found) -> None:
     """The columns of a measured force are not in the data.
 
-    ## What it does
     Looks for the columns whose labels begin with the identifiers of an external force: there must be three of each.
     Points out a force without a point (it acts at the origin of the body), columns that are not in the order x, y, z
     (OpenSim takes them in the order of the file), and forces without an identifier.
 
-    ## Why is this bad
     OpenSim refuses loads of which it does not find three columns, and swaps the axes of those in another order without
     a word.
 
-    ## Example
     ```setup
       <ExternalLoads name="loads">
           <objects>
@@ -95,20 +92,17 @@ def load_columns(setup: Setup, found: Found) -> None:
 def load_place(setup: Setup, found: Found) -> None:
     """A measured force acts far away from its body, or is expressed in another frame than its setup says.
 
-    ## What it does
     Puts the model into poses of the motion that the tool is given, and looks where measured forces act: at more than
     40 cm from the origin of their body nothing of a foot or a hand is. Where a force is expressed in a body, it looks
     whether the numbers, as they are, point up more than they do when they are turned with that body. Torques are
     compared with what the force would do 40 cm farther away, and the sum of all forces, if it is as large as half the
     weight of the model, must point up.
 
-    ## Why is this bad
     OpenSim applies the force wherever it is told to: joint moments are wrong by the force times that distance, without
     a word. Feet that were taken for one another, points in millimetres, torques in newton millimetres, axes of the
     laboratory that are not those of the model, forces on the ground for those on the foot, and loads of another trial
     are found so.
 
-    ## Example
     ```setup
       <ExternalLoads name="loads">
           <objects>

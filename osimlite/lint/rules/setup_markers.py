@@ -26,17 +26,14 @@ def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
 def marker_not_measured(setup: Setup, found: Found) -> None:
     """A marker that is to be fitted is not in the data.
 
-    ## What it does
     Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the data, and of pairs in
     each row that is averaged. If none is in both model and data, it is an error. Counts whether the markers are enough
     for the coordinates of the model.
 
-    ## Why is this bad
     OpenSim leaves the marker out without a word; with no marker at all in common it crashes. A measurement one of whose
     markers is missing, in one row, does not count: its bodies keep their size. Coordinates that too few markers tell of
     stay where they are, or drift.
 
-    ## Example
     ```setup
       <InverseKinematicsTool name="ik">
           <model_file>leg.osim</model_file>

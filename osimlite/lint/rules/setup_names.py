@@ -28,16 +28,13 @@ _PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/control
 def unknown_name(setup: Setup, found: Found) -> None:
     """A setup names what the model of its tool does not have.
 
-    ## What it does
     Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that a setup reads, names
     in the model of the tool, with the sets of forces and markers that the tool adds to it. In studies of Moco also
     states, controls and outputs, by their paths or by patterns of them.
 
-    ## Why is this bad
     Most tools refuse the setup, some crash. Tasks of markers, scale factors of bodies, muscles of an analysis that are
     not there are left out without a word, and so are patterns that nothing matches (warnings).
 
-    ## Example
     ```setup
       <AnalyzeTool name="analyze">
           <model_file>leg.osim</model_file>
@@ -164,15 +161,12 @@ def _is_made(setup: Setup, text: str) -> bool:
 def excluded_force(setup: Setup, found: Found) -> None:
     """Inverse dynamics is told to leave out a force that there is not.
 
-    ## What it does
     Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups of the model's
     forces, and, where there is no group, with the names of the forces: of a model with groups OpenSim looks at groups
     alone. An empty list is pointed out where the model has muscles.
 
-    ## Why is this bad
     The force takes part: moments of the joints are without what the passive muscles give.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>

@@ -28,16 +28,13 @@ def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
 def sensor_without_frame(setup: Setup, found: Found) -> None:
     """A measured sensor has no frame in the model, or a sensor that a tool names was not measured.
 
-    ## What it does
     Compares the columns of measured orientations with the frames of the model: inverse kinematics takes those that are
     called as a frame is, the placer of sensors those that are called as a frame with the ending `_imu`. Looks for the
     sensors that the tool names among the columns. The table must be one of quaternions.
 
-    ## Why is this bad
     OpenSim leaves out sensors without a frame, with no more than the number of those that are left; if none is left, it
     refuses the table.
 
-    ## Example
     ```setup
       <IMUPlacer name="placer">
           <model_file>leg.osim</model_file>

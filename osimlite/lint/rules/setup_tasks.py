@@ -18,15 +18,12 @@ from osimlite.text import listed
 def task_weight(setup: Setup, found: Found) -> None:
     """The weights of tasks make no sense.
 
-    ## What it does
     Looks for weights that are negative or no number, for tasks without weight (their default is 0), for markers and
     coordinates that have two tasks, and for sets of which no task applies.
 
-    ## Why is this bad
     OpenSim refuses negative weights. A task without weight is not tracked, but counted in the error; a weight of 0 that
     is given may be meant so, and is an information. If no task applies, all markers count the same.
 
-    ## Example
     ```setup
       <IKTaskSet name="tasks">
     -     <objects> <IKMarkerTask name="asis"> <weight>-5</weight> </IKMarkerTask> </objects>
@@ -65,15 +62,12 @@ def task_weight(setup: Setup, found: Found) -> None:
 def unreachable_task(setup: Setup, found: Found) -> None:
     """A coordinate that is to be fitted cannot move, or not there.
 
-    ## What it does
     Looks for tasks of locked coordinates, for values of which most are outside the range of a clamped coordinate, and
     for locked coordinates that move in the file of values.
 
-    ## Why is this bad
     Inverse kinematics keeps a locked coordinate where the model has it, and a clamped one in its range, without a word:
     knees stay straight, and other joints bend in their place.
 
-    ## Example
     ```setup
       <InverseKinematicsTool name="ik">
           <model_file>clamped.osim</model_file>

@@ -30,16 +30,13 @@ _USUAL_WINDOW = 0.01
 def time_outside_data(setup: Setup, found: Found) -> None:
     """A tool runs over times that its data do not have, or that make no sense.
 
-    ## What it does
     Compares the times of a tool with those of the tables that it reads: markers, coordinates, sensors. Computed muscle
     control needs 0.03 s and the time of one window.
 
-    ## Why is this bad
     Inverse kinematics cuts the times to the data without a word. Without a time range it stops at 2 s: OpenSim 4.6
     means to take all there is, and does not. Loads that end before the motion go on as their spline leaves them. Times
     in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>
@@ -138,14 +135,11 @@ def _data_of(item: Any) -> Iterator[tuple[str, str]]:
 def loads_end_early(setup: Setup, found: Found) -> None:
     """Measured loads do not last as long as the run of the tool.
 
-    ## What it does
     Compares the times of the data of external loads with those of the tool, or of the motion that the tool is given.
 
-    ## Why is this bad
     Before the first and after the last row OpenSim goes straight on, without a word: forces grow to thousands of
     newtons.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>
@@ -185,14 +179,11 @@ def loads_end_early(setup: Setup, found: Found) -> None:
 def filter_frequency(setup: Setup, found: Found) -> None:
     """A filter does not fit how often the data were measured.
 
-    ## What it does
     Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of 0.
 
-    ## Why is this bad
     A filter above half the sampling frequency cannot be made: OpenSim takes another one. With 0, nothing is left of
     the motion.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>
@@ -219,15 +210,12 @@ def filter_frequency(setup: Setup, found: Found) -> None:
 def motion_in_degrees(setup: Setup, found: Found) -> None:
     """Angles of a motion are in degrees, and OpenSim takes them for radians, or the other way round.
 
-    ## What it does
     Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of more than 10 is no
     angle in radians that a joint takes. Of a motion that says so, the largest angle of many joints is more than 3
     degrees.
 
-    ## Why is this bad
     Joint moments of hundreds of thousands, without a word.
 
-    ## Example
     ```setup
       <InverseDynamicsTool name="id">
           <model_file>leg.osim</model_file>

@@ -39,17 +39,14 @@ _SETTINGS: tuple[tuple[str, str, Callable[[Any], bool], str, Severity], ...] = (
 def tool_setting(setup: Setup, found: Found) -> None:
     """A tool has a setting with which it cannot work.
 
-    ## What it does
     Looks for accuracies and error tolerances that are not positive or far too large, tools without an analysis,
     analyses with one name, that are off, or whose step is not positive, static optimization without the model's forces,
     without an actuator for the joint to ground, or with an exponent of 1 or less, muscles that are analyzed without
     being in equilibrium, forces that replace those of the model, and forces and
     controllers that are off.
 
-    ## Why is this bad
     Some make OpenSim crash or run for ever, some give other results without a word.
 
-    ## Example
     ```setup
       <InverseKinematicsTool name="ik">
           <model_file>leg.osim</model_file>
@@ -175,15 +172,12 @@ def _carried_by_none(setup: Setup) -> list[str]:
 def scale_setting(setup: Setup, found: Found) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
-    ## What it does
     Looks at the order of scaling, at measurements without a pair of two different markers, at axes other than X, Y and
     Z, at the mass, at steps that are left out, and at the times that are averaged.
 
-    ## Why is this bad
     A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
     the body keeps its size.
 
-    ## Example
     ```setup
       <MeasurementSet name="measurements">
           <objects>

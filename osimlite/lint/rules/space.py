@@ -29,14 +29,11 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 def degenerate_frame(subject: Subject, found: Found) -> None:
     """The points of a frame do not make a frame.
 
-    ## What it does
     Reports frames laid through stations of which two of the three that give the axes are in the same place, or which
     are fixed to different bodies; and offset frames that are fixed to themselves, or to each other in a circle.
 
-    ## Why is this bad
     OpenSim refuses the model; of a circle it never finds the end.
 
-    ## Example
     ```xml
       <ComponentSet>
           <objects>
@@ -113,18 +110,15 @@ LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
 def starts_in_contact(subject: Subject, found: Found) -> None:
     """Contact surfaces are inside each other in the default pose.
 
-    ## What it does
     Puts the model in its default pose and reports balls that start inside a half-space or another ball of their
     contact force, by more than 1 mm and a tenth of the radius. It is a warning if the middle of the ball is inside.
     Only bodies whose place plain arithmetic tells are looked at: those that hang on joints made of plain rotations and
     translations, or on custom joints with constant, linear or polynomial functions. Meshes and other shapes are left
     out.
 
-    ## Why is this bad
     The contact pushes with full force from the first instant: the model is thrown up, and the integrator takes tiny
     steps. Often the floor or a default value is in the wrong place.
 
-    ## Example
     ```xml
       <ContactSphere name="heel">
     -     <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.38 0</location> <radius>0.05</radius>
@@ -155,15 +149,12 @@ def starts_in_contact(subject: Subject, found: Found) -> None:
 def lengths_in_millimetres(subject: Subject, found: Found) -> None:
     """A length on a body is longer than ten metres.
 
-    ## What it does
     Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground may be far away, and
     prescribed or infinite values are not looked at.
 
-    ## Why is this bad
     OpenSim works in metres. A place in millimetres is a thousand times too far out, and what is fixed there has a
     lever arm to match.
 
-    ## Example
     ```xml
       <Marker name="asis">
     -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> <location>15 20 128</location>
@@ -206,14 +197,11 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
 def no_direction(subject: Subject, found: Found) -> None:
     """A direction has no length.
 
-    ## What it does
     Reports lines, axes and directions of constraints and actuators that are 0 0 0. It is an error for the line of a
     PointOnLineConstraint, which is 0 0 0 if nobody gives it.
 
-    ## Why is this bad
     An actuator pulls in no direction, whatever its force. Of a line without a direction OpenSim makes NaN.
 
-    ## Example
     ```xml
       <PointActuator name="push">
     -     <body>thigh</body> <direction>0 0 0</direction>

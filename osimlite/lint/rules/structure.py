@@ -24,17 +24,14 @@ from osimlite.text import listed, nearest
 def unknown_tag(subject: Subject, found: Found) -> None:
     """An element is no property of the object it stands in.
 
-    ## What it does
     Reports child elements that their class does not have: misspelt, in the wrong case, of another class, or of another
     version. Names the nearest right tag.
 
-    ## Why is this bad
     OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of a contact is 0, and
     the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A setup may hold what older versions
     understood: that is a warning, or an information if the element is empty or switches off what is off anyway. A
     misspelt element that says what the default is anyway is a warning too.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
     -     <mass_centre>0 -0.2 0</mass_centre>
@@ -122,14 +119,11 @@ def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: 
 def duplicate_tag(subject: Subject, found: Found) -> None:
     """A property is given twice.
 
-    ## What it does
     Reports every element after the first of the same property in one object.
 
-    ## Why is this bad
     OpenSim takes the first and ignores the rest, while a reader expects the last one to hold. One that says the same
     as the first is a warning.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -161,14 +155,11 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
 def element_in_value(subject: Subject, found: Found) -> None:
     """A value has an element inside.
 
-    ## What it does
     Reports elements inside a number, a switch, a text or a reference, and comments and CDATA sections in the middle of
     one. A comment before or after it does no harm.
 
-    ## Why is this bad
     OpenSim refuses to load the file.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass><value>8</value></mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>

@@ -16,13 +16,10 @@ from osimlite.lint.words import times
 def no_rows(table: Table, found: Found) -> None:
     """A table has no rows.
 
-    ## What it does
     Reports tables without any row.
 
-    ## Why is this bad
     OpenSim refuses a storage file without rows; of a marker file it looks for the first row for ever.
 
-    ## Example
     ```sto
       knee
       version=1
@@ -43,15 +40,12 @@ def no_rows(table: Table, found: Found) -> None:
 def ragged_row(table: Table, found: Found) -> None:
     """A row of a table is no row of numbers, or has too many or too few.
 
-    ## What it does
     Compares the cells of each row with the labels, and points out lines between the rows that are blank or remarks.
 
-    ## Why is this bad
     OpenSim's older reader goes on in the next line for what a row lacks: from there on all numbers are in wrong
     columns. The newer one refuses the file. In marker files and tables of version 2 and 3 a blank line ends the table,
     and the rows behind it are lost without a word.
 
-    ## Example
     ```sto
       knee
       version=1
@@ -110,15 +104,12 @@ def _without_blank_lines(table: Table, first: int) -> Fix:
 def not_a_number(table: Table, found: Found) -> None:
     """A cell of a table is no number.
 
-    ## What it does
     Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column, with the number of
     rows in which it is so. In marker files a marker that was not seen has three empty cells, or NaN in all three.
 
-    ## Why is this bad
     At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the rest of its row is
     that of the row before, and all later rows are lost, without a word. The newer one takes NaN for it (a warning).
 
-    ## Example
     ```sto
       knee
       version=1
@@ -155,15 +146,12 @@ def not_a_number(table: Table, found: Found) -> None:
 def time_order(table: Table, found: Found) -> None:
     """A time of a table is not after the one before it.
 
-    ## What it does
     Finds rows with the time of the row before, and rows that go back in time.
 
-    ## Why is this bad
     Of two rows with one time OpenSim keeps the second, without a word; where time goes back the rows before are lost,
     or the tool stops. A marker file is refused for either. One time twice in a storage file is a warning, and in the
     last row an information: so OpenSim ends some of its results.
 
-    ## Example
     ```sto
       knee
       version=1
@@ -193,13 +181,10 @@ def time_order(table: Table, found: Found) -> None:
 def time_gap(table: Table, found: Found) -> None:
     """Rows are missing in a table of even times.
 
-    ## What it does
     Finds steps that are at least half as long again as the usual one, in tables in which nearly all steps are alike.
 
-    ## Why is this bad
     Rows were lost. OpenSim draws a spline through the gap; with a filter it does so at the smallest step.
 
-    ## Example
     ```sto
       knee
       version=1

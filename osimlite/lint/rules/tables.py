@@ -22,15 +22,12 @@ _TO_THE_END = 1_000_000
 def table_header(table: Table, found: Found) -> None:
     """The header of a table is not as OpenSim needs it.
 
-    ## What it does
     Looks for the line `endheader` of a storage file, in small letters, and for `nRows` and `nColumns` where the older
     reader takes the file (version 1 or none). A marker file must start with `PathFileType`, without a byte order mark,
     and name all eight keys of its second line in their order, each with a value.
 
-    ## Why is this bad
     OpenSim refuses the file; of a storage file it says no more than that an index is out of bounds.
 
-    ## Example
     ```sto
       knee
       version=1
@@ -138,15 +135,12 @@ def _marker_header(table: Table, header: MarkerHeader, found: Found) -> None:
 def table_count(table: Table, found: Found) -> None:
     """A count in the header of a table is not that of the table.
 
-    ## What it does
     Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the rows and the labels that there are.
 
-    ## Why is this bad
     Of a storage file of version 1 OpenSim reads as many rows as the header says, and takes numbers by `nColumns` from
     one line to the next. A marker file with another number of labels is refused. Where OpenSim does not look at a
     count, it is a warning.
 
-    ## Example
     ```sto
       knee
       version=1
@@ -195,15 +189,12 @@ def table_count(table: Table, found: Found) -> None:
 def table_setting(table: Table, found: Found) -> None:
     """A setting in the header of a table has a value that OpenSim does not know.
 
-    ## What it does
     Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at `version`, `DataType`,
     and of marker files at `Units` (m, cm, mm) and `DataRate`, which is compared with the times (for information).
 
-    ## Why is this bad
     For OpenSim `inDegrees=true` is no: the angles are taken for radians without a word. Unknown units make it refuse
     the file.
 
-    ## Example
     ```sto
       knee
       version=1
@@ -286,17 +277,14 @@ def _is_positive(text: str) -> bool:
 def column_label(table: Table, found: Found) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
-    ## What it does
     The first column of a storage file is `time`, in small letters. Every column has a label of its own. Labels of
     markers have no blanks, every marker has one, and the time and the frame before them are called `Time` and `Frame#`.
     In a storage file of version 2 or 3 tabs separate the labels (a warning).
 
-    ## Why is this bad
     Without a column `time` OpenSim refuses the table. Of two columns with one label it finds the first (a warning), and
     takes no loads from them; of two markers with one name it refuses the file. A blank makes two labels of one, so that
     all that follow name the wrong columns.
 
-    ## Example
     ```sto
       knee
       version=1

@@ -33,14 +33,11 @@ _LATE: Final = (
 def syntax_error(subject: Subject, found: Found) -> None:
     """The text is not well-formed XML.
 
-    ## What it does
     Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that was cut off.
 
-    ## Why is this bad
     OpenSim cannot load the file. The tags and values before the place are still checked; what follows is not, since
     nobody can tell which element it belongs to, nor are references, which may lead there.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -64,15 +61,12 @@ def _checked(subject: Subject) -> str:
 def unused_ignore(subject: Subject, found: Found) -> None:
     """A comment ignores what is not there.
 
-    ## What it does
     Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place. Such a comment speaks
     of its own line, or alone on a line of the element that follows, or before the root element of the whole file. A
     line `osimlite: ignore CODE` in the header of a table speaks of the whole table.
 
-    ## Why is this bad
     The fault was mended and the comment was forgotten; it would hide the next one.
 
-    ## Example
     ```xml
       <Body name="thigh">
     -     <!-- osimlite: ignore OSIM203 -->
@@ -88,22 +82,18 @@ def unused_ignore(subject: Subject, found: Found) -> None:
 def encoding(subject: Subject, found: Found) -> None:
     """The bytes are not in the encoding that the file declares.
 
-    ## What it does
     Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then read as Windows
     text (cp1252). A file in UTF-16 or UTF-32 is an error.
 
-    ## Why is this bad
     OpenSim copies the bytes unseen, but every other XML reader refuses the file, and names with accents differ
     between programs. Of two bytes for a letter it understands none, and cannot load the file. Save it as UTF-8.
 
-    ## Example
-    ```latin-1
-    <credits>Müller, 2016</credits>
-    ```
-
-    ## Use instead
-    ```xml
-    <credits>Müller, 2016</credits>
+    ```document
+    - <?xml version="1.0" encoding="US-ASCII" ?>
+    + <?xml version="1.0" encoding="UTF-8" ?>
+      <OpenSimDocument Version="40600">
+          <Model name="leg"> <credits>Müller, 2016</credits> </Model>
+      </OpenSimDocument>
     ```
     """
     source = subject.source
@@ -133,15 +123,12 @@ def encoding(subject: Subject, found: Found) -> None:
 def not_a_model(subject: Subject, found: Found) -> None:
     """The document is XML, but no OpenSim model.
 
-    ## What it does
     Reports a root element other than `<OpenSimDocument>`, and a document that holds something else than a `<Model>`. So
     it does of what is no ordinary file (a pipe, a device), and of a file of more than 100 MB, or what the setting
     `largest-file` allows: neither is read.
 
-    ## Why is this bad
     OpenSim fails with a message about a missing node, or makes an empty model without a word.
 
-    ## Example
     ```document
     - <OpenSimDokument Version="40600">
     + <OpenSimDocument Version="40600">
@@ -161,15 +148,12 @@ def not_a_model(subject: Subject, found: Found) -> None:
 def document_version(subject: Subject, found: Found) -> None:
     """The document has no version, or none that is read.
 
-    ## What it does
     Reports a `Version` that is missing, no whole number, too old to be read here, newer than OpenSim 4.6 writes, or
     older than a socket in the document that OpenSim takes in newer ones only.
 
-    ## Why is this bad
     OpenSim reads each file by the rules of its version. Without one it fails; from a version it does not know it
     silently takes what it happens to understand (a warning).
 
-    ## Example
     ```document
     - <OpenSimDocument>
     + <OpenSimDocument Version="40600">
@@ -227,13 +211,10 @@ def _late_socket(source: Source) -> str:
 def merge_conflict(subject: Subject, found: Found) -> None:
     """The file holds the marks of a merge that was not finished.
 
-    ## What it does
     Reports every line that begins with seven `<` or seven `>`.
 
-    ## Why is this bad
     OpenSim cannot load the file, and its message points somewhere else.
 
-    ## Example
     ```xml
     - <<<<<<< HEAD
     - <credits>Anna</credits>
@@ -254,13 +235,10 @@ def merge_conflict(subject: Subject, found: Found) -> None:
 def duplicate_attribute(subject: Subject, found: Found) -> None:
     """An element has the same attribute twice.
 
-    ## What it does
     Reports two attributes with the same name.
 
-    ## Why is this bad
     It is not XML. OpenSim takes the last one without a word; every other reader refuses the file.
 
-    ## Example
     ```xml
     - <Marker name="hip" name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -278,13 +256,10 @@ def duplicate_attribute(subject: Subject, found: Found) -> None:
 def second_object(subject: Subject, found: Found) -> None:
     """The document holds more than one object.
 
-    ## What it does
     Reports every element of the document after the first.
 
-    ## Why is this bad
     OpenSim reads the first object and passes over the others in silence.
 
-    ## Example
     ```document
       <OpenSimDocument Version="40600">
           <Model name="walker" />

@@ -18,14 +18,11 @@ from osimlite.text import listed
 def unconnected_body(subject: Subject, found: Found) -> None:
     """A body is not connected to ground.
 
-    ## What it does
     Reports bodies that no chain of joints connects to ground.
 
-    ## Why is this bad
     OpenSim says that it adds a free joint and then crashes, or ends with an invalid body index, as soon as the model
     has two joints. With fewer the body falls freely, which the file does not say.
 
-    ## Example
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
     + <FreeJoint name="ball_free">
@@ -68,16 +65,13 @@ def unconnected_body(subject: Subject, found: Found) -> None:
 def closed_loop(subject: Subject, found: Found) -> None:
     """Joints form a closed loop.
 
-    ## What it does
     Reports each joint that connects bodies which earlier joints have connected already.
 
-    ## Why is this bad
     OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds coordinates and
     multipliers that the file does not mention, and the halves together have another mass or inertia than the body, so
     the model moves otherwise than it says even where the loop closes. Where it does not close in the default pose,
     OpenSim refuses the model. Say what is meant with a constraint.
 
-    ## Example
     ```xml
     - <WeldJoint name="strut">
     -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
@@ -115,15 +109,12 @@ def closed_loop(subject: Subject, found: Found) -> None:
 def parallel_joints(subject: Subject, found: Found) -> None:
     """Two joints connect the same two bodies.
 
-    ## What it does
     Reports the second joint between one pair of bodies.
 
-    ## Why is this bad
     OpenSim adds a hidden body and welds it with a constraint: more coordinates, and a joint that is much stiffer than
     either. If one of the two is ground and the second joint is a weld, free, or the other way round, it refuses the
     model.
 
-    ## Example
     ```xml
     - <PinJoint name="hip_again">
     + <Body name="trunk"> <mass>30</mass> <inertia>1 1 1 0 0 0</inertia> </Body>
@@ -157,14 +148,11 @@ def parallel_joints(subject: Subject, found: Found) -> None:
 def massless_leaf(subject: Subject, found: Found) -> None:
     """A body without mass is the last of its chain.
 
-    ## What it does
     Reports bodies of mass 0 that move and carry nothing with mass.
 
-    ## Why is this bad
     A force on such a body would accelerate it without bounds: the mass matrix is singular, and OpenSim refuses the
     model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or welded to one, a massless body is fine.
 
-    ## Example
     ```xml
     - <Body name="shank"> <mass>0</mass> </Body>
     + <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia> </Body>

@@ -21,16 +21,13 @@ from osimlite.text import listed, nearest
 def unreadable_value(subject: Subject, found: Found) -> None:
     """A value is no number, no switch, or not written as OpenSim reads it.
 
-    ## What it does
     Reports text that OpenSim cannot read: words where a number belongs, `yes` for a switch, commas or brackets
     between the numbers of a vector.
 
-    ## Why is this bad
     OpenSim writes a line to its log, drops the value and keeps the default. A locked coordinate comes loose, a
     contact sphere sits at the origin. Where OpenSim takes what was plainly meant all the same, as false for `no`, it
     is a warning.
 
-    ## Example
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.2, 0</location>
     + <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0 -0.2 0</location>
@@ -59,13 +56,10 @@ def unreadable_value(subject: Subject, found: Found) -> None:
 def wrong_count(subject: Subject, found: Found) -> None:
     """A value has too many or too few numbers.
 
-    ## What it does
     Reports vectors and lists with another count than the property has.
 
-    ## Why is this bad
     Of too few numbers OpenSim keeps none and takes the default; of too many it takes the first ones, or none.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02</inertia> </Body>
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -86,14 +80,11 @@ def wrong_count(subject: Subject, found: Found) -> None:
 def cut_number(subject: Subject, found: Found) -> None:
     """OpenSim reads only the beginning of a number.
 
-    ## What it does
     Reports numbers with something behind them: a decimal comma (`1,5`), a unit (`5kg`), a fraction (`1/3`), hexadecimal
     digits (`0x10`), Fortran's exponent (`1d3`).
 
-    ## Why is this bad
     OpenSim takes the longest beginning that is a number and ignores the rest in silence: `1,5` is 1, `0x10` is 0.
 
-    ## Example
     ```xml
     - <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     + <Body name="thigh"> <mass>8.5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -114,15 +105,12 @@ def cut_number(subject: Subject, found: Found) -> None:
 def empty_value(subject: Subject, found: Found) -> None:
     """An element that should hold a value is empty.
 
-    ## What it does
     Reports empty numbers, vectors and switches, and elements in which an object should stand. Properties that may be
     left out may also be empty.
 
-    ## Why is this bad
     OpenSim writes a line to its log and keeps the default. The mass of a body has none: OpenSim refuses the model. And
     where an object should stand OpenSim then has none, and fails as soon as it needs one.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
     -     <mass_center></mass_center>

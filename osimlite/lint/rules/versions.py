@@ -15,18 +15,15 @@ from osimlite.schema.specs import FieldSpec
 def newer_class(subject: Subject, found: Found) -> None:
     """OpenSim has a class or a property only after the version that is aimed at.
 
-    ## What it does
     Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the version that the setting
     `target-version`, or the option `--target-version`, names: one of 4.0 to 4.6. Says which version has them first, and
     what a property was called before. Properties that say no more than the default are told for information, and so is
     a number of the format that is too new: no OpenSim refuses a file for it.
 
-    ## Why is this bad
     In a set (bodies, joints, forces ...) OpenSim refuses to load an object of an unknown class; elsewhere it leaves the
     object out. Unknown properties it drops without a word. The number of the format hardly tells: from 4.0 to 4.4 and
     from 4.5.1 to 4.6 it is the same.
 
-    ## Example
     ```xml
     - <CoordinateLinearStopForce name="stop">
     -     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <stiffness>100</stiffness>

@@ -21,15 +21,12 @@ from osimlite.text import nearest
 def control_function_count(subject: Subject, found: Found) -> None:
     """A prescribed controller has not one function for each of its actuators.
 
-    ## What it does
     Compares the number of control functions with the number of actuators. Controllers that read their controls from a
     file are left out.
 
-    ## Why is this bad
     The first function drives the first actuator, and so on; names play no part. OpenSim refuses the model where the
     numbers differ.
 
-    ## Example
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
       <PrescribedController name="drive">
@@ -62,15 +59,12 @@ def control_function_count(subject: Subject, found: Found) -> None:
 def broken_input(subject: Subject, found: Found) -> None:
     """An input names an output that does not exist.
 
-    ## What it does
     Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and one of its outputs
     of the type that the input takes.
 
-    ## Why is this bad
     OpenSim refuses the model when it is connected. Paths are absolute or begin at the component with the input. It
     also refuses an input of a geometry that a frame draws.
 
-    ## Example
     ```xml
       <components>
           <TableReporter__double_ name="table">
@@ -102,13 +96,10 @@ def broken_input(subject: Subject, found: Found) -> None:
 def connected_twice(subject: Subject, found: Found) -> None:
     """A list of sockets names the same component twice.
 
-    ## What it does
     Reports every mention of an actuator after the first in the list of one controller.
 
-    ## Why is this bad
     OpenSim refuses the model when it is connected.
 
-    ## Example
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
       <PrescribedController name="drive">

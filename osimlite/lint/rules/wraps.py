@@ -22,15 +22,12 @@ def _wraps(path: GeometryPath) -> list[PathWrap]:
 def swallowed_point(subject: Subject, found: Found) -> None:
     """A point of a path lies inside a surface that the path wraps around.
 
-    ## What it does
     Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an ellipsoid, and inside it,
     within the `range` of the wrap.
 
-    ## Why is this bad
     OpenSim lets no piece of a path wrap that begins or ends inside: the path goes straight through the surface, in
     every pose and without a message. A point may be inside by less than a millimetre, after scaling for instance.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
           <WrapObjectSet name="wrapobjectset">
@@ -84,16 +81,13 @@ def swallowed_point(subject: Subject, found: Found) -> None:
 def wrap_range(subject: Subject, found: Found) -> None:
     """The range of a wrap holds no piece of the path.
 
-    ## What it does
     Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends beyond the last
     point is an error.
 
-    ## Why is this bad
     The path never wraps around the surface; where the range ends before it begins, OpenSim leaves out all wraps of the
     path that follow as well. Beyond the last point it fails as soon as it computes a length, and its message names no
     wrap. Points count from 1, and -1 stands for either end.
 
-    ## Example
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
           <WrapObjectSet name="wrapobjectset">
