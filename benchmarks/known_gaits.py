@@ -23,7 +23,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 from osimlite.simulation import Simulation
-from osimlite.simulation.kernels.merson import STOPPED
+from osimlite.simulation.kernels.record import STOPPED
 from osimlite.simulation.many import Watch, run_many
 
 GRAVITY = 9.81

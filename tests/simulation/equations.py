@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels import layout, record
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.table import LAW_NUMBERS
 
@@ -61,10 +61,10 @@ class Equations:
         first = layout.WORK_HEAD
         structure = np.zeros(layout.LAWS + len(LAW_NUMBERS), dtype=np.int64)
         structure[[layout.FREEDOMS, layout.STATE_SIZE, layout.WORK_STATE]] = n, size, first
-        structure[layout.WORK_SIZE] = first + merson.STATES * size
+        structure[layout.WORK_SIZE] = first + record.STATES * size
         kernels = {layout.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
         packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, {}, (), [], [])
-        self.program = Program(packed, code, ("run_several",))
+        self.program = Program(packed, code, ("run_several", "merson"))
         self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n
         self.counted = (n, n) if counted is None else counted
         names = [f"state {k}" for k in range(size)] if names is None else names

@@ -54,7 +54,7 @@ def test_condensed_equations_are_those_of_all_states(case):
     with Simulation(model, "compiled") as simulation:
         y = np.array(simulation.initial_state({}, {"x": 0.1}, equilibrate=True))
     s = system.structure
-    system.program.method("bdf")
+    system.program.link_responses("bdf")
     room, f, c = np.zeros(condensation_room(1, int(s[layout.RESPONSES]))), np.zeros(len(y)), 2e-3
     rates = partial(rates_at, system)
     jacobian = np.column_stack([(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))])

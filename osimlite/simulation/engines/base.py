@@ -9,6 +9,7 @@ from typing import Self
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
+from osimlite.simulation.integrators import MERSON
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
@@ -26,7 +27,7 @@ class KernelEngine(System):
         UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
     """
 
-    entries = ("evaluate", "run_several")
+    entries = ("evaluate", "run_several", MERSON)
 
     @property
     def counted(self) -> tuple[int, int]:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.simulation import kernels
-from osimlite.simulation.integrators import INITIAL_STEP, MERSON
-from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.integrators import INITIAL_STEP
+from osimlite.simulation.kernels import layout, record
 from osimlite.simulation.kernels.condensation import condensation_room
+from osimlite.simulation.kernels.method import ERRORS
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_MODULES
 from osimlite.simulation.many import BatchOptions
@@ -39,7 +40,7 @@ class Batch:
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
-        counts: see :mod:`osimlite.simulation.kernels.merson` (W, 6).
+        counts: see :mod:`osimlite.simulation.kernels.record` (W, 6).
         states: at the end (W, y).
         endings: of the runs (W,).
         reports: states at the times (W, r, y), not a number after the end of a run.
@@ -69,28 +70,17 @@ class Batch:
         self._engine, self._kinds, self._levels = engine, kinds, levels
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
-        event = 3 + size * options.event_states
-        self._sizes, self._settings = (
-            np.zeros(merson.SIZES, dtype=np.int64),
-            np.array((options.to, options.accuracy)),
-        )
-        self._sizes[: merson.START_HOLDS] = (
-            *engine.counted,
-            options.most_tries,
-            len(self._times),
-            options.most_events,
-            event,
-            len(kinds),
-            most_logged,
-        )
-        s = engine.structure
-        self._room = int(s[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
-        self._sizes[merson.START_HOLDS] = start_holds
-        if options.integrator != MERSON:
-            method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
-            self._sizes[merson.METHOD :] = engine.program.method(options.integrator), self._room
-            self._room += method.HEAD + method.STATES * size
+        self._settings = options.to, options.accuracy, *engine.counted
+        s, event, program = engine.structure, 3 + size * options.event_states, engine.program
+        method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
+        self._method_at = int(s[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
+        self._room = self._method_at + method.HEAD + method.STATES * size
+        if method.IS_IMPLICIT:
+            program.link_responses(options.integrator)
             self._room += condensation_room(int(s[layout.FREEDOMS]), int(s[layout.RESPONSES]))
+        sizes = options.most_tries, len(self._times), options.most_events, event, len(kinds), most_logged
+        address = program.code.address(options.integrator)
+        self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
         self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
@@ -100,18 +90,19 @@ class Batch:
 
     def allow(self, steps: int) -> None:
         """Let the next call end after so many steps, or when the log is full."""
-        self._sizes[merson.MOST_LOGGED] = min(steps, len(self.log))
+        self._sizes[record.MOST_LOGGED] = min(steps, len(self.log))
 
     def room(self) -> Floats:
-        """What a call of `run` works on; an implicit method goes on from what it has left there."""
+        """What a call of `run` works on; a method goes on from what it has left there."""
         return np.zeros(self._room)
 
     def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
         """Compute the runs from `first` up to `last`; other threads compute others in rooms of theirs."""
         vectors = self._vectors
         size = self.states.shape[1]
-        first_error = int(self._engine.structure[layout.WORK_STATE]) + merson.ERRORS * size
+        first_error = int(self._engine.structure[layout.WORK_STATE]) + ERRORS * size
         self.errors = room[first_error : first_error + size]
+        room[self._method_at :][: len(self._settings)] = self._settings
         program = self._engine.program
         program.run(
             program.code.entry("run_several"),
@@ -120,7 +111,6 @@ class Batch:
             room,
             vectors.shape[1] if len(vectors) > 1 else 0,
             self._sizes,
-            self._settings,
             self.clocks,
             self.counts,
             self.states,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from osimlite.errors import SettingError, SimulationError
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP, INTEGRATORS, MERSON, shortest_step, weight
-from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels import layout, record
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.states import cubic
 from osimlite.simulation.many import BatchOptions
@@ -33,7 +33,7 @@ class ControlledSteps(Stepper):
     Merson's method propagates a fourth-order solution and estimates its error from an embedded third-order one
     (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is taken
     if the norm of the error is at most `accuracy`, and repeated smaller if not. With the same derivatives, the steps
-    are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.simulation.kernels.merson`), many in one call
+    are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.simulation.kernels.runs`), many in one call
     where a table of states is asked for.
 
     The methods for stiff motion, :mod:`osimlite.simulation.kernels.multistep` and `rosenbrock`, keep the same norm of
@@ -133,14 +133,14 @@ class ControlledSteps(Stepper):
             most_logged=LOGGED_STEPS,
             start_holds=True,
         )
-        batch.counts[0, : merson.REPORTED] = self.taken, self.attempted, self.evaluations
+        batch.counts[0, : record.REPORTED] = self.taken, self.attempted, self.evaluations
         batch.reports[0, : bisect_right(times, self.time)] = self.state
         return batch
 
     def _calls(self, batch: Batch) -> Iterator[float]:
         """Take steps until the last report is made; yields the mean length of the steps of each call, s."""
-        ending, steps = merson.FULL, FIRST_STEPS
-        while ending == merson.FULL:
+        ending, steps = record.FULL, FIRST_STEPS
+        while ending == record.FULL:
             started, before, taken = perf_counter(), self.time, self.taken
             ending = self._call(batch, steps)
             steps = min(max(1, int(steps * min(8.0, CALL_SECONDS / (perf_counter() - started)))), LOGGED_STEPS)
@@ -149,19 +149,19 @@ class ControlledSteps(Stepper):
     def _call(self, batch: Batch, steps: int) -> int:
         """Take so many steps at most; returns how that ended."""
         (count,) = batch.counts
-        count[merson.LOGGED] = 0
+        count[record.LOGGED] = 0
         batch.allow(steps)
         if self._room is None:
             self._room = batch.room()
         batch.run(self._room)
-        (ending,), logged = batch.endings.tolist(), int(count[merson.LOGGED])
+        (ending,), logged = batch.endings.tolist(), int(count[record.LOGGED])
         log = batch.log[:logged].copy(), batch.forces[:logged].copy()
-        clock, state, counts = batch.clocks[0].tolist(), batch.states[0].tolist(), count[: merson.REPORTED].tolist()
+        clock, state, counts = batch.clocks[0].tolist(), batch.states[0].tolist(), count[: record.REPORTED].tolist()
         # Ctrl-C comes between calls of functions: with none here, all of these are set or none is.
         self._put_off += (log,)
         (self.time, self._next_step), self.state = clock, state
         self.taken, self.attempted, self.evaluations = counts
-        if ending == merson.FAILED:
+        if ending == record.FAILED:
             self._explain(batch.errors.tolist())
         return int(ending)
 

@@ -214,13 +214,12 @@ class Program:
         self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
         self._kept.append(kept)
 
-    def method(self, name: str) -> int:
-        """Address of an implicit method, which not everybody asks for, with all that it needs made ready."""
-        self.code.make_ready((name, *dict.fromkeys(self._responses.values())))
+    def link_responses(self, method: str) -> None:
+        """Make ready an implicit method and the derivatives that it needs, which not everybody asks for."""
+        self.code.make_ready((method, *dict.fromkeys(self._responses.values())))
         for place, kernel in self._responses.items():
             if not self.ints[place]:
                 self._link(place, kernel)
-        return self.code.address(name)
 
     def link_equilibria(self) -> None:
         """Make ready what brings states into equilibrium, which not everybody asks for."""

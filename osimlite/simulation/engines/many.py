@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.errors import OsimliteError
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.kernels import layout, merson
+from osimlite.simulation.kernels import layout, record
 from osimlite.simulation.kernels.contacts import RADIUS
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.many import BatchOptions
@@ -45,7 +45,7 @@ def run_many(engine: CompiledEngine, states: ArrayLike, options: BatchOptions, n
     with ThreadPoolExecutor(options.threads or os.cpu_count()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
-    kept = [rows[:total] for rows, total in zip(batch.events, batch.counts[:, merson.EVENTS], strict=True)]
+    kept = [rows[:total] for rows, total in zip(batch.events, batch.counts[:, record.EVENTS], strict=True)]
     named = [[(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()] for rows in kept]
     at_events = [rows[:, 3:] for rows in kept] if options.event_states else []
     return Runs(
@@ -105,17 +105,17 @@ def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Fl
             place = mechanism.coordinate_index(watch.coordinate)
             if place not in engine.order:
                 raise OsimliteError(f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked")
-            kinds[row] = merson.COORDINATE, engine.order.index(place), watch.stops
+            kinds[row] = record.COORDINATE, engine.order.index(place), watch.stops
             levels[row, 6] = watch.level
         elif watch.contact:
             if watch.contact not in engine.contacts:
                 near = did_you_mean(watch.contact, engine.contacts)
                 raise OsimliteError(f"the model has no contact '{watch.contact}'{near}")
-            kinds[row] = merson.TOUCH, engine.contacts.index(watch.contact), watch.stops
+            kinds[row] = record.TOUCH, engine.contacts.index(watch.contact), watch.stops
         else:
             body, frame = mechanism.placement(watch.body)
             link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]
             station = (placed @ frame @ np.array((*watch.station, 1.0)))[:3]
-            kinds[row] = merson.HEIGHT, link, watch.stops
+            kinds[row] = record.HEIGHT, link, watch.stops
             levels[row] = (*station, *watch.direction, watch.level)
     return kinds, levels

@@ -6,6 +6,7 @@ from math import inf, isfinite, sqrt
 
 from osimlite.simulation.integrators import weight
 from osimlite.simulation.kernels.layout import CONSTRAINED, FREEDOMS, LAWS, OK, PROJECT, SCRATCH, STATE_SIZE, TIME
+from osimlite.simulation.kernels.method import ACCEPTED, COUNTED_Q, COUNTED_U
 from osimlite.simulation.kernels.pointers import Floats, Ints, call
 
 
@@ -17,29 +18,23 @@ def projected(
     return call(s[LAWS + s[s[CONSTRAINED] + PROJECT]], s, x, w, y, off, has_errors) == OK
 
 
-def projected_error(
-    s: Ints,
-    x: Floats,
-    w: Floats,
-    t: float,
-    y0: Floats,
-    y1: Floats,
-    errors: Floats,
-    accuracy: float,
-    count_q: int,
-    count_u: int,
-    is_strict: int,
+def step_error(
+    s: Ints, x: Floats, w: Floats, t1: float, y0: Floats, y1: Floats, errors: Floats, h: Floats, is_strict: int
 ) -> float:
-    """Move the end of a step to where the constraints hold; the norm of the error there."""
-    tolerance = accuracy / 10.0
+    """The norm of the errors of a step, once its end was moved to where the constraints hold; see `error_norm`."""
+    error = error_norm(s, y0, errors, h, is_strict)
+    # As in Simbody: what half a step would not mend, neither does the projection.
+    if s[CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
+        return error
+    tolerance = h[ACCEPTED] / 10.0
     for k in range(s[STATE_SIZE]):
         errors[k] = abs(errors[k])
-    if not projected(s, x, w, t, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))):
+    if not projected(s, x, w, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))):
         return inf
-    return error_norm(s, y0, errors, count_q, count_u, is_strict)
+    return error_norm(s, y0, errors, h, is_strict)
 
 
-def error_norm(s: Ints, y0: Floats, errors: Floats, count_q: int, count_u: int, is_strict: int) -> float:
+def error_norm(s: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: int) -> float:
     """Largest of three root mean squares: errors of q as they are, of u and z relative to y0 where |y0| > 1.
 
     That is Simbody's norm. A fiber among those of many muscles can err much in it. An explicit method brings such a one
@@ -49,8 +44,7 @@ def error_norm(s: Ints, y0: Floats, errors: Floats, count_q: int, count_u: int, 
         s: the mechanism.
         y0: state at the start of the step.
         errors: of its end.
-        count_q: what the sum of the squares of q is divided by.
-        count_u: what that of u is divided by.
+        h: place of the method.
         is_strict: whether the largest error of z counts.
     """
     n, size = s[FREEDOMS], s[STATE_SIZE]
@@ -64,8 +58,8 @@ def error_norm(s: Ints, y0: Floats, errors: Floats, count_q: int, count_u: int, 
         weighted = weight(y0[k]) * errors[k]
         square = weighted * weighted
         of_z = max(of_z, square) if is_strict else of_z + square
-    of_q /= max(count_q, 1)
-    of_u /= max(count_u, 1)
+    of_q /= max(h[COUNTED_Q], 1.0)
+    of_u /= max(h[COUNTED_U], 1.0)
     if not is_strict:
         of_z /= max(size - 2 * n, 1)
     return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf

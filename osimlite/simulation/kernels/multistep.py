@@ -15,11 +15,11 @@ from itertools import pairwise
 from math import inf, sqrt
 
 from osimlite.simulation.kernels.condensation import condense, correct, linearise, product
-from osimlite.simulation.kernels.error_control import error_norm, projected_error
-from osimlite.simulation.kernels.implicit import (
+from osimlite.simulation.kernels.error_control import error_norm, step_error
+from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
+from osimlite.simulation.kernels.method import (
     ACCEPTED,
-    COUNTED_Q,
-    COUNTED_U,
+    ERRORS,
     EVALUATED,
     HAS_DERIVATIVE,
     LAST_TIME,
@@ -27,8 +27,6 @@ from osimlite.simulation.kernels.implicit import (
     NEXT_STEP,
     REACHED,
 )
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, CONSTRAINED, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
-from osimlite.simulation.kernels.merson import ERRORS
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.states import is_finite
 
@@ -39,6 +37,7 @@ matrices (8, 8) that change the step, and of a column."""
 WIDTH = 8
 HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
 
+IS_IMPLICIT = True
 BDF, ADAMS = 0, 1
 MOST_ORDER = 5, 7
 ROWS = max(MOST_ORDER) + 3
@@ -115,10 +114,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
     if iterations > 0:
         for k in range(size):
             errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
-        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
-        # As in Simbody: what half a step would not mend, neither does the projection.
-        if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
+        error = step_error(s, x, w, t1, y0, y1, errors, h, 1)
     if not error <= accuracy:
         refuse(size, method, h, rows, error / accuracy)
         return OK
@@ -148,7 +144,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
 def begin(s: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
     """Start with order 1, and a step that changes little."""
     size = s[STATE_SIZE]
-    speed = error_norm(s, y0, at(y0, size), int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
+    speed = error_norm(s, y0, at(y0, size), h, 1)
     h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
     h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
     for k in range(size):
@@ -198,7 +194,7 @@ def newton(
         for k in range(size):
             step[k] = c * f1[k] - psi[k] - d[k]
         correct(s, c, room, step)
-        length = error_norm(s, y0, step, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
+        length = error_norm(s, y0, step, h, 1)
         if iteration > 0:
             h[RATE] = max(0.3 * h[RATE], length / before, SLOW)
             if length > 2.0 * before:
@@ -235,7 +231,7 @@ def choose(
             continue
         for k in range(size):
             errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
-        found = reach(error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1) / accuracy, other)
+        found = reach(error_norm(s, y0, errors, h, 1) / accuracy, other)
         if found > factor:
             best, factor = other, found
     factor = min(safety * factor, GROW)

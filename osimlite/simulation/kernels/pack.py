@@ -20,9 +20,9 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places, Response
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
-from osimlite.simulation.kernels.merson import STATES
 from osimlite.simulation.kernels.pack_constraints import constraint_record, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.record import STATES
 from osimlite.simulation.kernels.table import LAW_NUMBERS
 from osimlite.simulation.states import StateLayout
 

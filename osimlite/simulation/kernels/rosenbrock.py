@@ -10,11 +10,11 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.simulation.kernels.condensation import condense, correct, linearise
-from osimlite.simulation.kernels.error_control import error_norm, projected_error
-from osimlite.simulation.kernels.implicit import (
+from osimlite.simulation.kernels.error_control import step_error
+from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
+from osimlite.simulation.kernels.method import (
     ACCEPTED,
-    COUNTED_Q,
-    COUNTED_U,
+    ERRORS,
     EVALUATED,
     HAS_DERIVATIVE,
     LAST_TIME,
@@ -22,14 +22,12 @@ from osimlite.simulation.kernels.implicit import (
     NEXT_STEP,
     REACHED,
 )
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, CONSTRAINED, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
-from osimlite.simulation.kernels.merson import ERRORS
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.states import copy, is_finite
 
 IS_NEW = MEMORY
 """Whether the derivatives are those at the start of the step."""
-HEAD = MEMORY + 1
+HEAD, IS_IMPLICIT = MEMORY + 1, True
 
 STAGES = 4
 STATES = STAGES
@@ -97,10 +95,7 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
             for i in range(STAGES):
                 y1[k] += ENDS[i] * stages[size * i + k]
                 errors[k] += MISSES[i] * stages[size * i + k]
-        error = error_norm(s, y0, errors, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
-        # As in Simbody: what half a step would not mend, neither does the projection.
-        if s[CONSTRAINED] > 0 and error <= 16.0 * accuracy:
-            error = projected_error(s, x, w, t1, y0, y1, errors, accuracy, int(h[COUNTED_Q]), int(h[COUNTED_U]), 1)
+        error = step_error(s, x, w, t1, y0, y1, errors, h, 1)
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of the time, the step was longer than it was to be.

@@ -16,7 +16,8 @@ from typing import Any
 LAW_MODULES = {
     "evaluate": "dynamics",
     "equilibrate": "dynamics",
-    "run_several": "merson",
+    "run_several": "runs",
+    "merson": "merson",
     "adams": "multistep",
     "bdf": "multistep",
     "rosenbrock": "rosenbrock",
