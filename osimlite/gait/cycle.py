@@ -63,8 +63,7 @@ def step_matrix(step_map: StepMap, state: ArrayLike, difference: float = DIFFERE
     moves = difference * np.eye(len(reduced))
     images = step_map(step_map.expand(np.concatenate((reduced + moves, reduced - moves)))).states
     ahead, back = np.split(step_map.reduce(images), 2)
-    slope: Floats = (ahead - back).T / (2.0 * difference)
-    return slope
+    return (ahead - back).T / (2.0 * difference)
 
 
 def find_cycle(

@@ -135,14 +135,12 @@ def upright(states: Floats, neutral: Floats) -> Floats:
     for place in range(len(neutral)):
         if np.linalg.matrix_rank(neutral[[*chosen, place]], tol=1e-6) > len(chosen):
             chosen.append(place)
-    moved: Floats = states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
-    return moved
+    return states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
 
 
 def _centres(engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None) -> Floats:
     """Centres of the contacts' second surfaces (k, P, 3), in ground."""
-    places: Floats = engine.contact_places(states, numbers, rows)[..., 6:]
-    return places
+    return engine.contact_places(states, numbers, rows)[..., 6:]
 
 
 def _contacts(engine: BatchEngine, footing: FootContacts) -> Ints:

@@ -162,8 +162,7 @@ class StepMap:
         images = self._single(state[None], 1)
         if np.isnan(images.states).any():
             raise OsimliteError(f"'{self.engine.mechanism.name}' makes one step only; give another start")
-        second: Floats = images.states[0]
-        return second
+        return images.states[0]
 
     def land(self, state: Floats, foot: int) -> Floats:
         """A state (y,) a billionth of a second from a heel strike, moved onto it."""
@@ -173,8 +172,7 @@ class StepMap:
         _, depths = along_slope(self.engine, np.array([state, state + dt * rate]))
         touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
         speed = (depths[1, touching] - depths[0, touching]) / dt
-        moved: Floats = state - depths[0, touching] / speed * rate
-        return moved
+        return state - depths[0, touching] / speed * rate
 
     # ----------------------------------------------------------------------------------------------- images
     def __call__(self, states: ArrayLike) -> Images:
@@ -223,10 +221,8 @@ class StepMap:
     # -------------------------------------------------------------------------------------------- coordinates
     def reduce(self, states: ArrayLike) -> Floats:
         """States without the neutral directions (..., y - m)."""
-        reduced: Floats = np.asarray(states, dtype=float) @ self.basis
-        return reduced
+        return np.asarray(states, dtype=float) @ self.basis
 
     def expand(self, reduced: ArrayLike) -> Floats:
         """States (..., y) from reduced ones; along the neutral directions they are where `start` is."""
-        states: Floats = np.asarray(reduced) @ self.basis.T + self.start @ self.neutral @ self.neutral.T
-        return states
+        return np.asarray(reduced) @ self.basis.T + self.start @ self.neutral @ self.neutral.T

@@ -79,7 +79,7 @@ def _function(source: str) -> Callable[..., Any]:
         found = getattr(module, name, None)
         if not callable(found):
             raise OsimliteError(f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}")
-        return found  # type: ignore[no-any-return]
+        return found
     return _only_function(module, place)
 
 

@@ -192,8 +192,7 @@ class _Search:
         """How the multipliers' pull on the free coordinates changes along a direction of them (f,)."""
         change = 1e-6 * self._spread(direction)
         ahead, behind = (self._rows(self._state(place)).T @ multipliers for place in (q + change, q - change))
-        result: Array = (ahead - behind) / 2e-6
-        return result
+        return (ahead - behind) / 2e-6
 
     def _spread(self, step: Array) -> Array:
         full = np.zeros(len(self.wanted))

@@ -7,11 +7,11 @@ are given in the frames of the bodies; -1 stands for ground.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from osimlite.multibody.constraints import Bond, Constraint, Holonomic
+from osimlite.multibody.constraints import Bond, Bonded
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.parts import FramePlacement, StationPlacement
 from osimlite.multibody.spatial import Array, cross, skew
@@ -83,18 +83,25 @@ def joined(*bonds: Bond) -> Bond:
     return Bond(*(np.concatenate(parts) for parts in zip(*bonds, strict=True)))
 
 
-@dataclass(frozen=True, eq=False)
-class PointConstraint(Holonomic):
-    """Keeps two stations on each other, as a ball joint would."""
+P = TypeVar("P", StationPlacement, FramePlacement)
 
-    first: StationPlacement
-    second: StationPlacement
-    name: str = "point constraint"
+
+@dataclass(frozen=True, eq=False)
+class _Between(Bonded, Generic[P]):
+    first: P
+    second: P
 
     @property
     def bodies(self) -> tuple[int, ...]:
         """The two bodies."""
         return self.first.body, self.second.body
+
+
+@dataclass(frozen=True, eq=False)
+class PointConstraint(_Between[StationPlacement]):
+    """Keeps two stations on each other, as a ball joint would."""
+
+    name: str = "point constraint"
 
     def bond(self, state: Kinematics) -> Bond:
         """The vector between the stations vanishes."""
@@ -102,18 +109,11 @@ class PointConstraint(Holonomic):
 
 
 @dataclass(frozen=True, eq=False)
-class DistanceConstraint(Holonomic):
+class DistanceConstraint(_Between[StationPlacement]):
     """Keeps two stations at a distance (m), as a rod between ball joints would."""
 
-    first: StationPlacement
-    second: StationPlacement
     distance: float
     name: str = "distance constraint"
-
-    @property
-    def bodies(self) -> tuple[int, ...]:
-        """The two bodies."""
-        return self.first.body, self.second.body
 
     def bond(self, state: Kinematics) -> Bond:
         """The length of the vector between the stations is the distance."""
@@ -134,7 +134,7 @@ class DistanceConstraint(Holonomic):
 
 
 @dataclass(frozen=True, eq=False)
-class PointOnLineConstraint(Holonomic):
+class PointOnLineConstraint(Bonded):
     """Keeps a station of the follower on a line fixed in a body.
 
     Attributes:
@@ -166,17 +166,10 @@ class PointOnLineConstraint(Holonomic):
 
 
 @dataclass(frozen=True, eq=False)
-class WeldConstraint(Holonomic):
+class WeldConstraint(_Between[FramePlacement]):
     """Keeps two frames on each other."""
 
-    first: FramePlacement
-    second: FramePlacement
     name: str = "weld constraint"
-
-    @property
-    def bodies(self) -> tuple[int, ...]:
-        """The two bodies."""
-        return self.first.body, self.second.body
 
     def bond(self, state: Kinematics) -> Bond:
         """The origins coincide, and each axis of one frame is square to the next axis of the other."""
@@ -190,7 +183,7 @@ class WeldConstraint(Holonomic):
 
 
 @dataclass(frozen=True, eq=False)
-class RollingConstraint(Constraint):
+class RollingConstraint(Bonded):
     """OpenSim's RollingOnSurfaceConstraint: a roller on a plane that neither slips nor turns about the normal.
 
     The roller's origin stays at `height` along `normal` (3,) of the surface's frame, its Z axis square to the
@@ -215,15 +208,9 @@ class RollingConstraint(Constraint):
         """The height and the turn about the normal."""
         return self._contact(state).errors
 
-    def velocity_equations(self, state: Kinematics) -> tuple[Array, Array]:
-        """The contact persists and does not slip."""
-        bond = joined(self._contact(state), *self._slips(state))
-        return bond.rows, bond.rates
-
-    def acceleration_equations(self, state: Kinematics) -> tuple[Array, Array]:
-        """The contact goes on persisting and not slipping."""
-        bond = joined(self._contact(state), *self._slips(state))
-        return bond.rows, bond.drifts
+    def bond(self, state: Kinematics) -> Bond:
+        """The contact persists and does not slip, which binds only the speeds."""
+        return joined(self._contact(state), *self._slips(state))
 
     def _contact(self, state: Kinematics) -> Bond:
         centre, foot = (station(state, StationPlacement(body, np.zeros(3))) for body in (self.roller, self.surface))

@@ -46,8 +46,8 @@ class Bond(NamedTuple):
     drifts: Array
 
 
-class Holonomic(Constraint):
-    """A constraint whose equations all bind positions."""
+class Bonded(Constraint):
+    """A constraint that is one bond; unless `position_errors` says otherwise, all its equations bind positions."""
 
     @abstractmethod
     def bond(self, state: Kinematics) -> Bond:
@@ -97,7 +97,7 @@ class Lock:
 
 
 @dataclass(frozen=True)
-class Prescribed(Holonomic):
+class Prescribed(Bonded):
     """Makes one coordinate follow a function of time (s)."""
 
     bodies: ClassVar[tuple[int, ...]] = ()
@@ -118,7 +118,7 @@ class Prescribed(Holonomic):
 
 
 @dataclass(frozen=True)
-class Coupler(Holonomic):
+class Coupler(Bonded):
     """Makes one coordinate a function of others."""
 
     bodies: ClassVar[tuple[int, ...]] = ()

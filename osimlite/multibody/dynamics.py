@@ -91,13 +91,11 @@ class MassCentres:
 
     def velocities(self) -> Array:
         """The velocities of the mass centres in ground (b, 3)."""
-        result: Array = self.moving @ self.state.u
-        return result
+        return self.moving @ self.state.u
 
     def positions(self) -> Array:
         """The mass centres in ground (b, 3)."""
-        result: Array = self.state.origins[:-1] + self.arms
-        return result
+        return self.state.origins[:-1] + self.arms
 
     def kinetic_energy(self) -> float:
         """Kinetic energy (J)."""
@@ -163,8 +161,7 @@ def constrained_accelerations(
             return udot
     particular, free = solutions(rows, values)
     reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free)
-    exact: Array = particular + free @ reduced
-    return exact
+    return particular + free @ reduced
 
 
 def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
@@ -191,16 +188,14 @@ def _skews(vectors: Array) -> Array:
 
 def _times(matrices: Array, vectors: Array) -> Array:
     """Each matrix (b, 3, 3) times its vector (b, 3)."""
-    result: Array = (matrices @ vectors[:, :, None])[:, :, 0]
-    return result
+    return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 def _projected(jacobians: Array, loads: Array) -> Array:
     """Sum over the bodies of each Jacobian (b, 3, n), transposed, times its load (b, 3) or loads (b, 3, m)."""
     count, _, size = jacobians.shape
     flat = jacobians.reshape(3 * count, size)
-    result: Array = flat.T @ loads.reshape(3 * count, *loads.shape[2:])
-    return result
+    return flat.T @ loads.reshape(3 * count, *loads.shape[2:])
 
 
 def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array | None) -> Array:

@@ -50,8 +50,7 @@ class Kinematics:
 
     def point(self, body: int, station: Array) -> Array:
         """Position in ground (3,) of a `station` (3,) given in the body's frame."""
-        position: Array = self.origins[body] + self.rotations[body] @ station
-        return position
+        return self.origins[body] + self.rotations[body] @ station
 
     def point_velocity(self, body: int, station: Array) -> Array:
         """Velocity in ground (3,) of a `station` (3,) given in the body's frame."""
@@ -72,8 +71,7 @@ class Kinematics:
 
     def accelerations(self, udot: Array) -> Array:
         """Spatial accelerations of all bodies (b + 1, 6) for the derivatives `udot` (n,) of the speeds."""
-        result: Array = self.biases + self.jacobians @ udot
-        return result
+        return self.biases + self.jacobians @ udot
 
 
 def kinematics(

@@ -192,8 +192,7 @@ class Mechanism:
     def frame_transform(self, frame: str, q: Values) -> Array:
         """Transform (4, 4) in ground of a frame."""
         body, placed = self.placement(frame)
-        result: Array = self.at(q).transform(body) @ placed
-        return result
+        return self.at(q).transform(body) @ placed
 
     def station_position(self, frame: str, station: ArrayLike, q: Values) -> Array:
         """Position (3,) in ground of a point given in a frame (m)."""
@@ -370,8 +369,7 @@ class Mechanism:
 
     def _mean(self, vectors: Array) -> Array:
         """Mean of one vector per body (b, 3), weighted by mass; zero where nothing has mass."""
-        mean: Array = self.inertial[0] @ vectors / (self.total_mass or 1.0)
-        return mean
+        return self.inertial[0] @ vectors / (self.total_mass or 1.0)
 
     def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
         body, placed = self.placement(frame)

@@ -247,8 +247,7 @@ class SphericalMotion(Motion):
             -s1 * r1 * r2 + (s1 * s2 * r2 - c1 * c2 * r1) * r3,
             c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3,
         )
-        bias: Array = -rates @ np.array(drift)
-        return bias
+        return -rates @ np.array(drift)
 
     def _angles(self, q: Array) -> tuple[float, float, float, float]:
         first, second = q[self.coordinates[0]], q[self.coordinates[1]]

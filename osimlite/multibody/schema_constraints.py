@@ -136,8 +136,7 @@ def _direction(vector: tuple[float, float, float], what: str) -> Array:
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
         raise ModelError(f"{what} has no direction; give a vector that is not zero")
-    unit: Array = direction / length
-    return unit
+    return direction / length
 
 
 _READERS: dict[type[SchemaConstraint], Callable[..., Constraint]] = {

@@ -129,8 +129,7 @@ def _smoothed(points: Array, values: Array, half_order: int, error_variance: flo
         return error - error_variance * (2.0 * trace - 1.0)
 
     smoothing = math.exp(_minimum(criterion, -math.log(roughness[half_order:].mean())))
-    smooth: Array = vectors @ (loads / (1.0 + smoothing * roughness))
-    return smooth
+    return vectors @ (loads / (1.0 + smoothing * roughness))
 
 
 def _minimum(function: Callable[[float], float], start: float) -> float:

@@ -38,8 +38,7 @@ def centers_of_mass(system: System, moments: Moments) -> Floats:
     inertia, fixed = system.inertia, system.masses_in_ground
     total = inertia[:, 0] @ moving(system.links_at(moments), inertia[:, 1:4])
     total[:, :3] += sum((mass * center for mass, center in fixed), np.zeros(3))
-    found: Floats = total / (inertia[:, 0].sum() + sum(mass for mass, _ in fixed) or 1.0)
-    return found
+    return total / (inertia[:, 0].sum() + sum(mass for mass, _ in fixed) or 1.0)
 
 
 def stations(system: System, moments: Moments, body: int, location: Floats) -> Floats:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,3 +60,10 @@ class Runs:
     events: list[list[tuple[float, str, bool]]]
     peaks: Floats
     event_states: list[Floats] = field(default_factory=list)
+
+    def of(self, places: Sequence[int] | Ints) -> Runs:
+        """Some of the runs."""
+        chosen: dict[str, Any] = {}
+        for name, rows in vars(self).items():
+            chosen[name] = rows[places] if isinstance(rows, np.ndarray) else [rows[place] for place in places if rows]
+        return Runs(**chosen)

@@ -43,8 +43,7 @@ class StateVariable:
 
 def states_of(element: Any) -> tuple[StateVariable, ...]:
     """The auxiliary states of a force element."""
-    found: tuple[StateVariable, ...] = getattr(element, "states", ())
-    return found
+    return getattr(element, "states", ())
 
 
 def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:

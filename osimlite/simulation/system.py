@@ -145,8 +145,7 @@ class System:
 
     def found(self) -> list[float]:
         """The derivative (y,) of the state; after the stage of forces, generalized forces in the place of udot."""
-        row: list[float] = self._f.tolist()
-        return row
+        return self._f.tolist()
 
     def applied(self, t: float, y: Sequence[float]) -> list[float]:
         """The derivative (y,) at a state, with the applied generalized forces (n,) in the place of udot.
@@ -192,16 +191,14 @@ class System:
             raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
         if status != layout.OK:
             raise self.refusal(status, t, y)
-        row: list[float] = self._y.tolist()
-        return row
+        return self._y.tolist()
 
     def _told(self, item: int) -> str:
         """What an item is that has no solution."""
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
         place, room = self._items[owner][-1]
-        told: str = element.told(self._w[place : place + room].tolist())
-        return told
+        return element.told(self._w[place : place + room].tolist())
 
     def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         """The error for what the kernels say of a state."""
@@ -251,8 +248,7 @@ class System:
     def controls(self) -> list[float]:
         """The controls of all actuators after an evaluation, in the order of `Controls.names`."""
         first = self.structure[layout.WORK_CONTROL]
-        found: list[float] = self._w[first : first + len(self._controls.names)].tolist()
-        return found
+        return self._w[first : first + len(self._controls.names)].tolist()
 
     def touching(self, t: float, y: Sequence[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""

@@ -204,8 +204,7 @@ class CycleSearch:
         variant = self.variants.variant(self.values(fractions))
         if variant.structure != self.variants.given.structure:
             raise OsimliteError("the numbers change the structure of the model; vary others")
-        found: BatchEngine = variant.engine
-        return found
+        return variant.engine
 
     # ---------------------------------------------------------------------------------------- random starts
     def candidates(self, count: int, seed: int, progress: Progress | None = None) -> list[Candidate]:

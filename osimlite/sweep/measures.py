@@ -12,7 +12,7 @@ or an expression, as :mod:`osimlite.sweep.expressions` has them: ``start(Pelvis_
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
@@ -71,6 +71,19 @@ class Batch:
     def quantities(self) -> Mapping[str, Quantity]:
         """What can be looked at during the runs."""
         return quantities(self.engine)
+
+    def part(self, place: int) -> Batch:
+        """One of the runs."""
+        rows = [place]
+        return replace(
+            self,
+            engine_of=lambda _: self.engine_of(place),
+            numbers=None if self.numbers is None else self.numbers[rows],
+            starts=self.starts[rows],
+            runs=self.runs.of(rows),
+            values=self.values[rows],
+            memory={},
+        )
 
 
 @dataclass(frozen=True)
@@ -147,8 +160,7 @@ class Run:
         """What a name in an expression stands for, at the times."""
         if name not in self.quantities:
             raise SettingError(f"a run has no '{name}'{did_you_mean(name, self.quantities)}")
-        found: Floats = self.quantities[name](self.engine, list(zip(self.times, self.states.tolist(), strict=True)))
-        return found
+        return self.quantities[name](self.engine, list(zip(self.times, self.states.tolist(), strict=True)))
 
     @cached_property
     def mechanism(self) -> Any:
@@ -292,4 +304,4 @@ def _function(name: str) -> Callable[[Run], float]:
     found = getattr(module, function, None)
     if not callable(found):
         raise SettingError(f"'{place}' has no function '{function}'{did_you_mean(function, vars(module))}")
-    return found  # type: ignore[no-any-return]
+    return found

@@ -317,23 +317,11 @@ class _Evaluations:
         for place in starts:
             self.pool.submit(place, values[place : place + size])
         blocks: dict[int, Block] = dict(self.pool.result() for _ in starts)
-        ordered = [blocks[place] for place in starts]
-        status = [word for block in ordered for word in block.status]
-        reasons = [word for block in ordered for word in block.reasons]
-        measures = {name: np.concatenate([block.measures[name] for block in ordered]) for name in ordered[0].measures}
-        self.partial.add(
-            [
-                np.arange(first, first + len(values)),
-                np.full(len(values), self.batches),
-                *values.T,
-                status,
-                reasons,
-                np.concatenate([block.times for block in ordered]),
-                *measures.values(),
-            ]
-        )
-        self._note(status, reasons)
-        return list(zip(values.tolist(), status, measures[self.objective].tolist(), strict=True))
+        block = Block.joined([blocks[place] for place in starts])
+        numbers = np.arange(first, first + len(values)), np.full(len(values), self.batches)
+        self.partial.add([*numbers, *values.T, *block.columns])
+        self._note(block.status, block.reasons)
+        return list(zip(values.tolist(), block.status, block.measures[self.objective].tolist(), strict=True))
 
 
 def _finish(

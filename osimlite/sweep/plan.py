@@ -120,8 +120,7 @@ class Plan:
     @staticmethod
     def unpacked(data: bytes) -> Plan:
         """The plan that was packed; only from those whom you would let run programs here."""
-        found: Plan = pickle.loads(zlib.decompress(data))
-        return found
+        return pickle.loads(zlib.decompress(data))
 
     def columns(self, *first: str) -> dict[str, str]:
         """Columns of a table of the runs, after some of whole numbers, and what they hold.

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import get_context
 from queue import SimpleQueue
 from typing import Any, Protocol
@@ -145,17 +146,7 @@ class ProcessPool(_LocalPool):
         packed = plan.packed()
         Runner(plan)
         executor = ProcessPoolExecutor(count, get_context("spawn"))
-        super().__init__(executor, _Packed(packed), count)
-
-
-class _Packed:
-    """Runs samples of a packed plan, wherever it is called."""
-
-    def __init__(self, packed: bytes) -> None:
-        self._packed = packed
-
-    def __call__(self, values: Floats) -> Block:
-        return run_packed(self._packed, values)
+        super().__init__(executor, partial(run_packed, packed), count)
 
 
 class ClusterPool:

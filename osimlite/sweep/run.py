@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import Partial, ResultTable, partial_of, schema, spare
 from osimlite.sweep.runner import Block
 from osimlite.sweep.sampling import Samples
+from osimlite.sweep.variables import Floats
 
 Progress = Callable[[float, float], object]
 """Called with the number of runs that are done, and of all."""
@@ -114,7 +115,7 @@ def sweep(
         better = path.with_suffix(".parquet").name
         raise SettingError(f"the results are a Parquet file, not '{path.name}'; name the file '{better}'")
     wanted = settings(plan, samples)
-    table = schema(columns(plan), wanted)
+    table = schema(plan.columns("run"), wanted)
     # Who goes on with an interrupted sweep was asked before it began.
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
         spare(path, wanted)
@@ -134,11 +135,6 @@ def sweep(
     return outcome
 
 
-def columns(plan: Plan) -> dict[str, str]:
-    """The columns of the results, and what they hold."""
-    return plan.columns("run")
-
-
 class _Work:
     """Gives out samples, and saves what comes back in their order."""
 
@@ -150,8 +146,8 @@ class _Work:
         self.next = self.saved = partial.rows
         self.under_way = 0
         self.size = FIRST_TASK
-        self.done: dict[int, tuple[np.ndarray[Any, Any], Block]] = {}
-        self.values: dict[int, np.ndarray[Any, Any]] = {}
+        self.done: dict[int, tuple[Floats, Block]] = {}
+        self.values: dict[int, Floats] = {}
         self.last_saved = time.monotonic()
 
     def do(self) -> None:
@@ -200,33 +196,18 @@ class _Work:
             there = self.outcome.before + sum(self.outcome.status.values())
             self.progress(there, self.samples.count)
 
+    @defer_sigint()
     def _save(self) -> None:
         """Write the rows before which none is missing."""
-        with defer_sigint():
-            self._write()
-
-    def _write(self) -> None:
-        rows: list[list[Any]] = []
+        values: list[Floats] = []
+        blocks: list[Block] = []
         first = self.saved
         while self.saved in self.done:
-            values, block = self.done.pop(self.saved)
-            rows.append([values, block])
-            self.saved += len(values)
+            own, block = self.done.pop(self.saved)
+            values.append(own)
+            blocks.append(block)
+            self.saved += len(own)
         self.last_saved = time.monotonic()
-        if not rows:
-            return
-        values = np.concatenate([row[0] for row in rows])
-        blocks: list[Block] = [row[1] for row in rows]
-        found: Mapping[str, Any] = {
-            name: np.concatenate([block.measures[name] for block in blocks]) for name in blocks[0].measures
-        }
-        self.partial.add(
-            [
-                np.arange(first, self.saved),
-                *values.T,
-                [status for block in blocks for status in block.status],
-                [reason for block in blocks for reason in block.reasons],
-                np.concatenate([block.times for block in blocks]),
-                *found.values(),
-            ]
-        )
+        if blocks:
+            numbers = np.arange(first, self.saved)
+            self.partial.add([numbers, *np.concatenate(values).T, *Block.joined(blocks).columns])

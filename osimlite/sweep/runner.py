@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,7 +39,22 @@ class Block:
     reasons: list[str | None]
     times: Floats
     measures: dict[str, Floats]
-    seconds: float
+    seconds: float = 0.0
+
+    @classmethod
+    def joined(cls, blocks: Sequence[Block]) -> Block:
+        """Several of them in one."""
+        return cls(
+            [word for block in blocks for word in block.status],
+            [words for block in blocks for words in block.reasons],
+            np.concatenate([block.times for block in blocks]),
+            {name: np.concatenate([block.measures[name] for block in blocks]) for name in blocks[0].measures},
+        )
+
+    @property
+    def columns(self) -> list[Any]:
+        """What stands behind the values of the variables in a table of results."""
+        return [self.status, self.reasons, self.times, *self.measures.values()]
 
 
 class _Sample(NamedTuple):
@@ -103,7 +117,6 @@ class Runner:
             [None] * count,
             np.full(count, np.nan),
             {measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures},
-            0.0,
         )
         groups: dict[bytes, list[_Sample]] = {}
         for place, row in enumerate(values.tolist()):
@@ -146,10 +159,10 @@ class Runner:
         rows = np.array([group[number].place for number in good])
         batch = Batch(
             engine,
-            partial(_engine, chosen),
+            lambda number: chosen[number].engine,
             self._numbers(chosen),
             starts[good],
-            _chosen(runs, good),
+            runs.of(good),
             values[rows],
             [item.name for item in self.plan.variables],
             self._report_times,
@@ -173,7 +186,7 @@ class Runner:
             if len(rows) > 1:
                 # One by one, to find which run it is.
                 for number, row in enumerate(rows):
-                    self._measure(made, _part(batch, number), np.array([row]), block)
+                    self._measure(made, batch.part(number), np.array([row]), block)
             else:
                 block.status[rows[0]] = FAILED
                 block.reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
@@ -265,35 +278,3 @@ class Runner:
                 peaks[number, contacts.index(name)] = largest["force_N"], largest["time_s"]
         still = np.zeros(size, dtype=np.int64)
         return Runs(times, states, still, np.zeros((size, 3), dtype=np.int64), reports, events, peaks), why
-
-
-def _engine(variants: Sequence[Variant], place: int) -> Any:
-    return variants[place].engine
-
-
-def _chosen(runs: Runs, places: Any) -> Runs:
-    return Runs(
-        runs.times[places],
-        runs.states[places],
-        runs.endings[places],
-        runs.counts[places],
-        runs.reports[places],
-        [runs.events[place] for place in places],
-        runs.peaks[places],
-        [runs.event_states[place] for place in places] if runs.event_states else [],
-    )
-
-
-def _part(batch: Batch, place: int) -> Batch:
-    """One run of several."""
-    places = np.array([place])
-    return Batch(
-        batch.engine,
-        lambda number: batch.engine_of(place),
-        None if batch.numbers is None else batch.numbers[places],
-        batch.starts[places],
-        _chosen(batch.runs, places),
-        batch.values[places],
-        batch.names,
-        batch.report_times,
-    )

@@ -65,8 +65,7 @@ class Samples:
         if self.sampler == "random":
             return numbers
         layers = [_shuffled(first, last, self.count, self.seed, column) for column in range(len(varied))]
-        found: Floats = (np.stack(layers, axis=1) + numbers) / self.count
-        return found
+        return (np.stack(layers, axis=1) + numbers) / self.count
 
     def _grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
         """The last variable changes fastest."""

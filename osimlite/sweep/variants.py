@@ -145,8 +145,7 @@ class Variants:
                     raise SettingError(f"'{path}' is locked in this model, so that it has no start")
                 number = engine.order.index(coordinate)
                 row[number + (len(engine.order) if is_speed else 0)] = values[place]
-        started: Floats = self.started(engine, [variant], row[None])[0]
-        return started
+        return self.started(engine, [variant], row[None])[0]
 
     def started(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
         """States (k, y) of as many models, with the auxiliary ones where they start from the values and speeds.

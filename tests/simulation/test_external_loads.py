@@ -1,4 +1,4 @@
-"""Measured forces: their splines, what they do in a simulation, and what is refused."""
+"""Measured forces: what they do in a simulation, and what is refused."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import pytest
 
 from osimlite.errors import DocumentError, MissingFileError, ModelError, UnsupportedError
 from osimlite.multibody import build_mechanism
-from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema.frames import Body
 from osimlite.schema.functions import Constant, FunctionSet
 from osimlite.schema.joints import FreeJoint
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalForce, PrescribedForce
 from osimlite.simulation import simulate, write_sto
-from osimlite.simulation.elements.external_loads import natural_cubics, read_external_loads
+from osimlite.simulation.elements.external_loads import read_external_loads
 
 LABELS = ["grf_vx", "grf_vy", "grf_vz", "grf_px", "grf_py", "grf_pz", "grf_mx", "grf_my", "grf_mz"]
 
@@ -46,18 +45,6 @@ def force(**tags: str) -> str:
 
 def data(folder: Path, rows: np.ndarray, times=(0.0, 1.0)) -> None:
     write_sto(folder / "grf.mot", "grf", times, LABELS, rows.tolist())
-
-
-@pytest.mark.parametrize("count", [4, 5, 40])
-def test_splines_are_those_of_opensim(count):
-    rng = np.random.default_rng(count)
-    times = np.cumsum(rng.uniform(0.1, 1.0, count))
-    columns = rng.normal(size=(count, 3))
-    for column, ours in zip(columns.T, natural_cubics(times, columns), strict=True):
-        theirs = smoothing_spline(times, column, 2, 0.0)
-        for x in np.concatenate([times, rng.uniform(times[0] - 1.0, times[-1] + 1.0, 50)]):
-            for a, b in zip(ours.evaluate(np.array([x])), theirs.evaluate(np.array([x])), strict=True):
-                assert a == pytest.approx(b, abs=1e-9)
 
 
 def test_the_same_as_a_prescribed_force(model, tmp_path):

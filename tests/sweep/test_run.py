@@ -410,9 +410,9 @@ def _first(before, number):
 
 
 def schema_of(made, chosen):
-    from osimlite.sweep.run import columns, settings
+    from osimlite.sweep.run import settings
 
-    return schema(columns(made), settings(made, chosen))
+    return schema(made.columns("run"), settings(made, chosen))
 
 
 def test_memory_does_not_grow_with_the_number_of_runs(made, tmp_path):

@@ -16,7 +16,7 @@ from osimlite.document.part import read_object
 from osimlite.errors import DocumentError, ModelError
 from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.geometries.load import Load
@@ -159,30 +159,4 @@ def functions_of(times: Array, columns: Array) -> list[Function]:
         return [Constant(float(value)) for value in columns[0]]
     if len(times) < 4:
         return [PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()]
-    return natural_cubics(times, columns)
-
-
-def natural_cubics(times: Array, columns: Array) -> list[Function]:
-    """The k natural cubic splines through columns (n, k) over times (n,), n > 2, straight before and after."""
-    widths = np.diff(times)[:, None]
-    slopes = np.diff(columns, axis=0) / widths
-    # The second derivatives, which vanish at both ends, solve a tridiagonal system: forwards and back.
-    seconds = np.zeros_like(columns)
-    factor = np.zeros(len(times))
-    for k in range(1, len(times) - 1):
-        left, right = widths[k - 1, 0], widths[k, 0]
-        pivot = 2.0 * (left + right) - left * factor[k - 1]
-        factor[k] = right / pivot
-        seconds[k] = (6.0 * (slopes[k] - slopes[k - 1]) - left * seconds[k - 1]) / pivot
-    for k in range(len(times) - 2, 0, -1):
-        seconds[k] -= factor[k] * seconds[k + 1]
-    firsts = slopes - widths * (2.0 * seconds[:-1] + seconds[1:]) / 6.0
-    last = slopes[-1] + widths[-1] * seconds[-2] / 6.0
-    thirds = np.diff(seconds, axis=0) / widths
-    inner = np.stack([columns[:-1], firsts, seconds[:-1] / 2.0, thirds / 6.0], axis=2)
-    ends = np.zeros((2, *inner.shape[1:]))
-    ends[0, :, 0], ends[0, :, 1], ends[1, :, 0], ends[1, :, 1] = columns[0], firsts[0], columns[-1], last
-    pieces = np.concatenate([ends[:1], inner, ends[1:]])
-    # The piece before the first time counts from there too.
-    knots = np.append(times[0], times)
-    return [PiecewisePolynomial(knots, np.ascontiguousarray(pieces[:, k])) for k in range(columns.shape[1])]
+    return [smoothing_spline(times, column, 2, 0.0) for column in columns.T]

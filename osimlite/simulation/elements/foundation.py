@@ -206,10 +206,7 @@ def _inside(stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh
         return []
     ends, inside = other.nearest(seen[places])
     acting = places[inside]
-    found: list[list[float]] = np.column_stack(
-        (stiffness[acting], middles[acting], theirs.points(ends[inside]))
-    ).tolist()
-    return found
+    return np.column_stack((stiffness[acting], middles[acting], theirs.points(ends[inside]))).tolist()
 
 
 @dataclass(frozen=True)

@@ -181,8 +181,7 @@ class ElementBuilder:
         kind = kind_of_class(component)
         if kind is None:
             raise self.unsupported(force)
-        element: ForceElement = kind.make(self, force)
-        return element
+        return kind.make(self, force)
 
     @cached_property
     def controls(self) -> ModelControls:

@@ -177,5 +177,4 @@ def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., 
     exec(compile(source, file, "exec", dont_inherit=True), known)
     # Tracebacks and `inspect.getsource` show it as they show a file.
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    kernel: Callable[..., int] = known[name]
-    return kernel
+    return known[name]

@@ -211,8 +211,7 @@ class DeclaredForce:
     @property
     def kind(self) -> Kind:
         """The declaration."""
-        kind: Kind = kind_of_class(self.component)
-        return kind
+        return kind_of_class(self.component)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:

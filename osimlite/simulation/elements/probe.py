@@ -156,8 +156,7 @@ class DeclaredProbe:
     @property
     def kind(self) -> ProbeKind:
         """The declaration."""
-        kind: ProbeKind = kind_of_probe(self.component)
-        return kind
+        return kind_of_probe(self.component)
 
     @property
     def columns(self) -> tuple[str, ...]:

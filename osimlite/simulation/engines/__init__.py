@@ -46,5 +46,4 @@ def engine_factory(name: str) -> EngineFactory:
         OsimliteError: there is no engine of that name.
         MissingDependency: the package it works with is not installed.
     """
-    make: EngineFactory = import_module(ENGINES[engine_name(name)]).make
-    return make
+    return import_module(ENGINES[engine_name(name)]).make

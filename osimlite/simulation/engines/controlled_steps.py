@@ -103,7 +103,7 @@ class ControlledSteps(Stepper):
         except (KeyboardInterrupt, SimulationError) as ended:
             self.ended = ended
         table: Any = batch.reports[0, : bisect_right(times, self.time)]
-        return table  # type: ignore[no-any-return]
+        return table
 
     def catch_up(self) -> None:
         """Call `observe` for all steps that it was not called for."""

@@ -86,8 +86,7 @@ def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
     """Radii of the second surfaces (v, P)."""
     s = engine.structure
     records = s[s[layout.CONTACT_AT] : s[layout.CONTACT_AT] + len(engine.contacts)]
-    radii: Floats = _rows(engine, numbers)[:, s[records + layout.NUMBERS] + RADIUS]
-    return radii
+    return _rows(engine, numbers)[:, s[records + layout.NUMBERS] + RADIUS]
 
 
 def _rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:

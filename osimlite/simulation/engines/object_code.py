@@ -62,8 +62,7 @@ def _parsed(head: bytes) -> object:
 
 def translated(text: str) -> bytes:
     """Code in the object format of the system from the intermediate language of LLVM."""
-    code: bytes = _machine().emit_object(llvm.parse_assembly(text))
-    return code
+    return _machine().emit_object(llvm.parse_assembly(text))
 
 
 def keep(name: str, digest: str, code: bytes, symbol: str) -> int:
@@ -103,8 +102,7 @@ def _link(code: bytes, symbol: str) -> int:
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     _kept.append(engine)
-    found: int = engine.get_function_address(symbol)
-    return found
+    return engine.get_function_address(symbol)
 
 
 def _machine() -> Any:

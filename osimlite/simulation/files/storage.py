@@ -46,8 +46,7 @@ class StoTable:
         """The first column (n,) of a label; KeyError if there is none."""
         if column not in self.columns:
             raise KeyError(column)
-        values: Array = self.rows[:, self.columns.index(column)]
-        return values
+        return self.rows[:, self.columns.index(column)]
 
 
 def sto_text(

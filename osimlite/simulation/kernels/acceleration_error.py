@@ -79,8 +79,7 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
 def rate(s: Ints, w: Floats, u: Floats, operation: int) -> float:
     """Of the amount of an operation."""
     freedom = s[s[OPERATION_AT] + OPERATION_INTS * operation + FREEDOM]
-    found: float = u[freedom] if freedom >= 0 else w[s[WORK_OPERATION] + OPERATION_WORK * operation + RATE]
-    return found
+    return u[freedom] if freedom >= 0 else w[s[WORK_OPERATION] + OPERATION_WORK * operation + RATE]
 
 
 def share(s: Ints, w: Floats, operation: int, freedom: int) -> float:

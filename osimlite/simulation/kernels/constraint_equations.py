@@ -125,8 +125,7 @@ def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: floa
     dx = c2 * r2 * r3
     dy = -s1 * r1 * r2 + (s1 * s2 * r2 - c1 * c2 * r1) * r3
     dz = c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3
-    bias: float = -factor * (nx * dx + ny * dy + nz * dz)
-    return bias
+    return -factor * (nx * dx + ny * dy + nz * dz)
 
 
 def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:

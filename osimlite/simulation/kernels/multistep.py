@@ -242,8 +242,7 @@ def choose(
 
 def reach(excess: float, order: int) -> float:
     """How many times longer a step would just do, of which the error is so many times what it may be."""
-    factor: float = max(excess, 1e-12) ** (-1.0 / (order + 1.0))
-    return factor
+    return max(excess, 1e-12) ** (-1.0 / (order + 1.0))
 
 
 def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:

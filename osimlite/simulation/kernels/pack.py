@@ -196,8 +196,7 @@ def _load(link: _Link, properties: Any, frame: Array) -> None:
 
 def _square(v: Array) -> Array:
     """[v] [v], the inertia of a unit mass at v but for the sign."""
-    matrix: Array = skew(v) @ skew(v)
-    return matrix
+    return skew(v) @ skew(v)
 
 
 def _inertia(link: _Link) -> list[float]:

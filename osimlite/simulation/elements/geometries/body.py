@@ -28,8 +28,7 @@ def turning_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
     """How fast a body turns against another about an axis (rad/s), which OpenSim takes for one of ground."""
     ax, ay, az = angular_velocity(s, w, g[0])
     bx, by, bz = angular_velocity(s, w, g[1])
-    speed: float = gp[3] * (ax - bx) + gp[4] * (ay - by) + gp[5] * (az - bz)
-    return speed
+    return gp[3] * (ax - bx) + gp[4] * (ay - by) + gp[5] * (az - bz)
 
 
 def push_along(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:

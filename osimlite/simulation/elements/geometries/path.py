@@ -45,8 +45,7 @@ class AlongPath(Geometry):
         module = f"{__package__}.paths.{module_name(type(force.geometry_path))}"
         if find_spec(module) is None:
             raise builder.unsupported(force, f" on a {kind_of(force.geometry_path)}")
-        path: Path = import_module(module).read(builder, force)
-        return path
+        return import_module(module).read(builder, force)
 
     def parts(self, place: Path, places: Places) -> list[Item]:
         """Those of the path."""

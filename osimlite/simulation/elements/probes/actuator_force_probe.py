@@ -23,8 +23,7 @@ def raised(x: float, exponent: float) -> float:
         return nan
     if x == 0.0 and exponent < 0.0:
         return inf
-    power: float = x**exponent
-    return power
+    return x**exponent
 
 
 def actuator_force(actuation: float, n: Power) -> float:

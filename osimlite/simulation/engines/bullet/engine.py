@@ -152,8 +152,7 @@ class BulletEngine(KernelEngine):
         """Forces on joints that are coordinates each, which do what forces conjugate to the generalized speeds do."""
         rates = self.mechanism.rate_matrix(self.state.values(y))
         spread = self.state.spread(forces.tolist(), [0.0] * len(rates))
-        found: list[float] = np.linalg.solve(rates.T, spread)[self.coordinates].tolist()
-        return found
+        return np.linalg.solve(rates.T, spread)[self.coordinates].tolist()
 
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
