@@ -172,7 +172,7 @@ def _run(words: list[str]) -> None:
             warnings.simplefilter("ignore", UnitWarning)
             raise SystemExit(app(names)(args=words, prog_name="osimlite", standalone_mode=False))
     except OsimliteError as error:
-        complain(f"{error}{_built_in(error)}")
+        complain(error, _built_in(error))
         raise SystemExit(error.exit_code) from None
     except KeyboardInterrupt:
         complain("interrupted")

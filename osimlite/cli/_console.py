@@ -52,9 +52,12 @@ def say(text: object = "", *, err: bool = False) -> None:
     print(visible(str(text)), file=sys.stderr if err else sys.stdout, flush=True)
 
 
-def complain(text: object) -> None:
-    """Say one sentence on standard error, as the program."""
-    say(f"osimlite: {text}", err=True)
+def complain(text: object, cure: str = "") -> None:
+    """Say one sentence on standard error, as the program; of an error, with the page of the manual to read on."""
+    from osimlite.cli._manual import page_of
+
+    page = f" (see {page_of(text)})" if isinstance(text, BaseException) else ""
+    say(f"osimlite: {text}{cure}{page}", err=True)
 
 
 def show(lines: str, *, err: bool = False) -> None:

@@ -120,14 +120,16 @@ def test_info(fixtures: Path) -> None:
 def test_errors_are_one_sentence(tmp_path: Path) -> None:
     code, out, error = run("info", "nowhere.osim", folder=tmp_path)
     assert (code, out) == (2, "")
-    assert error == "osimlite: nowhere.osim: cannot read the file: no such file\n"
+    assert error == "osimlite: nowhere.osim: cannot read the file: no such file (see docs/errors.md#files)\n"
     for command in ("info", "validate", "format"):
         code, out, error = run(command, "steady-walker", folder=tmp_path)
         assert (code, out) == (2, "") and "'osimlite build steady-walker -o steady-walker.osim'" in error
         assert error.count("\n") == 1
     code, _, error = run("info", ".", folder=tmp_path)
-    assert code == 2 and error.endswith("this is a folder; name a model file in it\n")
-    said = "osimlite: .: there is no file of OpenSim in this folder: no .osim, .xml or .omoco\n"
+    assert code == 2 and "this is a folder; name a model file in it" in error
+    said = (
+        "osimlite: .: there is no file of OpenSim in this folder: no .osim, .xml or .omoco (see docs/lint-in-ci.md)\n"
+    )
     assert run("format", ".", folder=tmp_path) == (2, "", said)
     (tmp_path / "empty.osim").touch()
     assert run("format", "empty.osim", folder=tmp_path)[0] == 1

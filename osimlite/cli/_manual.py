@@ -1,0 +1,97 @@
+"""Where the manual says more about what has failed."""
+
+from __future__ import annotations
+
+from itertools import chain
+from traceback import walk_tb
+
+PAGES = {
+    "osimlite.errors.MissingDependency": "README.md#what-to-install",
+    "osimlite.errors.MissingFileError": "docs/errors.md#files",
+    "osimlite.errors.NotWellFormedError": "docs/rules.md#text",
+    "osimlite.errors.VersionError": "docs/errors.md#versions",
+    "osimlite.cli._validating": "docs/lint-in-ci.md",
+    "osimlite.cli.build": "docs/errors.md#sources-of-models",
+    "osimlite.cli.demo": "README.md#start",
+    "osimlite.cli.diff": "docs/format-and-diff.md",
+    "osimlite.cli.doctor": "README.md#what-to-install",
+    "osimlite.cli.find_gait": "docs/gaits.md#how-they-were-found",
+    "osimlite.cli.format": "docs/format-and-diff.md",
+    "osimlite.cli.gait": "docs/gaits.md",
+    "osimlite.cli.info": "docs/format-and-diff.md#setup-files-and-other-documents",
+    "osimlite.cli.inverse_dynamics": "docs/from-opensim.md#kinematics-and-dynamics",
+    "osimlite.cli.kinematics": "docs/from-opensim.md#kinematics-and-dynamics",
+    "osimlite.cli.lsp": "docs/editors.md",
+    "osimlite.cli.muscles": "docs/muscles.md",
+    "osimlite.cli.optimize": "docs/sweeps.md#a-search",
+    "osimlite.cli.rule": "docs/rules.md",
+    "osimlite.cli.simulate": "docs/from-opensim.md#simulating",
+    "osimlite.cli.sweep": "docs/sweeps.md#a-sweep",
+    "osimlite.cli.translate": "docs/urdf.md",
+    "osimlite.cli.upgrade": "docs/errors.md#versions",
+    "osimlite.cli.validate": "docs/lint-in-ci.md",
+    "osimlite.cli.view": "docs/viewer.md",
+    "osimlite.document": "docs/rules.md#text",
+    "osimlite.document.data": "docs/yaml.md",
+    "osimlite.document.plugins": "docs/plugin-classes.md",
+    "osimlite.gait": "docs/gaits.md",
+    "osimlite.lint": "docs/lint-in-ci.md",
+    "osimlite.lint.config": "docs/lint-in-ci.md#settings",
+    "osimlite.lint.settings": "docs/lint-in-ci.md#settings",
+    "osimlite.lsp": "docs/editors.md",
+    "osimlite.meshes": "docs/viewer.md#meshes",
+    "osimlite.models.source": "docs/errors.md#sources-of-models",
+    "osimlite.multibody": "docs/constraints.md",
+    "osimlite.multibody.assembly": "docs/constraints.md#the-start",
+    "osimlite.project": "docs/lint-in-ci.md#settings",
+    "osimlite.schema": "docs/from-opensim.md#making-components",
+    "osimlite.schema.tree": "docs/from-opensim.md#finding-components",
+    "osimlite.simulation": "docs/from-opensim.md#simulating",
+    "osimlite.simulation.elements": "docs/forces.md#what-a-simulation-computes",
+    "osimlite.simulation.elements.control_sets": "docs/controls.md#the-models",
+    "osimlite.simulation.elements.control_tables": "docs/controls.md#the-models",
+    "osimlite.simulation.elements.controllers": "docs/controls.md#the-models",
+    "osimlite.simulation.elements.external_loads": "docs/forces.md#measured-loads",
+    "osimlite.simulation.elements.foundation": "docs/forces.md#a-foot-that-is-a-mesh",
+    "osimlite.simulation.elements.geometries.paths": "docs/forces.md#paths",
+    "osimlite.simulation.elements.muscle": "docs/forces.md#muscles",
+    "osimlite.simulation.elements.probe": "docs/controls.md#probes",
+    "osimlite.simulation.elements.signals": "docs/controls.md#the-models",
+    "osimlite.simulation.elements.triangle_mesh": "docs/forces.md#a-foot-that-is-a-mesh",
+    "osimlite.simulation.engines": "docs/compiled.md",
+    "osimlite.simulation.files": "docs/forces.md#tables",
+    "osimlite.simulation.given_controls": "docs/controls.md#yours",
+    "osimlite.simulation.integrators": "docs/integrators.md",
+    "osimlite.simulation.muscle_curves": "docs/muscles.md",
+    "osimlite.simulation.paths": "docs/forces.md#paths",
+    "osimlite.sweep": "docs/sweeps.md",
+    "osimlite.sweep.controls": "docs/sweeps.md#controls-over-time",
+    "osimlite.sweep.expressions": "docs/sweeps.md#what-is-kept",
+    "osimlite.sweep.measures": "docs/sweeps.md#what-is-kept",
+    "osimlite.sweep.optimize": "docs/sweeps.md#a-search",
+    "osimlite.sweep.pools": "docs/sweeps.md#on-a-cluster",
+    "osimlite.sweep.properties": "docs/sweeps.md#what-can-be-varied",
+    "osimlite.sweep.results": "docs/sweeps.md#interrupted",
+    "osimlite.sweep.run": "docs/sweeps.md#interrupted",
+    "osimlite.sweep.sampling": "docs/sweeps.md#which-samples",
+    "osimlite.sweep.variables": "docs/sweeps.md#what-can-be-varied",
+    "osimlite.translate": "docs/urdf.md",
+    "osimlite.translate.mjcf": "docs/mujoco.md",
+    "osimlite.view": "docs/viewer.md",
+}
+"""Pages and their headings, by the class of an error, or else by the module or package that could not go on.
+
+What has no page, such as the reading of numbers, fails for the sake of whoever called it.
+"""
+
+
+def page_of(error: BaseException) -> str:
+    """The page that says more about an error that was raised."""
+    kinds = (f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__)
+    modules = (frame.f_globals.get("__name__", "") for frame, _ in reversed([*walk_tb(error.__traceback__)]))
+    for part in chain(kinds, modules):
+        while part:
+            if part in PAGES:
+                return PAGES[part]
+            part = part.rpartition(".")[0]
+    return "docs/errors.md"
