@@ -9,14 +9,16 @@ from osimlite.document.source import Source
 from osimlite.lint.rules.classes import set_for
 from osimlite.schema.registry import class_for
 
-SKELETON = Path(__file__).resolve().parents[2] / "fixtures" / "lint" / "skeleton.osim"
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
+SKELETON, LIMB = FIXTURES / "skeleton.osim", FIXTURES / "limb.osim"
+"""A leg; and the same with a foot, wraps, paths and muscles, for lines about a part of these."""
 
 
 def document(fragment: str) -> str:
     """The skeleton with the elements of `fragment` in place.
 
-    An element takes the place of the one with its tag and name, a set or value of the model that of its tag. A new
-    member is put at the end of its set, all else at the end of the model.
+    An element takes the place of the first with its tag and, if it has one, its name; of what only the limb has, it
+    keeps what `fragment` does not give. A new member is put at the end of its set, all else at the end of the model.
     """
     text = SKELETON.read_text(encoding="utf-8")
     wrapped = Source(f"<_>{fragment}</_>".encode())
@@ -26,41 +28,58 @@ def document(fragment: str) -> str:
     spans = [wrapped.spans[number] for number in tops]
     if any(span.end == span.tag_end and not wrapped.text[: span.end].endswith("/>") for span in spans):
         # Not closed: take it as it stands.
-        spans = [spans[0]._replace(end=len(wrapped.text) - 4)]
-    for span in spans:
-        end = span.end
-        element = wrapped.text[span.start : end]
-        name = re.search(r'\sname="([^"]*)"', wrapped.text[span.start : span.tag_end])
-        text = _placed(text, span.tag, name[1] if name else None, element)
+        return _placed(text, wrapped, tops[0], len(wrapped.text) - 4)
+    limb = LIMB.read_text(encoding="utf-8")
+    of_limb = [top for top in tops if _found(text, wrapped, top) is None and _found(limb, wrapped, top) is not None]
+    text = limb if of_limb else text
+    for top in tops:
+        if top in of_limb:
+            for child in wrapped.children(top):
+                text = _within(text, wrapped, top, child)
+        else:
+            text = _placed(text, wrapped, top, wrapped.spans[top].end)
     return text
 
 
-def _placed(text: str, tag: str, name: str | None, element: str) -> str:
+def _found(text: str, wrapped: Source, number: int) -> int | None:
+    """The element of a text that has the tag and name of another."""
+    span = wrapped.spans[number]
+    name = re.search(r'\sname="[^"]*"', wrapped.text[span.start : span.tag_end])
+    for found, other in enumerate(Source(text.encode()).spans):
+        if other.tag == span.tag and (name is None or name[0] in text[other.start : other.tag_end]):
+            return found
+    return None
+
+
+def _placed(text: str, wrapped: Source, number: int, end: int) -> str:
+    tag, element = wrapped.spans[number].tag, wrapped.text[wrapped.spans[number].start : end]
     source = Source(text.encode())
-    model = source.child(0, "Model")
-    assert model is not None
-    for child in source.children(model):
-        if source.spans[child].tag == tag:
-            return _replaced(text, source, child, element)
+    found = _found(text, wrapped, number)
+    if found is not None:
+        return text[: source.spans[found].start] + element + text[source.spans[found].end :]
     holder = set_for(class_for(tag))
     if holder is None:
         return _at_the_end(text, element)
-    number = source.child(model, holder)
-    if number is None:
+    model = source.child(0, "Model")
+    assert model is not None
+    held = source.child(model, holder)
+    members = None if held is None else source.child(held, "objects")
+    if members is None:
         return _at_the_end(text, f"<{holder}><objects>{element}</objects></{holder}>")
-    members = source.child(number, "objects")
-    assert members is not None
-    for member in source.children(members):
-        head = text[source.spans[member].start : source.spans[member].tag_end]
-        if source.spans[member].tag == tag and name is not None and f'name="{name}"' in head:
-            return _replaced(text, source, member, element)
     place = source.spans[members].inner_end
     return text[:place] + element + "\n" + text[place:]
 
 
-def _replaced(text: str, source: Source, number: int, element: str) -> str:
-    span = source.spans[number]
-    return text[: span.start] + element + text[span.end :]
+def _within(text: str, wrapped: Source, number: int, child: int) -> str:
+    """A text whose element that is like another has a child of that one, in place of its own with that tag."""
+    source, span = Source(text.encode()), wrapped.spans[child]
+    found = _found(text, wrapped, number)
+    assert found is not None
+    before = source.child(found, span.tag)
+    start = end = source.spans[found].inner_end
+    if before is not None:
+        start, end = source.spans[before].start, source.spans[before].end
+    return text[:start] + wrapped.text[span.start : span.end] + text[end:]
 
 
 def _at_the_end(text: str, element: str) -> str:

@@ -47,8 +47,9 @@ def example(rule: Rule, heading: str) -> bytes:
     return skeleton.document(block[2]).encode()
 
 
-def test_the_skeleton_is_without_findings():
-    assert str(validate(skeleton.SKELETON)) == "nothing found"
+@pytest.mark.parametrize("path", [skeleton.SKELETON, skeleton.LIMB], ids=lambda path: path.stem)
+def test_the_skeleton_is_without_findings(path):
+    assert str(validate(path)) == "nothing found"
 
 
 @pytest.mark.parametrize("rule", RULES)

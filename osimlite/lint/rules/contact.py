@@ -25,16 +25,10 @@ def contact_without_partner(subject: Subject, found: Found) -> None:
     Such a force never acts, and OpenSim does not mention it.
 
     ```xml
-      <HuntCrossleyForce name="foot_ground">
-          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-              <objects>
-                  <HuntCrossleyForce::ContactParameters>
-    -                 <geometry>heel</geometry> <stiffness>1e6</stiffness>
-    +                 <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-                  </HuntCrossleyForce::ContactParameters>
-              </objects>
-          </HuntCrossleyForce::ContactParametersSet>
-      </HuntCrossleyForce>
+      <HuntCrossleyForce::ContactParameters>
+    -     <geometry>heel</geometry> <stiffness>1e6</stiffness>
+    +     <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+      </HuntCrossleyForce::ContactParameters>
     ```
     """
     for force, holders, uses in _contact_lists(subject):
@@ -57,16 +51,10 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
     OpenSim counts the surface twice, and the force is doubled.
 
     ```xml
-      <HuntCrossleyForce name="foot_ground">
-          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-              <objects>
-                  <HuntCrossleyForce::ContactParameters>
-    -                 <geometry>heel heel floor</geometry> <stiffness>1e6</stiffness>
-    +                 <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-                  </HuntCrossleyForce::ContactParameters>
-              </objects>
-          </HuntCrossleyForce::ContactParametersSet>
-      </HuntCrossleyForce>
+      <HuntCrossleyForce::ContactParameters>
+    -     <geometry>heel heel floor</geometry> <stiffness>1e6</stiffness>
+    +     <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+      </HuntCrossleyForce::ContactParameters>
     ```
     """
     for force, _, uses in _contact_lists(subject):
@@ -98,16 +86,11 @@ def unused_contact_geometry(subject: Subject, found: Found) -> None:
     It has no effect; often a force was meant to list it.
 
     ```xml
-    + <HuntCrossleyForce name="toe_ground">
-    +     <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-    +         <objects>
-    +             <HuntCrossleyForce::ContactParameters>
-    +                 <geometry>toe floor</geometry> <stiffness>1e6</stiffness>
-    +             </HuntCrossleyForce::ContactParameters>
-    +         </objects>
-    +     </HuntCrossleyForce::ContactParametersSet>
-    + </HuntCrossleyForce>
       <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
+      <HuntCrossleyForce::ContactParameters>
+    -     <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+    +     <geometry>heel toe floor</geometry> <stiffness>1e6</stiffness>
+      </HuntCrossleyForce::ContactParameters>
     ```
     """
     surfaces = list(subject.each(ContactGeometry))

@@ -60,14 +60,8 @@ def default_outside_range(subject: Subject, found: Found) -> None:
     rules out; often the range or the default is in degrees.
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-          <coordinates>
-    -         <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
-    +         <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
-          </coordinates>
-      </PinJoint>
+    - <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
+    + <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
     ```
     """
     for coordinate in subject.each(Coordinate):
@@ -95,17 +89,10 @@ def prescribed_without_function(subject: Subject, found: Found) -> None:
     OpenSim switches the prescription off in silence, and the coordinate moves freely.
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-    -     <coordinates> <Coordinate name="knee_angle"> <prescribed>true</prescribed> </Coordinate> </coordinates>
-    +     <coordinates>
-    +         <Coordinate name="knee_angle">
-    +             <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
-    +             <prescribed>true</prescribed>
-    +         </Coordinate>
-    +     </coordinates>
-      </PinJoint>
+      <Coordinate name="knee_angle">
+    +     <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
+          <prescribed>true</prescribed>
+      </Coordinate>
     ```
     """
     for coordinate in subject.each(Coordinate):

@@ -41,24 +41,11 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
     0, and the axis no longer follows the coordinate it was meant to follow.
 
     ```xml
-      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-      <CustomJoint name="ankle">
-          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-          <socket_child_frame>/bodyset/foot</socket_child_frame>
-          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-          <SpatialTransform>
-              <TransformAxis name="rotation1">
-                  <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-              </TransformAxis>
-              <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-              <TransformAxis name="translation1">
-    -             <coordinates>ankle_angel</coordinates>
-    +             <coordinates>ankle_angle</coordinates>
-                  <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
-              </TransformAxis>
-          </SpatialTransform>
-      </CustomJoint>
+      <TransformAxis name="translation1">
+    -     <coordinates>ankle_angel</coordinates>
+    +     <coordinates>ankle_angle</coordinates>
+          <LinearFunction name="function"> <coefficients>0.01 0</coefficients> </LinearFunction>
+      </TransformAxis>
     ```
     """
     for joint in subject.named("CustomJoint"):
@@ -92,23 +79,10 @@ def axis_without_coordinate(subject: Subject, found: Found) -> None:
     OpenSim crashes, without a message.
 
     ```xml
-      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-      <CustomJoint name="ankle">
-          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-          <socket_child_frame>/bodyset/foot</socket_child_frame>
-          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-          <SpatialTransform>
-              <TransformAxis name="rotation1">
-                  <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-              </TransformAxis>
-              <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-              <TransformAxis name="translation1">
-    +             <coordinates>ankle_angle</coordinates>
-                  <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
-              </TransformAxis>
-          </SpatialTransform>
-      </CustomJoint>
+      <TransformAxis name="translation1">
+    +     <coordinates>ankle_angle</coordinates>
+          <SimmSpline name="function"> <x>-1 0 1</x> <y>0.01 0 0.01</y> </SimmSpline>
+      </TransformAxis>
     ```
     """
     for joint in subject.named("CustomJoint"):
@@ -134,20 +108,9 @@ def collinear_axes(subject: Subject, found: Found) -> None:
     OpenSim refuses to load the file, also where an axis moves nothing. Give each unused axis a direction of its own.
 
     ```xml
-      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-      <CustomJoint name="ankle">
-          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-          <socket_child_frame>/bodyset/foot</socket_child_frame>
-          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-          <SpatialTransform>
-              <TransformAxis name="rotation1">
-                  <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-              </TransformAxis>
-    -         <TransformAxis name="rotation2"> <axis>0 0 1</axis> </TransformAxis>
-    +         <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-          </SpatialTransform>
-      </CustomJoint>
+      <TransformAxis name="rotation1"> <axis>0 0 1</axis> </TransformAxis>
+    - <TransformAxis name="rotation2"> <axis>0 0 1</axis> </TransformAxis>
+    + <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
     ```
     """
     for joint in subject.named("CustomJoint"):
@@ -179,20 +142,11 @@ def idle_coordinate(subject: Subject, found: Found) -> None:
     the joint become NaN, without a message, also if the coordinate is locked or prescribed.
 
     ```xml
-      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
-      <CustomJoint name="ankle">
-          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-          <socket_child_frame>/bodyset/foot</socket_child_frame>
-          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
-          <SpatialTransform>
-              <TransformAxis name="rotation1">
-    -             <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <Constant name="function" />
-    +             <coordinates>ankle_angle</coordinates> <axis>0 0 1</axis> <LinearFunction name="function" />
-              </TransformAxis>
-              <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
-              <TransformAxis name="rotation3"> <axis>1 0 0</axis> </TransformAxis>
-          </SpatialTransform>
-      </CustomJoint>
+      <TransformAxis name="rotation1">
+          <coordinates>ankle_angle</coordinates>
+    -     <LinearFunction name="function"> <coefficients>0 0.5</coefficients> </LinearFunction>
+    +     <LinearFunction name="function"> <coefficients>0.5 0</coefficients> </LinearFunction>
+      </TransformAxis>
     ```
     """
     for joint in subject.named("CustomJoint"):

@@ -37,19 +37,12 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
     stands twice, a SimmSpline has no slope (a warning).
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-          <coordinates>
-              <Coordinate name="knee_angle">
-                  <prescribed_function>
-    -                 <SimmSpline> <x>0 0.5 0.5 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
-    +                 <SimmSpline> <x>0 0.5 0.6 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
-                  </prescribed_function>
-                  <prescribed>true</prescribed>
-              </Coordinate>
-          </coordinates>
-      </PinJoint>
+      <Coordinate name="knee_angle">
+          <prescribed_function>
+    -         <SimmSpline> <x>0 0.5 0.5 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
+    +         <SimmSpline> <x>0 0.5 0.6 1</x> <y>0 -0.4 -0.5 -1</y> </SimmSpline>
+          </prescribed_function>
+      </Coordinate>
     ```
     """
     for function in _tabulated(subject):
@@ -87,19 +80,12 @@ def unequal_points(subject: Subject, found: Found) -> None:
     Too many y are ignored.
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-          <coordinates>
-              <Coordinate name="knee_angle">
-                  <prescribed_function>
-    -                 <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4</y> </SimmSpline>
-    +                 <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4 -1</y> </SimmSpline>
-                  </prescribed_function>
-                  <prescribed>true</prescribed>
-              </Coordinate>
-          </coordinates>
-      </PinJoint>
+      <Coordinate name="knee_angle">
+          <prescribed_function>
+    -         <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4</y> </SimmSpline>
+    +         <SimmSpline> <x>0 0.5 1</x> <y>0 -0.4 -1</y> </SimmSpline>
+          </prescribed_function>
+      </Coordinate>
     ```
     """
     for function in _tabulated(subject):
@@ -125,17 +111,10 @@ def too_few_points(subject: Subject, found: Found) -> None:
     A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns what is in memory.
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-          <coordinates>
-              <Coordinate name="knee_angle">
-    -             <prescribed_function> <SimmSpline> <x>0</x> <y>-1</y> </SimmSpline> </prescribed_function>
-    +             <prescribed_function> <Constant> <value>-1</value> </Constant> </prescribed_function>
-                  <prescribed>true</prescribed>
-              </Coordinate>
-          </coordinates>
-      </PinJoint>
+      <Coordinate name="knee_angle">
+    -     <prescribed_function> <SimmSpline> <x>0</x> <y>-1</y> </SimmSpline> </prescribed_function>
+    +     <prescribed_function> <Constant> <value>-1</value> </Constant> </prescribed_function>
+      </Coordinate>
     ```
     """
     for function in _tabulated(subject):
@@ -162,18 +141,12 @@ def coefficient_count(subject: Subject, found: Found) -> None:
     for the constant, and drops what is between: the joint moves by another law than was written.
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-          <coordinates>
-              <Coordinate name="knee_angle">
-                  <prescribed_function>
-    -                 <LinearFunction> <coefficients></coefficients> </LinearFunction>
-    +                 <LinearFunction> <coefficients>0 -0.2</coefficients> </LinearFunction>
-                  </prescribed_function>
-              </Coordinate>
-          </coordinates>
-      </PinJoint>
+      <Coordinate name="knee_angle">
+          <prescribed_function>
+    -         <LinearFunction> <coefficients></coefficients> </LinearFunction>
+    +         <LinearFunction> <coefficients>0 -0.2</coefficients> </LinearFunction>
+          </prescribed_function>
+      </Coordinate>
     ```
     """
     for function in subject.each(LinearFunction):
@@ -230,20 +203,13 @@ def missing_function(subject: Subject, found: Found) -> None:
     that was taken out later leaves an empty multiplier.
 
     ```xml
-      <PinJoint name="knee">
-          <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-          <socket_child_frame>/bodyset/shank</socket_child_frame>
-          <coordinates>
-              <Coordinate name="knee_angle">
-                  <prescribed_function>
-    -                 <MultiplierFunction> <scale>2</scale> </MultiplierFunction>
-    +                 <MultiplierFunction>
-    +                     <function> <Constant> <value>-0.1</value> </Constant> </function> <scale>2</scale>
-    +                 </MultiplierFunction>
-                  </prescribed_function>
-              </Coordinate>
-          </coordinates>
-      </PinJoint>
+      <Coordinate name="knee_angle">
+          <prescribed_function>
+              <MultiplierFunction> <scale>2</scale>
+    +             <function> <Constant> <value>-0.1</value> </Constant> </function>
+              </MultiplierFunction>
+          </prescribed_function>
+      </Coordinate>
     ```
     """
     for force in subject.named("PrescribedForce"):

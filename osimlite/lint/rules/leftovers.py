@@ -165,29 +165,8 @@ def force_outside_set(subject: Subject, found: Found) -> None:
 
     ```xml
     - <components>
-    -     <PathSpring name="band">
-    -         <GeometryPath name="path">
-    -             <PathPointSet>
-    -                 <objects>
-    -                     <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-    -                     <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-    -                 </objects>
-    -             </PathPointSet>
-    -         </GeometryPath>
-    -         <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    -     </PathSpring>
+          <SpringGeneralizedForce name="spring"> <coordinate>knee_angle</coordinate> </SpringGeneralizedForce>
     - </components>
-    + <PathSpring name="band">
-    +     <GeometryPath name="path">
-    +         <PathPointSet>
-    +             <objects>
-    +                 <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-    +                 <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-    +             </objects>
-    +         </PathPointSet>
-    +     </GeometryPath>
-    +     <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-    + </PathSpring>
     ```
     """
     places: dict[int, list[Component]] = {}

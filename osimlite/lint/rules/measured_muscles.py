@@ -32,18 +32,8 @@ def start_off_equilibrium(subject: Subject, found: Found) -> None:
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
+    -     <default_fiber_length>0.1</default_fiber_length>
     +     <default_fiber_length>0.128</default_fiber_length>
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                          <location>0 0.17 0</location> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <max_isometric_force>500</max_isometric_force> <optimal_fiber_length>0.1</optimal_fiber_length>
-          <tendon_slack_length>0.1</tendon_slack_length>
       </Millard2012EquilibriumMuscle>
     ```
     """
@@ -82,20 +72,8 @@ def fiber_limit(subject: Subject, found: Found) -> None:
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
-    -     <default_fiber_length>0.065</default_fiber_length>
-    +     <default_fiber_length>0.128</default_fiber_length>
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                          <location>0 0.17 0</location> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <max_isometric_force>500</max_isometric_force> <optimal_fiber_length>0.1</optimal_fiber_length>
-    -     <tendon_slack_length>0.165</tendon_slack_length>
-    +     <tendon_slack_length>0.1</tendon_slack_length>
+    -     <default_fiber_length>0.065</default_fiber_length> <tendon_slack_length>0.165</tendon_slack_length>
+    +     <default_fiber_length>0.128</default_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
       </Millard2012EquilibriumMuscle>
     ```
     """

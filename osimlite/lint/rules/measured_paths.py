@@ -33,34 +33,26 @@ def wrong_wrapping(subject: Subject, found: Found) -> None:
     `osimlite muscles` and `osimlite simulate` compute the right lengths with `--wrapping geodesic`.
 
     ```xml
-      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-              <WrapObjectSet name="wrapobjectset">
-                  <objects>
-                      <WrapCylinder name="high"> <translation>-0.01 -0.12 0</translation> <radius>0.04</radius>
-    -                     <length>0.2</length> </WrapCylinder>
-    -                 <WrapCylinder name="low"> <translation>-0.01 -0.28 0</translation> <radius>0.04</radius>
-                          <length>0.2</length> </WrapCylinder>
-                  </objects>
-              </WrapObjectSet>
-          </Body>
-          <PathSpring name="spring">
-              <GeometryPath name="path">
-                  <PathPointSet>
-                      <objects>
-                          <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                          <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                              <location>0 -0.4 0</location> </PathPoint>
-                      </objects>
-                  </PathPointSet>
-                  <PathWrapSet>
-                      <objects>
-                          <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
-    -                     <PathWrap name="around_low"> <wrap_object>low</wrap_object> </PathWrap>
-                      </objects>
-                  </PathWrapSet>
-              </GeometryPath>
-              <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-          </PathSpring>
+      <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia>
+          <WrapObjectSet name="wrapobjectset">
+              <objects>
+                  <WrapCylinder name="high">
+                      <translation>-0.01 -0.12 0</translation> <radius>0.04</radius> <length>0.2</length>
+                  </WrapCylinder>
+    -             <WrapCylinder name="low">
+    -                 <translation>-0.01 -0.28 0</translation> <radius>0.04</radius> <length>0.2</length>
+    -             </WrapCylinder>
+              </objects>
+          </WrapObjectSet>
+      </Body>
+      <PathPoint name="a"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+      <PathPoint name="b"> <location>0 -0.4 0</location> </PathPoint>
+      <PathWrapSet>
+          <objects>
+              <PathWrap name="around_high"> <wrap_object>high</wrap_object> </PathWrap>
+    -         <PathWrap name="around_low"> <wrap_object>low</wrap_object> </PathWrap>
+          </objects>
+      </PathWrapSet>
     ```
     """
     most, measures = subject.config.value_of(OFF), measures_of(subject)
@@ -95,22 +87,11 @@ def path_jump(subject: Subject, found: Found) -> None:
     surface, or a moving point, in place of the conditional point makes the length continuous.
 
     ```xml
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <ConditionalPathPoint name="b">
-                          <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0.05 -0.2 0</location>
-    -                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 -1</range>
-    +                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2.1 0</range>
-                      </ConditionalPathPoint>
-                      <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <ConditionalPathPoint name="via">
+          <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate>
+    -     <range>-2.1 -1</range>
+    +     <range>-2.1 0</range>
+      </ConditionalPathPoint>
     ```
     """
     for jump in measures_of(subject).jumps:
@@ -136,32 +117,14 @@ def length_of_wrap(subject: Subject, found: Found) -> None:
     Where a path goes through the middle of a sphere its length jumps.
 
     ```xml
-      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-          <WrapObjectSet name="wrapobjectset">
-              <objects>
-                  <WrapSphere name="condyle">
-    -                 <quadrant>x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
-    +                 <quadrant>-x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
-                  </WrapSphere>
-              </objects>
-          </WrapObjectSet>
-      </Body>
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                          <location>-0.039 -0.18 0</location> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                          <location>-0.039 -0.22 0.001</location> </PathPoint>
-                  </objects>
-              </PathPointSet>
-              <PathWrapSet>
-                  <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
-              </PathWrapSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <PathPoint name="band_a"> <location>-0.039 -0.18 0</location> </PathPoint>
+      <PathPoint name="band_b">
+          <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>-0.039 -0.22 0.001</location>
+      </PathPoint>
+      <WrapSphere name="condyle">
+    -     <quadrant>x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
+    +     <quadrant>-x</quadrant> <translation>0 -0.2 0</translation> <radius>0.04</radius>
+      </WrapSphere>
     ```
     """
     for item in measures_of(subject).on_surfaces:
@@ -192,26 +155,11 @@ def moving_point_range(subject: Subject, found: Found) -> None:
     and energy is not conserved. Nothing keeps a coordinate in its range in a simulation, `clamped` neither.
 
     ```xml
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <MovingPathPoint name="b">
-                          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                          <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
-                          <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
-                          <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
-    -                     <x_location> <SimmSpline> <x>-1 -0.5 0</x> <y>0.02 0.03 0.05</y> </SimmSpline> </x_location>
-    +                     <x_location> <SimmSpline> <x>-2.1 -1 0</x> <y>0.018 0.02 0.05</y> </SimmSpline> </x_location>
-                          <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
-                          <z_location> <Constant> <value>0</value> </Constant> </z_location>
-                      </MovingPathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <MovingPathPoint name="patella">
+          <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
+    -     <x_location> <SimmSpline> <x>-1 -0.5 0</x> <y>0.02 0.03 0.05</y> </SimmSpline> </x_location>
+    +     <x_location> <SimmSpline> <x>-2.1 -1 0</x> <y>0.018 0.02 0.05</y> </SimmSpline> </x_location>
+      </MovingPathPoint>
     ```
     """
     made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)

@@ -30,18 +30,9 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
     the numbers belong to two different muscles.
 
     ```xml
-      <Millard2012EquilibriumMuscle name="soleus">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-    -     <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.5</default_fiber_length>
-    +     <tendon_slack_length>0.3</tendon_slack_length> <default_fiber_length>0.05</default_fiber_length>
+      <Millard2012EquilibriumMuscle name="flexor">
+    -     <optimal_fiber_length>0.1</optimal_fiber_length> <default_fiber_length>0.5</default_fiber_length>
+    +     <optimal_fiber_length>0.1</optimal_fiber_length> <default_fiber_length>0.12</default_fiber_length>
       </Millard2012EquilibriumMuscle>
     ```
     """
@@ -80,19 +71,9 @@ def control_below_activation(subject: Subject, found: Found) -> None:
     it; a control that asks for less is a contradiction.
 
     ```xml
-      <Millard2012EquilibriumMuscle name="soleus">
-    -     <min_control>0</min_control>
-    +     <min_control>0.01</min_control>
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-          <tendon_slack_length>0.3</tendon_slack_length>
+      <Millard2012EquilibriumMuscle name="flexor">
+    -     <min_control>0</min_control> <minimum_activation>0.01</minimum_activation>
+    +     <min_control>0.01</min_control> <minimum_activation>0.01</minimum_activation>
       </Millard2012EquilibriumMuscle>
     ```
     """
@@ -119,18 +100,9 @@ def out_of_reach(subject: Subject, found: Found) -> None:
     of another muscle, or were not scaled with the bones.
 
     ```xml
-      <Millard2012EquilibriumMuscle name="soleus">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <max_isometric_force>3500</max_isometric_force> <optimal_fiber_length>0.05</optimal_fiber_length>
-    -     <tendon_slack_length>0.03</tendon_slack_length>
-    +     <tendon_slack_length>0.34</tendon_slack_length>
+      <Millard2012EquilibriumMuscle name="flexor">
+    -     <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.01</tendon_slack_length>
+    +     <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
       </Millard2012EquilibriumMuscle>
     ```
     """
@@ -165,31 +137,11 @@ def shared_time_constants(subject: Subject, found: Found) -> None:
 
     ```xml
       <DeGrooteFregly2016Muscle name="fast">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                          <location>0 0.17 0</location> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <ignore_tendon_compliance>true</ignore_tendon_compliance>
-          <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
+          <activation_time_constant>0.015</activation_time_constant>
       </DeGrooteFregly2016Muscle>
       <DeGrooteFregly2016Muscle name="slow">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                          <location>0 0.17 0</location> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <ignore_tendon_compliance>true</ignore_tendon_compliance>
-          <optimal_fiber_length>0.1</optimal_fiber_length> <tendon_slack_length>0.1</tendon_slack_length>
     -     <activation_time_constant>0.03</activation_time_constant>
+    +     <activation_time_constant>0.015</activation_time_constant>
       </DeGrooteFregly2016Muscle>
     ```
     """

@@ -24,17 +24,12 @@ def short_path(subject: Subject, found: Found) -> None:
     OpenSim refuses the model.
 
     ```xml
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-    +                 <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <PathPointSet>
+          <objects>
+              <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+    +         <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+          </objects>
+      </PathPointSet>
     ```
     """
     for path in subject.each(GeometryPath):
@@ -76,18 +71,13 @@ def coincident_path_points(subject: Subject, found: Found) -> None:
     Usually one point was copied and not moved.
 
     ```xml
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-    -                 <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <PathPointSet>
+          <objects>
+              <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+    -         <PathPoint name="b"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
+              <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
+          </objects>
+      </PathPointSet>
     ```
     """
     nearest = subject.config.value_of(DISTANCE)
@@ -117,22 +107,11 @@ def inverted_point_range(subject: Subject, found: Found) -> None:
     The coordinate is never inside, so that the path always leaves the point out.
 
     ```xml
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <ConditionalPathPoint name="b">
-                          <socket_parent_frame>/bodyset/thigh</socket_parent_frame> <location>0 -0.1 0</location>
-    -                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>0 -2</range>
-    +                     <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate> <range>-2 0</range>
-                      </ConditionalPathPoint>
-                      <PathPoint name="c"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <ConditionalPathPoint name="via">
+          <socket_coordinate>/jointset/knee/knee_angle</socket_coordinate>
+    -     <range>0 -2.1</range>
+    +     <range>-2.1 0</range>
+      </ConditionalPathPoint>
     ```
     """
     for point in subject.each(ConditionalPathPoint):
@@ -156,13 +135,11 @@ def unused_wrap_object(subject: Subject, found: Found) -> None:
     They have no effect; often a path was meant to use them.
 
     ```xml
-    - <Body name="thigh">
+      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
     -     <WrapObjectSet>
-    -         <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
+    -         <objects> <WrapSphere name="ball"> <radius>0.03</radius> </WrapSphere> </objects>
     -     </WrapObjectSet>
-    -     <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-    - </Body>
-    + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
+      </Body>
     ```
     """
     surfaces = list(subject.each(WrapObject))
@@ -184,26 +161,12 @@ def moving_point_coordinates(subject: Subject, found: Found) -> None:
     does with the knee; two joints would need a surface.
 
     ```xml
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <MovingPathPoint name="b">
-                          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
-                          <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
-    -                     <socket_y_coordinate>/jointset/hip/hip_flexion</socket_y_coordinate>
-    +                     <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
-                          <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
-                          <x_location> <Constant> <value>0.04</value> </Constant> </x_location>
-                          <y_location> <Constant> <value>0.1</value> </Constant> </y_location>
-                          <z_location> <Constant> <value>0</value> </Constant> </z_location>
-                      </MovingPathPoint>
-                  </objects>
-              </PathPointSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <MovingPathPoint name="patella">
+          <socket_x_coordinate>/jointset/knee/knee_angle</socket_x_coordinate>
+    -     <socket_y_coordinate>/jointset/hip/hip_flexion</socket_y_coordinate>
+    +     <socket_y_coordinate>/jointset/knee/knee_angle</socket_y_coordinate>
+          <socket_z_coordinate>/jointset/knee/knee_angle</socket_z_coordinate>
+      </MovingPathPoint>
     ```
     """
     for point in subject.named("MovingPathPoint"):

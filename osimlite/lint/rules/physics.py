@@ -56,17 +56,11 @@ def friction_order(subject: Subject, found: Found) -> None:
     and d dynamic: where s is less than half of d this is negative at small v, and friction pushes the way things slide.
 
     ```xml
-      <HuntCrossleyForce name="foot_ground">
-          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-              <objects>
-                  <HuntCrossleyForce::ContactParameters>
-                      <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
-    -                 <static_friction>0.4</static_friction> <dynamic_friction>0.8</dynamic_friction>
-    +                 <static_friction>0.8</static_friction> <dynamic_friction>0.4</dynamic_friction>
-                  </HuntCrossleyForce::ContactParameters>
-              </objects>
-          </HuntCrossleyForce::ContactParametersSet>
-      </HuntCrossleyForce>
+      <HuntCrossleyForce::ContactParameters>
+          <geometry>heel floor</geometry> <stiffness>1e6</stiffness>
+    -     <static_friction>0.4</static_friction> <dynamic_friction>0.8</dynamic_friction>
+    +     <static_friction>0.8</static_friction> <dynamic_friction>0.4</dynamic_friction>
+      </HuntCrossleyForce::ContactParameters>
     ```
     """
     for material in subject.each(HuntCrossleyContactParameters):

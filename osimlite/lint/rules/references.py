@@ -33,16 +33,10 @@ def unresolved_reference(subject: Subject, found: Found) -> None:
     force. A group that names a missing member loses it in silence.
 
     ```xml
-      <HuntCrossleyForce name="foot_ground">
-          <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
-              <objects>
-                  <HuntCrossleyForce::ContactParameters>
-    -                 <geometry>floor heal</geometry> <stiffness>1e6</stiffness>
-    +                 <geometry>floor heel</geometry> <stiffness>1e6</stiffness>
-                  </HuntCrossleyForce::ContactParameters>
-              </objects>
-          </HuntCrossleyForce::ContactParametersSet>
-      </HuntCrossleyForce>
+      <HuntCrossleyForce::ContactParameters>
+    -     <geometry>floor heal</geometry> <stiffness>1e6</stiffness>
+    +     <geometry>floor heel</geometry> <stiffness>1e6</stiffness>
+      </HuntCrossleyForce::ContactParameters>
     ```
     """
     for broken in _broken(subject, "missing"):

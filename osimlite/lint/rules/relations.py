@@ -47,28 +47,12 @@ def contradicting_values(subject: Subject, found: Found) -> None:
     OpenSim refuses the model, and its message names neither the muscle nor the property.
 
     ```xml
-      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-          <WrapObjectSet name="wrapobjectset">
-              <objects>
-    -             <WrapTorus name="ring"> <inner_radius>0.6</inner_radius> <outer_radius>0.4</outer_radius> </WrapTorus>
-    +             <WrapTorus name="ring"> <inner_radius>0.4</inner_radius> <outer_radius>0.6</outer_radius> </WrapTorus>
-              </objects>
-          </WrapObjectSet>
-      </Body>
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="start"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame> </PathPoint>
-                      <PathPoint name="end"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-              <PathWrapSet>
-                  <objects> <PathWrap name="around"> <wrap_object>ring</wrap_object> </PathWrap> </objects>
-              </PathWrapSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <WrapObjectSet name="wrapobjectset">
+          <objects>
+    -         <WrapTorus name="condyle"> <inner_radius>0.6</inner_radius> <outer_radius>0.4</outer_radius> </WrapTorus>
+    +         <WrapTorus name="condyle"> <inner_radius>0.4</inner_radius> <outer_radius>0.6</outer_radius> </WrapTorus>
+          </objects>
+      </WrapObjectSet>
     ```
     """
     strange = {id(item) for item, *_ in outside(subject)}

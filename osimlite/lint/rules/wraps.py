@@ -29,27 +29,9 @@ def swallowed_point(subject: Subject, found: Found) -> None:
     every pose and without a message. A point may be inside by less than a millimetre, after scaling for instance.
 
     ```xml
-      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-          <WrapObjectSet name="wrapobjectset">
-    -         <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
-    +         <objects> <WrapSphere name="condyle"> <radius>0.028</radius> </WrapSphere> </objects>
-          </WrapObjectSet>
-      </Body>
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                          <location>0.02 0 0.02</location> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-              <PathWrapSet>
-                  <objects> <PathWrap name="around"> <wrap_object>condyle</wrap_object> </PathWrap> </objects>
-              </PathWrapSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+      <PathPoint name="band_a"> <location>0.02 0 0.02</location> </PathPoint>
+    - <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere>
+    + <WrapSphere name="condyle"> <radius>0.028</radius> </WrapSphere>
     ```
     """
     for path in subject.each(GeometryPath):
@@ -89,29 +71,8 @@ def wrap_range(subject: Subject, found: Found) -> None:
     wrap. Points count from 1, and -1 stands for either end.
 
     ```xml
-      <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
-          <WrapObjectSet name="wrapobjectset">
-              <objects> <WrapSphere name="condyle"> <radius>0.03</radius> </WrapSphere> </objects>
-          </WrapObjectSet>
-      </Body>
-      <PathSpring name="spring">
-          <GeometryPath name="path">
-              <PathPointSet>
-                  <objects>
-                      <PathPoint name="a"> <socket_parent_frame>/bodyset/thigh</socket_parent_frame>
-                          <location>0.05 0 0</location> </PathPoint>
-                      <PathPoint name="b"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </PathPoint>
-                  </objects>
-              </PathPointSet>
-              <PathWrapSet>
-                  <objects>
-    -                 <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
-    +                 <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>1 2</range> </PathWrap>
-                  </objects>
-              </PathWrapSet>
-          </GeometryPath>
-          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
-      </PathSpring>
+    - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
+    + <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>1 2</range> </PathWrap>
     ```
     """
     for path in subject.each(GeometryPath):
