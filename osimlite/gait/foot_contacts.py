@@ -113,7 +113,7 @@ def _soles(engine: BatchEngine) -> list[_Sole]:
             continue
         for place, pair in enumerate(element.pairs):
             plane, sphere = element.surfaces[pair.first], element.surfaces[pair.second]
-            if plane.is_half_space and sphere.body != GROUND:
+            if plane.is_half_space and not sphere.radii and sphere.body != GROUND:
                 held = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
                 reach = sum((a - b) ** 2 for a, b in zip(sphere.center, held.tolist(), strict=True)) ** 0.5
                 name = element.pair_name(place)

@@ -124,23 +124,25 @@ class BatchEngine(Engine, Protocol):
         """
 
 
-class Renewed(Protocol):
-    """A model of which only numbers have changed."""
+@dataclass(frozen=True)
+class Renewed:
+    """A model of which only numbers have changed.
 
-    @property
-    def mechanism(self) -> Mechanism:
-        """Of it."""
+    Attributes:
+        mechanism: of it.
+        forces: of it.
+        numbers: as `BatchEngine.numbers` (m,).
+        given: engine of the model before.
+    """
 
-    @property
-    def forces(self) -> Forces:
-        """Of it."""
-
-    @property
-    def numbers(self) -> Floats:
-        """As `BatchEngine.numbers` (m,)."""
+    mechanism: Mechanism
+    forces: Forces
+    numbers: Floats
+    given: Any
 
     def engine(self) -> Any:
         """The engine of this very model."""
+        return self.given.renumbered(self.mechanism, self.forces, self.numbers)
 
 
 class Renewal(Protocol):

@@ -41,11 +41,6 @@ class StateVariable:
     is_named: bool = True
 
 
-def states_of(element: Any) -> tuple[StateVariable, ...]:
-    """The auxiliary states of a force element."""
-    return getattr(element, "states", ())
-
-
 def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:
     """Paths of states in the order of their components, as OpenSim names them all.
 
@@ -82,7 +77,7 @@ class StateLayout:
     def __init__(self, mechanism: Mechanism, order: Sequence[int], elements: Iterable[Any] = ()) -> None:
         self.mechanism = mechanism
         self.order = tuple(order)
-        found = [variable for element in elements for variable in states_of(element)]
+        found = [variable for element in elements for variable in element.states]
         self.variables = tuple(sorted(found, key=attrgetter("is_simbody")))
         self.size = 2 * len(self.order) + len(self.variables)
         self._still = [info.default_value for info in mechanism.coordinates]
@@ -101,7 +96,7 @@ class StateLayout:
 
     def first_of(self, element: Any) -> int:
         """Place in y of the first state of an element, which the others of the element follow; -1 if it has none."""
-        own = states_of(element)
+        own = element.states
         return 2 * len(self.order) + self.variables.index(own[0]) if own else -1
 
     # ------------------------------------------------------------------------------------------ whole states

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -228,24 +228,17 @@ class Interrupted(KeyboardInterrupt):
         self.trajectory = trajectory
 
 
-class Report:
+class Report(NamedTuple):
     """How a trajectory gets what it works out later.
 
-    Args:
+    Attributes:
         forces: labels, and one row for each moment.
         energies: kinetic energy, potential energy of gravity and stored energy at each moment, J.
         probes: labels, and one row for each moment.
         summary: what goes into summary.json.
     """
 
-    def __init__(
-        self,
-        forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]],
-        energies: Callable[[], Sequence[Sequence[float]]],
-        probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]],
-        summary: Callable[[], dict[str, Any]],
-    ) -> None:
-        self.forces = forces
-        self.energies = energies
-        self.probes = probes
-        self.summary = summary
+    forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
+    energies: Callable[[], Sequence[Sequence[float]]]
+    probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
+    summary: Callable[[], dict[str, Any]]

@@ -55,6 +55,12 @@ def test_energy_on_a_plane_is_kept_without_dissipation(tmp_path):
     assert np.ptp(total) < 1e-6 * stored.max()
 
 
+def test_a_force_that_is_switched_off_does_nothing(tmp_path):
+    model = thrown(tmp_path)
+    model.force_set.objects[0].appliesForce = False
+    assert not osimlite.simulate(model, 0.01, folder=tmp_path).forces
+
+
 def test_fixed_steps_converge_at_first_order(tmp_path):
     model = thrown(tmp_path, dissipation=0.5, friction=0.5)
     best = osimlite.simulate(model, 0.2, accuracy=1e-9, folder=tmp_path)

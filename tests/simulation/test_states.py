@@ -89,7 +89,7 @@ def test_states_have_the_order_and_the_starts_of_their_owners():
     muscle = Element(
         StateVariable("/m/activation", 0.05), StateVariable("/m/fiber_length", lambda q, u: 0.1 + q[1] + u[3])
     )
-    spring, bushing = object(), Element(StateVariable("/b/dissipated_energy", is_simbody=True))
+    spring, bushing = Element(), Element(StateVariable("/b/dissipated_energy", is_simbody=True))
     layout = StateLayout(mechanism, (3, 0, 1), [bushing, spring, muscle])
     assert layout.size == 9 and layout.paths == ["/m/activation", "/m/fiber_length", "/b/dissipated_energy"]
     assert [layout.first_of(element) for element in (bushing, spring, muscle)] == [8, -1, 6]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy
@@ -82,17 +82,14 @@ class PairContact:
         records: the surfaces in the order of OpenSim's record.
     """
 
+    states: ClassVar[tuple[StateVariable, ...]] = ()
+
     path: str
     name: str
     surfaces: tuple[ContactSurface, ...]
     pairs: tuple[ContactPair, ...]
     vt: float
     early_return: bool = False
-
-    @property
-    def states(self) -> tuple[StateVariable, ...]:
-        """None."""
-        return ()
 
     def items(self, places: Places) -> list[Item]:
         """An item for each pair, and what computes them one by one if they depend on one another."""
@@ -175,24 +172,14 @@ class PairContact:
         )
 
 
-@dataclass(frozen=True)
 class HuntCrossley(PairContact):
-    """One HuntCrossleyForce on half spaces and spheres."""
+    """One HuntCrossleyForce on half spaces, spheres and ellipsoids."""
 
+    component: ClassVar = HuntCrossleyForce
 
-@dataclass(frozen=True)
-class EllipsoidContact(PairContact):
-    """One HuntCrossleyForce with ellipsoids among its surfaces."""
-
-
-class HuntCrossleyContacts:
-    """The kind of a HuntCrossleyForce."""
-
-    component = HuntCrossleyForce
-
-    @staticmethod
-    def make(builder: ElementBuilder, force: HuntCrossleyForce) -> PairContact:
-        """The element of a HuntCrossleyForce."""
+    @classmethod
+    def make(cls, builder: ElementBuilder, force: HuntCrossleyForce) -> HuntCrossley:
+        """The element of a force."""
         surfaces = [surface_of(builder, force, *found) for found in geometries(builder, force)]
         builder.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
         pairs = []
@@ -206,13 +193,11 @@ class HuntCrossleyContacts:
                 pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
             except ValueError as error:
                 raise ModelError(f"the force '{builder.path(force)}': {error}") from None
-        has_ellipsoid = any(surface.radii for surface in surfaces)
         early_return = builder.early_return and len(pairs) > 1
-        if has_ellipsoid and early_return:
+        if early_return and any(surface.radii for surface in surfaces):
             raise builder.unsupported(force, " with an ellipsoid, and Simbody's early return")
-        kind = EllipsoidContact if has_ellipsoid else HuntCrossley
         path, vt = builder.path(force), force.transition_velocity
-        return kind(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
+        return cls(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
 
 
 def _shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:

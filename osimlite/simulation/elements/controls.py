@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.errors import UnsupportedError
@@ -152,7 +150,7 @@ def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
 
     A class of controllers is declared in the module of its name in `controllers/`, by a function `drives`.
     """
-    from osimlite.simulation.elements.gather import module_name
+    from osimlite.simulation.elements.gather import module_of
 
     for controller in builder.components(Controller):
         if isinstance(controller, Unknown):
@@ -160,11 +158,10 @@ def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
         # OpenSim 4.6 enables a ControlSetController that has read its file.
         if not (controller.enabled or isinstance(controller, ControlSetController)):
             continue
-        module = f"{__package__}.controllers.{module_name(type(controller))}"
-        if find_spec(module) is not None:
+        if (module := module_of("controllers", type(controller))) is not None:
             path = builder.path(controller)
             if path not in builder.drives:
-                builder.drives[path] = list(import_module(module).drives(builder, controller))
+                builder.drives[path] = list(module.drives(builder, controller))
             yield from ((controller, drive) for drive in builder.drives[path])
             continue
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from re import sub
@@ -251,6 +253,12 @@ def kind_of(component: Any) -> str:
 def module_name(component: type) -> str:
     """The module that declares what osimlite makes of a class: PathSpring is in path_spring."""
     return sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", component.__name__).lower()
+
+
+def module_of(package: str, component: type) -> Any:
+    """The module of the elements that declares what is made of a class; None if there is none."""
+    name = f"{__package__}.{package}.{module_name(component)}"
+    return import_module(name) if find_spec(name) is not None else None
 
 
 def triple(values: Any) -> Triple:

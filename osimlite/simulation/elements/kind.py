@@ -17,12 +17,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
-from importlib.util import find_spec
 from pkgutil import iter_modules
 from typing import Any, ClassVar
 
 from osimlite.schema.actuators import Actuator
-from osimlite.simulation.elements.gather import ElementBuilder, module_name
+from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response
 from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
@@ -289,5 +288,4 @@ def kinds() -> list[Any]:
 @cache
 def kind_of_class(component: type) -> Any:
     """The declaration of a class of forces, None if there is none."""
-    name = f"{__package__}.kinds.{module_name(component)}"
-    return import_module(name).KIND if find_spec(name) is not None else None
+    return getattr(module_of("kinds", component), "KIND", None)

@@ -15,14 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.quantity import tell
-from osimlite.simulation.elements.gather import ElementBuilder, module_name
+from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places
 from osimlite.simulation.elements.kernel_text import written
 from osimlite.simulation.elements.kind import DeclaredForce
@@ -280,8 +278,7 @@ def _subject(
 @cache
 def kind_of_probe(component: type) -> Any:
     """The declaration of a class of probes, None if there is none."""
-    name = f"{__package__}.probes.{module_name(component)}"
-    return import_module(name).PROBE if find_spec(name) is not None else None
+    return getattr(module_of("probes", component), "PROBE", None)
 
 
 def members_of(builder: ElementBuilder, probe: Any, words: Sequence[Any], path: str, kind: str) -> list[Any]:

@@ -9,8 +9,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from numpy.typing import ArrayLike
-
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
@@ -20,9 +18,7 @@ from osimlite.simulation.engines import many
 from osimlite.simulation.engines.base import KernelEngine
 from osimlite.simulation.engines.linking import version
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels.pointers import Floats
-from osimlite.simulation.many import BatchEngine, BatchOptions
-from osimlite.simulation.runs import Runs
+from osimlite.simulation.many import BatchEngine
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.renewal import NumbersOnly
@@ -56,19 +52,7 @@ class CompiledEngine(KernelEngine):
         # Addresses mean nothing in another process.
         return CompiledEngine, (self.mechanism, self.forces)
 
-    def run_many(self, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None) -> Runs:
-        """Compute a batch."""
-        return many.run_many(self, states, options, numbers)
-
-    def contact_places(
-        self, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
-    ) -> Floats:
-        """Where the surfaces of all contacts are, in ground."""
-        return many.contact_places(self, states, numbers, rows)
-
-    def contact_radii(self, numbers: ArrayLike | None = None) -> Floats:
-        """Radii of the second surfaces of all contacts, m."""
-        return many.contact_radii(self, numbers)
+    run_many, contact_places, contact_radii = many.run_many, many.contact_places, many.contact_radii
 
     def renewal(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> NumbersOnly:
         """What makes parts of the model anew."""

@@ -25,7 +25,9 @@ AT_ONCE = 8
 """So many runs a thread takes at a time."""
 
 
-def run_many(engine: CompiledEngine, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None) -> Runs:
+def run_many(
+    engine: CompiledEngine, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None
+) -> Runs:
     """Compute a batch."""
     from concurrent.futures import ThreadPoolExecutor
 
@@ -61,28 +63,19 @@ def run_many(engine: CompiledEngine, states: ArrayLike, options: BatchOptions, n
 
 
 def contact_places(
-    engine: CompiledEngine, states: ArrayLike, numbers: ArrayLike | None, rows: ArrayLike | None
+    engine: CompiledEngine, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
 ) -> Floats:
     """Where the surfaces of all contacts are (k, P, 9)."""
     vectors, given = _rows(engine, numbers), engine.state.table(states)
     which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     places = np.zeros((len(given), len(engine.contacts), 9))
     w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(engine.state.size)
-    engine.program.code.entry("contact_places")(
-        engine.program.ints,
-        vectors,
-        w,
-        vectors.shape[1],
-        which,
-        given,
-        derivative,
-        places,
-        len(given),
-    )
+    arrays = vectors, w, vectors.shape[1], which, given, derivative, places
+    engine.program.code.entry("contact_places")(engine.program.ints, *arrays, len(given))
     return places
 
 
-def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
     """Radii of the second surfaces (v, P)."""
     s = engine.structure
     records = s[s[layout.CONTACT_AT] : s[layout.CONTACT_AT] + len(engine.contacts)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,23 +25,10 @@ from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
+from osimlite.simulation.many import Renewed
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.compiled import CompiledEngine
-
-
-@dataclass(frozen=True)
-class Renumbered:
-    """A model of which only numbers have changed; see :class:`osimlite.simulation.many.Renewed`."""
-
-    mechanism: Mechanism
-    forces: Forces
-    numbers: Floats
-    given: CompiledEngine
-
-    def engine(self) -> CompiledEngine:
-        """The engine of this very model."""
-        return self.given.renumbered(self.mechanism, self.forces, self.numbers)
 
 
 class NumbersOnly:
@@ -71,7 +58,7 @@ class NumbersOnly:
             self._first[path] = place
             place += _length(items)
 
-    def renewed(self, owners: Sequence[Component]) -> Renumbered | None:
+    def renewed(self, owners: Sequence[Component]) -> Renewed | None:
         """The model with what its forces and bodies are now; None if more has changed than numbers.
 
         Args:
@@ -108,7 +95,7 @@ class NumbersOnly:
         if mechanism is None:
             return None
         numbers = self._with_forces(made, forces.controls) if only_forces else self._packed(mechanism, forces)
-        return None if numbers is None else Renumbered(mechanism, forces, numbers, self._engine)
+        return None if numbers is None else Renewed(mechanism, forces, numbers, self._engine)
 
     def _with_forces(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
         """The given numbers with those of some elements, and of the controls, in their places."""

@@ -2,73 +2,23 @@
 
 from __future__ import annotations
 
-from osimlite.forces.formulas import (
-    arccosine,
-    arcsine,
-    arctangent,
-    complementary_error_function,
-    cosecant,
-    cosine,
-    cotangent,
-    cube,
-    divide,
-    error_function,
-    exponential,
-    hyperbolic_cosine,
-    hyperbolic_sine,
-    hyperbolic_tangent,
-    is_zero,
-    larger,
-    logarithm,
-    magnitude,
-    power,
-    reciprocal,
-    secant,
-    sine,
-    smaller,
-    square,
-    square_root,
-    tangent,
-    unit_step,
-)
-from osimlite.simulation.elements.formula import Formula
+from osimlite.forces import formulas
+from osimlite.forces.formulas import divide, larger, power, smaller
+from osimlite.simulation.elements.formula import FUNCTIONS, OF_TWO, Formula
+from osimlite.simulation.elements.kernel_text import written
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
-STEPS = (
-    "number",
-    "+",
-    "-",
-    "*",
-    "negative",
-    "divide",
-    "power",
-    "smaller",
-    "larger",
-    "square_root",
-    "exponential",
-    "logarithm",
-    "sine",
-    "cosine",
-    "secant",
-    "cosecant",
-    "tangent",
-    "cotangent",
-    "arcsine",
-    "arccosine",
-    "arctangent",
-    "hyperbolic_sine",
-    "hyperbolic_cosine",
-    "hyperbolic_tangent",
-    "error_function",
-    "complementary_error_function",
-    "unit_step",
-    "is_zero",
-    "square",
-    "cube",
-    "reciprocal",
-    "magnitude",
-)
+OF_ONE = tuple(law for name, law in FUNCTIONS.items() if name not in OF_TWO)
+STEPS = ("number", "+", "-", "*", "negative", "divide", "power", "smaller", "larger", *OF_ONE)
 """What a step may do, by its number."""
+
+LINES = [line for number, law in enumerate(OF_ONE) for line in (f"if kind == {number}:", f"    return {law}(a)")]
+of_one = written(
+    "of_one",
+    __name__,
+    "\n    ".join(['def of_one(kind: "int", a: "float") -> "float":', *LINES, "return 0.0\n"]),
+    **{law: getattr(formulas, law) for law in OF_ONE},
+)
 
 
 def compute(steps: Ints, count: int, constants: Floats, registers: Floats, variables: int) -> float:
@@ -107,58 +57,6 @@ def compute(steps: Ints, count: int, constants: Floats, registers: Floats, varia
             else:
                 value = of_one(kind - 9, a)
         registers[variables + k] = value
-    return value
-
-
-def of_one(kind: int, a: float) -> float:
-    """A function of one number."""
-    value = 0.0
-    if kind == 0:
-        value = square_root(a)
-    elif kind == 1:
-        value = exponential(a)
-    elif kind == 2:
-        value = logarithm(a)
-    elif kind == 3:
-        value = sine(a)
-    elif kind == 4:
-        value = cosine(a)
-    elif kind == 5:
-        value = secant(a)
-    elif kind == 6:
-        value = cosecant(a)
-    elif kind == 7:
-        value = tangent(a)
-    elif kind == 8:
-        value = cotangent(a)
-    elif kind == 9:
-        value = arcsine(a)
-    elif kind == 10:
-        value = arccosine(a)
-    elif kind == 11:
-        value = arctangent(a)
-    elif kind == 12:
-        value = hyperbolic_sine(a)
-    elif kind == 13:
-        value = hyperbolic_cosine(a)
-    elif kind == 14:
-        value = hyperbolic_tangent(a)
-    elif kind == 15:
-        value = error_function(a)
-    elif kind == 16:
-        value = complementary_error_function(a)
-    elif kind == 17:
-        value = unit_step(a)
-    elif kind == 18:
-        value = is_zero(a)
-    elif kind == 19:
-        value = square(a)
-    elif kind == 20:
-        value = cube(a)
-    elif kind == 21:
-        value = reciprocal(a)
-    elif kind == 22:
-        value = magnitude(a)
     return value
 
 

@@ -7,7 +7,6 @@ from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.controllers import Controller
 from osimlite.schema.wrapping import WrapObject
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.states import states_of
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf.draft import Draft, add
 
@@ -34,6 +33,6 @@ def add_driven(draft: Draft) -> None:
     idle = {"joint": joint.get("name"), "gainprm": 0, "gear": 0}
     for path in forces.controls.names:
         add(draft.section("actuator"), "general", name=draft.name("actuator", path), **idle)
-    count = sum(len(states_of(element)) for element in forces.elements)
+    count = sum(len(element.states) for element in forces.elements)
     if count:
         add(draft.section("actuator"), "general", name=STATES, dyntype="user", actdim=count, **idle)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Any, Protocol
 
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_name
+from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels.paths import path_length, pull_path
@@ -42,10 +40,10 @@ class AlongPath(Geometry):
             UnsupportedError: it is of a class, or wraps around a surface, that osimlite cannot compute.
             ModelError: it makes no sense.
         """
-        module = f"{__package__}.paths.{module_name(type(force.geometry_path))}"
-        if find_spec(module) is None:
+        module = module_of("geometries.paths", type(force.geometry_path))
+        if module is None:
             raise builder.unsupported(force, f" on a {kind_of(force.geometry_path)}")
-        return import_module(module).read(builder, force)
+        return module.read(builder, force)
 
     def parts(self, place: Path, places: Places) -> list[Item]:
         """Those of the path."""
