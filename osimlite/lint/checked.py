@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypedDict, Unpack
 
 from osimlite.lint.config import Config
 from osimlite.lint.fixes import suggested
@@ -13,6 +13,16 @@ if TYPE_CHECKING:
     from osimlite.lint.diagnostic import Fix
     from osimlite.lint.engine import Rule
     from osimlite.schema.base import Object
+
+
+class Where(TypedDict, total=False):
+    """What more tells the place of a finding; :meth:`Subject.position` says how."""
+
+    tag: str | None
+    word: str | None
+    nth: int
+    attribute: str | None
+    number: int | None
 
 
 class Checked:
@@ -54,16 +64,7 @@ class Checked:
         """The absolute path of the component an object belongs to."""
         return ""
 
-    def position(
-        self,
-        item: Object | None,
-        *,
-        tag: str | None = None,
-        word: str | None = None,
-        nth: int = 0,
-        attribute: str | None = None,
-        number: int | None = None,
-    ) -> Position | None:
+    def position(self, item: Object | None, **where: Unpack[Where]) -> Position | None:
         """Where something is in the text."""
         return None
 

@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from inspect import cleandoc
-from typing import Any, Literal, Protocol
+from pkgutil import iter_modules
+from typing import Any, Literal, Unpack
 
 from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
 from osimlite.document.survey import Survey, survey, survey_file
 from osimlite.errors import SpecialFileError
 from osimlite.files import read_file
-from osimlite.lint.checked import Checked
+from osimlite.lint import rules
+from osimlite.lint.checked import Checked, Where
 from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
 from osimlite.lint.measures import MEASURES
@@ -46,76 +48,58 @@ FAMILIES = {
 }
 """The families of rules by the first digit of their codes."""
 
-_MODULES = (
-    "text",
-    "markup",
-    "structure",
-    "classes",
-    "leftovers",
-    "versions",
-    "values",
-    "domains",
-    "relations",
-    "references",
-    "names",
-    "contact",
-    "wiring",
-    "topology",
-    "joints",
-    "custom_joints",
-    "gimbals",
-    "bodies",
-    "physics",
-    "coordinates",
-    "space",
-    "functions",
-    "paths",
-    "wraps",
-    "muscles",
-    "measured_paths",
-    "measured_muscles",
-    "files",
-    "tables",
-    "table_rows",
-    "marker_tables",
-    "setup_files",
-    "setup_names",
-    "setup_columns",
-    "setup_markers",
-    "setup_geometry",
-    "setup_loads",
-    "setup_times",
-    "setup_sensors",
-    "setup_tasks",
-    "setup_tools",
-    "moco",
-)
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a rule calls for each finding of a subject."""
 
-class Found(Protocol):
-    """What a rule calls for each finding."""
+    rule: Rule
+    subject: Checked
+    findings: list[Finding]
 
     def __call__(
         self,
         message: str,
         item: Object | None = None,
         *,
-        tag: str | None = None,
-        word: str | None = None,
-        nth: int = 0,
-        attribute: str | None = None,
-        number: int | None = None,
         at: Position | None = None,
         severity: Severity | None = None,
         suggestion: str | None = None,
         certain: bool = False,
         fix: Fix | None = None,
+        **where: Unpack[Where],
     ) -> None:
         """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
 
         Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is `certain` or differs in
         letter case alone.
         """
+        rule, subject = self.rule, self.subject
+        if at is None and (item is not None or where.get("number") is not None):
+            at = subject.position(item, **where)
+        line, column, length = at if at is not None else (None, None, 1)
+        if rule.mends and rule.about != "model" and suggestion is not None and at is not None:
+            named = where.get("word") or (item and getattr(item, where.get("attribute") or where.get("tag") or "name"))
+            fix = fix or subject.replacing(at, named, suggestion, certain=certain)
+        elif subject.upgraded:
+            # What is said of an upgraded document need not be said of its text.
+            fix = None
+        self.findings.append(
+            Finding(
+                rule.code,
+                rule.name,
+                subject.config.severity_of(rule, severity or rule.severity_in(subject.version)),
+                brief(message),
+                subject.file,
+                line,
+                column,
+                max(1, length),
+                subject.path(item),
+                suggestion,
+                # Nor need what is said of one that was guessed at.
+                None if subject.sure_until is not None else fix,
+            )
+        )
 
 
 Check = Callable[[Any, Found], None]
@@ -202,8 +186,8 @@ def rule(
 @cache
 def all_rules() -> tuple[Rule, ...]:
     """Every rule, by code."""
-    for module in _MODULES:
-        import_module(f"osimlite.lint.rules.{module}")
+    for module in iter_modules(rules.__path__):
+        import_module(f"{rules.__name__}.{module.name}")
     return tuple(_RULES[code] for code in sorted(_RULES))
 
 
@@ -277,7 +261,7 @@ def run(subject: Checked, *, measure: bool = True) -> Report:
     left_out = measuring if why_not else []
     for known in wanted:
         if known not in left_out:
-            known.check(subject, _collector(known, subject, findings))
+            known.check(subject, Found(known, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
@@ -296,7 +280,7 @@ def _not_ignored(
     kept = [finding for finding in findings if not any([comment.covers(finding) for comment in comments])]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):
-        found = _collector(unused, subject, kept)
+        found = Found(unused, subject, kept)
         for comment in comments:
             for code in comment.codes:
                 named = [known for known in all_rules() if known.matches(code)]
@@ -308,48 +292,3 @@ def _not_ignored(
             if not comment.codes:
                 found("this comment names no code to ignore", at=comment.place)
     return kept
-
-
-def _collector(known: Rule, subject: Checked, findings: list[Finding]) -> Found:
-    def found(
-        message: str,
-        item: Object | None = None,
-        *,
-        tag: str | None = None,
-        word: str | None = None,
-        nth: int = 0,
-        attribute: str | None = None,
-        number: int | None = None,
-        at: Position | None = None,
-        severity: Severity | None = None,
-        suggestion: str | None = None,
-        certain: bool = False,
-        fix: Fix | None = None,
-    ) -> None:
-        if at is None and (item is not None or number is not None):
-            at = subject.position(item, tag=tag, word=word, nth=nth, attribute=attribute, number=number)
-        line, column, length = at if at is not None else (None, None, 1)
-        if known.mends and known.about != "model" and suggestion is not None and at is not None:
-            named = word if word is not None or item is None else getattr(item, attribute or tag or "name")
-            fix = fix or subject.replacing(at, named, suggestion, certain=certain)
-        elif subject.upgraded:
-            # What is said of an upgraded document need not be said of its text.
-            fix = None
-        findings.append(
-            Finding(
-                known.code,
-                known.name,
-                subject.config.severity_of(known, severity or known.severity_in(subject.version)),
-                brief(message),
-                subject.file,
-                line,
-                column,
-                max(1, length),
-                subject.path(item),
-                suggestion,
-                # Nor need what is said of one that was guessed at.
-                None if subject.sure_until is not None else fix,
-            )
-        )
-
-    return found

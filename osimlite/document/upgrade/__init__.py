@@ -8,55 +8,24 @@ rounding of numbers to six digits and without the references it breaks.
 from __future__ import annotations
 
 from importlib import import_module
+from pkgutil import iter_modules
 
 from lxml import etree
 
 from osimlite.document.names import as_written
-from osimlite.document.upgrade import v40500_path_names, v40600_controllers  # noqa: F401
 from osimlite.document.upgrade.draft import REGISTERED, Change, Draft, Element, Refusal, Refused, Step
 from osimlite.document.upgrade.v40600_class_names import class_names
 from osimlite.schema.model import CURRENT_VERSION
 
 __all__ = ["Change", "Refusal", "Refused", "Step", "Upgraded", "steps", "upgrade", "with_present_names"]
 
-_BEFORE_4 = (
-    "v10601_engine",
-    "v10901_scale_factors",
-    "v10901_transform_axes",
-    "v10904_tools",
-    "v10905_point_actuators",
-    "v20002_conditional_points",
-    "v20101_geometry_files",
-    "v20202_tools",
-    "v20301_external_forces",
-    "v20302_muscles",
-    "v30000_moving_points",
-    "v30500_bodies",
-    "v30500_names",
-    "v30501_ground_and_joints",
-    "v30502_geometry",
-    "v30505_offset_frames",
-    "v30505_references",
-    "v30506_components",
-    "v30507_coordinates_and_contact",
-    "v30509_switches",
-    "v30512_frame_set",
-    "v30513_controls",
-    "v30514_reverse",
-    "v30515_wrap_objects",
-    "v30516_paths",
-    "v30517_sockets",
-    "v40000_axis_functions",
-    "v40000_meaningless",
-)
-"""The modules that only documents from before version 4 need."""
-
 
 def steps(version: int = 0) -> list[Step]:
     """The steps that a document of this version needs, oldest first."""
-    if version < 40000:
-        for module in _BEFORE_4:
-            import_module(f"{__name__}.{module}")
+    needed = "v" if version < 40000 else "v4"
+    for module in iter_modules(__path__):
+        if module.name.startswith(needed):
+            import_module(f"{__name__}.{module.name}")
     return sorted((step for step in REGISTERED if version < step.below), key=lambda step: step.order)
 
 
