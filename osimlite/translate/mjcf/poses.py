@@ -54,11 +54,12 @@ class Poses:
         )
 
     def points(self, body: int, station: Array) -> Array:
-        """Places in ground (P, 3) of a station of a body, (3,) or one for each pose (P, 3)."""
-        placed: Array = self.origins[body] + np.einsum(
-            "pij,pj->pi", self.rotations[body], np.broadcast_to(station, (len(self.q), 3))
-        )
-        return placed
+        """Places in ground (P, 3) or (k, P, 3) of a station of a body, (3,) or one for each pose."""
+        return self.origins[body] + each_pose(station, self.rotations[body].mT)
+
+    def stations(self, body: int, places: Array) -> Array:
+        """Stations of a body (k, P, 3) at places in ground (k, P, 3)."""
+        return each_pose(places - self.origins[body], self.rotations[body])
 
     def points_at(self, body: int, stations: Array, at: Places) -> Array:
         """Places in ground (k, 3) of stations of a body (k, 3), each in one of the poses, by their places (k,)."""
@@ -79,6 +80,13 @@ class Truth:
     lengths: Array
     arms: Array
     nodes: Sequence[Sequence[tuple[int, Array]]]
+
+
+def each_pose(rows: Array, matrices: Array) -> Array:
+    """Rows (k, P, i), (P, i) or (i,) times the matrix of each pose (P, i, j). Many times as fast as `einsum`."""
+    if rows.ndim < 3:
+        return np.asarray((rows[..., None, :] @ matrices)[..., 0, :])
+    return np.asarray((rows.swapaxes(0, 1) @ matrices).swapaxes(0, 1))
 
 
 def arm_errors(mechanism: Mechanism, arms: Array, truth: Truth) -> dict[int, Error]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.multibody.spatial import Array
-from osimlite.translate.mjcf.poses import Poses
+from osimlite.translate.mjcf.poses import Poses, each_pose
 from osimlite.translate.mjcf.wrapping import bend, norm, unit
 
 
@@ -98,7 +98,8 @@ def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tupl
     alike: dict[Any, list[tuple[int, Around | None]]] = {}
     for place, tendon in enumerate(tendons):
         for first, around, second in sections(tendon):
-            kind = None if around is None else (around.body, around.kind, around.side is None)
+            side = around and around.side and (around.side.body, around.side.slides is None)
+            kind = around and (around.body, around.kind, side)
             alike.setdefault((first, second, kind), []).append((place, around))
     for (first, second, kind), uses in alike.items():
         numbers = {around: k for k, around in enumerate(dict.fromkeys(around for _, around in uses))}
@@ -111,32 +112,43 @@ def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tupl
 
 
 def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses, version: int) -> tuple[Array, Array]:
-    """Lengths (k, P) and moment arms (k, P, m) from site to site: straight, or around each of k surfaces of a kind."""
+    """Lengths (k, P) and moment arms (k, P, m) from site to site: straight, or around each of k surfaces of a kind.
+
+    Surfaces that differ in their side sites only are computed once, in each way that the tendon can go around them.
+    """
     one, two = (_placed(spot, poses)[None] for spot in (first, second))
     way, back = two - one, one - two
     lengths, arms = np.zeros(()), np.zeros(())
+    chosen: Any = ...
     if arounds:
-        body = arounds[0].body
-        frames = np.stack([around.frame for around in arounds])
-        rotations = poses.rotations[body] @ frames[:, None, :3, :3]
-        middles = poses.origins[body] + np.einsum("pij,kj->kpi", poses.rotations[body], frames[:, :3, 3])
-        sides = [_placed(around.side, poses) for around in arounds if around.side is not None]
-        given = (one, two, np.stack(sides)) if sides else (one, two)
-        local = (np.einsum("kpji,kpj->kpi", rotations, at - middles).reshape(-1, 3) for at in given)
-        radii = np.repeat([around.radius for around in arounds], len(poses.q))
-        found = bend(arounds[0].kind, radii, *local, version=version)
-        ends = (np.einsum("kpij,kpj->kpi", rotations, at.reshape(middles.shape)) for at in (found.first, found.second))
-        leaves, returns = (middles + end for end in ends)
+        body, kind = arounds[0].body, arounds[0].kind
+        numbers: dict[Any, int] = {}
+        keys = [(around.radius, around.frame.tobytes()) for around in arounds]
+        owners = np.array([numbers.setdefault(key, len(numbers)) for key in keys])
+        of_each = np.unique(owners, return_index=True)[1]
+        frames = np.stack([arounds[place].frame for place in of_each])
+        radii = np.array([[arounds[place].radius] for place in of_each])
+        rotations, middles = frames[:, :3, :3], frames[:, None, :3, 3]
+        start, end = ((poses.stations(body, at) - middles) @ rotations for at in (one, two))
+        sides = [_station(around.side, body, poses) for around in arounds if around.side is not None]
+        sites = (np.stack(sides) - middles[owners]) @ rotations[owners] if sides else None
+        found = bend(kind, radii, start, end, sites, owners, version)
+        # Each way around each surface is one of the k, until they are chosen.
+        touches = found.touches.reshape(-1, len(poses.q))
+        leaves, returns = (
+            poses.points(body, (middles + at @ rotations.mT).reshape(*touches.shape, 3))
+            for at in (found.first, found.second)
+        )
         way, back = leaves - one, returns - two
-        touches = found.touches.reshape(middles.shape[:2])
         lengths = np.where(touches, found.length.reshape(touches.shape) + norm(back), 0.0)
         for place, pull in ((leaves, way), (returns, back)):
             arms = arms - _worked(body, place, np.where(touches[..., None], unit(pull), 0.0), poses)
+        chosen = found.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
     for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
         arms = arms + _worked(spot.body, place, pull, poses)
         if spot.slides is not None:
             arms = arms + _slid(spot, pull, poses)
-    return lengths + norm(way), arms
+    return (lengths + norm(way))[chosen], arms[chosen]
 
 
 def sections(tendon: Tendon) -> Iterator[tuple[Spot, Around | None, Spot]]:
@@ -160,11 +172,17 @@ def _placed(spot: Spot, poses: Poses) -> Array:
     return poses.points(spot.body, spot.place + polyval(helper, spot.slides.T).T)
 
 
+def _station(spot: Spot, body: int, poses: Poses) -> Array:
+    """Where a site is in a body: (1, 3) if it is fixed there, else (P, 3)."""
+    if spot.body == body and spot.slides is None:
+        return spot.place[None]
+    return poses.stations(body, _placed(spot, poses))
+
+
 def _worked(body: int, places: Array, force: Array, poses: Poses) -> Array:
     """What forces (k, P, 3) on a body at places in ground do at the moving coordinates (k, P, m)."""
     moments = np.cross(places - poses.origins[body], force)
-    found: Array = np.einsum("kpi,pij->kpj", np.concatenate((moments, force), axis=-1), poses.jacobians[body])
-    return found
+    return each_pose(np.concatenate((moments, force), axis=-1), poses.jacobians[body])
 
 
 def _slid(spot: Spot, force: Array, poses: Poses) -> Array:

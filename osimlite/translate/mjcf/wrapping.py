@@ -24,105 +24,107 @@ from numpy.typing import NDArray
 from osimlite.multibody.spatial import Array
 
 Mask = NDArray[np.bool_]
-Radius = float | Array
 
 TINY = 1e-15
 """MuJoCo's own least number."""
+ROUNDING = 1e-9
+"""A turn that is smaller is none, and not a whole one."""
 
 
-class Bend(NamedTuple):
-    """How a tendon bends around a surface, in P poses; what is not touched goes straight on.
+class Bends(NamedTuple):
+    """How a tendon bends around each of S surfaces in P poses, in each of C ways; what is not touched goes straight on.
 
     Attributes:
-        touches: whether it touches (P,).
-        first: where the tendon leads to from the first end (P, 3), in the frame of the surface, m: a tangent point, or
-            the second end.
-        second: where it comes to the second end from (P, 3).
-        length: on the surface (P,), m.
+        touches: whether it touches (C, S, P).
+        first: where the tendon leads to from the first end (C, S, P, 3), in the frame of the surface, m: a tangent
+            point, or the second end.
+        second: where it comes to the second end from (C, S, P, 3).
+        length: on the surface (C, S, P), m.
+        choice: which way it goes with each of k side sites (k, P); without any, one for each surface.
     """
 
     touches: Mask
     first: Array
     second: Array
     length: Array
+    choice: NDArray[np.intp]
 
 
-def bend(kind: str, radius: Radius, first: Array, second: Array, side: Array | None = None, *, version: int) -> Bend:
+def bend(
+    kind: str, radius: Array, first: Array, second: Array, sides: Array | None, owners: NDArray[np.intp], version: int
+) -> Bends:
     """How a tendon bends.
 
     Args:
         kind: ``"sphere"`` or ``"cylinder"``, this one about z.
-        radius: m, one for all or each.
-        first: one end (P, 3) in the frame of the surface, m.
-        second: the other end (P, 3).
-        side: side site (P, 3) there.
+        radius: m (S, 1).
+        first: one end (S, P, 3) in the frame of the surface, m.
+        second: the other end (S, P, 3).
+        sides: side sites (k, P, 3) in the frames of their surfaces, or None.
+        owners: places of these surfaces (k,).
         version: of MuJoCo, 3 or 4.
     """
-    if kind == "cylinder":
-        flat, across = np.eye(3)[:2], np.broadcast_to(np.eye(3)[:2], (len(first), 2, 3))
-    else:
-        flat, across = None, _plane(first, second)
+    across = None if kind == "cylinder" else _plane(first, second)
     p, q = _in(across, first), _in(across, second)
-    toward = None if side is None else _in(across, side)
-    winding = _winding(p, q, toward, radius, version)
     reach_p, reach_q = _reach(p, radius), _reach(q, radius)
-    arc = radius * (np.abs(winding) - reach_p - reach_q)
+    between = _angle(p, q)
+    signs = np.array((0.0, 1.0, -1.0))[:, None, None] if sides is not None else np.where(between < 0.0, -1.0, 1.0)[None]
+    # Of ends one behind the other, one line passes the other by, and MuJoCo 3 goes all the way around.
+    least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
+    winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
+    arc = radius * (winding - reach_p - reach_q)
+    at_p, at_q = _turned(p, signs * reach_p, radius), _turned(q, -signs * reach_q, radius)
     outside = (norm(p) >= radius) & (norm(q) >= radius)
     touches = outside & (arc > 0.0)
-    sign = np.where(winding < 0.0, -1.0, 1.0)
-    at_p, at_q = _turned(p, sign * reach_p, radius), _turned(q, -sign * reach_q, radius)
-    if side is not None and (inside := np.sqrt(np.einsum("pi,pi->p", side, side)) < radius).any():
-        through, at = _through(p, q, radius)
-        touches = np.where(inside, outside & through, touches)
-        arc = np.where(inside, 0.0, arc)
-        at_p, at_q = (np.where(inside[:, None], at, point) for point in (at_p, at_q))
-    one, two = (np.einsum("pij,pi->pj", across, flat_point) for flat_point in (at_p, at_q))
-    if flat is not None:
+    choice = np.zeros((len(owners), len(p[0])), dtype=int)
+    if sides is not None:
+        toward = _in(None if across is None else across[owners], sides)
+        if version >= 4:
+            choice = np.where(_angle(p[owners], toward) + _angle(toward, q[owners]) < 0.0, 2, 1)
+        else:
+            choice = _side(p, q, radius, at_p[1:], at_q[1:], toward, owners)
+        if (inside := norm(sides) < radius[owners]).any():
+            through, at = _through(p, q, radius)
+            touches, arc = np.stack((*touches, outside & through)), np.stack((*arc, 0.0 * between))
+            at_p, at_q = np.stack((*at_p, at)), np.stack((*at_q, at))
+            choice = np.where(inside, 3, choice)
+    if across is None:
         lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
-        rise = second[:, 2] - first[:, 2]
-        share = rise / np.maximum(lines.sum(0), TINY)
-        one[:, 2] = first[:, 2] + share * lines[0]
-        two[:, 2] = first[:, 2] + share * (lines[0] + lines[1])
-        arc = np.hypot(arc, two[:, 2] - one[:, 2])
-    hit = touches[:, None]
-    return Bend(touches, np.where(hit, one, second), np.where(hit, two, first), np.where(touches, arc, 0.0))
+        share = (second - first)[..., 2] / np.maximum(lines.sum(0), TINY)
+        heights = first[..., 2] + share * lines[0], first[..., 2] + share * (lines[0] + lines[1])
+        one, two = (np.concatenate((at, z[..., None]), axis=-1) for at, z in zip((at_p, at_q), heights, strict=True))
+        arc = np.hypot(arc, heights[1] - heights[0])
+    else:
+        one, two = (np.einsum("spij,cspi->cspj", across, at) for at in (at_p, at_q))
+    hit = touches[..., None]
+    return Bends(touches, np.where(hit, one, second), np.where(hit, two, first), np.where(touches, arc, 0.0), choice)
 
 
-def _winding(p: Array, q: Array, side: Array | None, radius: Radius, version: int) -> Array:
-    """The angle (P,) by which a tendon goes around the middle; 0 where it goes straight in 3.x."""
-    between = _angle(p, q)
-    if side is None:
-        return between
-    if version >= 4:
-        return _angle(p, side) + _angle(side, q)
+def _side(
+    p: Array, q: Array, radius: Array, at_p: Array, at_q: Array, side: Array, owners: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Which way a tendon goes in MuJoCo 3 with each of k sides (k, P): 0 is straight."""
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
-    nearest = p + part[:, None] * way
-    straight = (norm(nearest) > radius) & (_dot(side, nearest) >= 0.0)
-    reach_p, reach_q = _reach(p, radius), _reach(q, radius)
-    best, winding = np.full(len(p), -np.inf), np.zeros(len(p))
-    for sign in (1.0, -1.0):
-        one, two = _turned(p, sign * reach_p, radius), _turned(q, -sign * reach_q, radius)
-        middle = one + two
-        good = _dot(middle, side) / np.maximum(norm(middle) * norm(side), TINY)
-        good = np.where(_cut(p, one, q, two), -np.inf, good)
-        # Of ends one behind the other, one line passes the other by, and MuJoCo 3 goes all the way around.
-        turn = np.mod(sign * between - reach_p - reach_q, 2.0 * np.pi) + reach_p + reach_q
-        winding, best = np.where(good > best, sign * turn, winding), np.maximum(good, best)
-    return np.where(straight, 0.0, winding)
+    nearest = p + part[..., None] * way
+    straight = (norm(nearest) > radius)[owners] & (_dot(side, nearest[owners]) >= 0.0)
+    middle = unit(at_p + at_q)
+    crossed: Mask = _cut(p, at_p, q, at_q)
+    good = np.where(crossed[:, owners], -np.inf, _dot(middle[:, owners], side))
+    return np.where(straight | np.all(crossed, axis=0)[owners], 0, 1 + good.argmax(0))
 
 
-def _through(p: Array, q: Array, radius: Radius) -> tuple[Mask, Array]:
+def _through(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     """Whether the way through a circle is not straight (P,), and the point of the circle (P, 2) that it then has.
 
     Both lines to that point have the same angle with the radius there.
     """
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
-    passes = norm(p + part[:, None] * way) > radius
+    passes = norm(p + part[..., None] * way) > radius
     between = _angle(p, q)
     # At the share t of the angle from p to q the slope of the length changes its sign once.
-    low, high = np.zeros(len(p)), np.ones(len(p))
+    low, high = np.zeros(between.shape), np.ones(between.shape)
     for _ in range(50):
         middle = 0.5 * (low + high)
         at = _turned(p, middle * between, radius)
@@ -132,7 +134,7 @@ def _through(p: Array, q: Array, radius: Radius) -> tuple[Mask, Array]:
 
 
 def _cut(p: Array, one: Array, q: Array, two: Array) -> Mask:
-    """Whether the line from p to one and that from q to two have a point in common (P,)."""
+    """Whether the line from p to one and that from q to two have a point in common (...)."""
     way, other, apart = one - p, two - q, q - p
     across = _cross(way, other)
     across = np.where(np.abs(across) < TINY, np.nan, across)
@@ -142,20 +144,20 @@ def _cut(p: Array, one: Array, q: Array, two: Array) -> Mask:
 
 
 def _plane(first: Array, second: Array) -> Array:
-    """Two unit vectors (P, 2, 3) in the plane of both ends and the middle of a sphere, one toward the first end."""
-    along = first / np.maximum(norm(first), TINY)[:, None]
+    """Two unit vectors (S, P, 2, 3) in the plane of both ends and the middle of a sphere, one toward the first end."""
+    along = first / np.maximum(norm(first), TINY)[..., None]
     normal = np.cross(first, second)
-    size = norm(normal)
+    size = norm(normal)[..., None]
     # Ends in line with the middle share no plane of their own.
-    other = np.where(np.abs(along) < np.abs(along).max(1, keepdims=True), 1.0, 0.0)
-    normal = np.where((size > TINY)[:, None], normal, np.cross(along, other))
-    normal /= np.maximum(norm(normal), TINY)[:, None]
-    return np.stack((along, np.cross(normal, along)), axis=1)
+    other = np.where(np.abs(along) < np.abs(along).max(-1, keepdims=True), 1.0, 0.0)
+    normal = np.where(size > TINY, normal, np.cross(along, other))
+    normal /= np.maximum(norm(normal), TINY)[..., None]
+    return np.stack((along, np.cross(normal, along)), axis=-2)
 
 
-def _in(across: Array, points: Array) -> Array:
-    found: Array = np.einsum("pij,pj->pi", across, points)
-    return found
+def _in(across: Array | None, points: Array) -> Array:
+    """Points (..., 3) in the plane (..., 2): that of two vectors (..., 2, 3), or the one normal to z."""
+    return points[..., :2] if across is None else np.einsum("...ij,...j->...i", across, points)
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -176,21 +178,20 @@ def unit(a: Array) -> Array:
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """From one vector to the other (P,), from -pi to pi."""
+    """From one vector to the other (...), from -pi to pi."""
     return np.arctan2(_cross(a, b), _dot(a, b))
 
 
 def _cross(a: Array, b: Array) -> Array:
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _reach(p: Array, radius: Radius) -> Array:
-    """The angle between a point and where a line from it touches the circle, as seen from the middle (P,)."""
+def _reach(p: Array, radius: Array) -> Array:
+    """The angle between a point and where a line from it touches the circle, as seen from the middle (...)."""
     return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
 
 
-def _turned(p: Array, angle: Array, radius: Radius) -> Array:
-    """On the circle, in the direction of a point turned by an angle (P, 2)."""
-    direction = np.arctan2(p[:, 1], p[:, 0]) + angle
-    found: Array = np.expand_dims(radius, -1) * np.stack((np.cos(direction), np.sin(direction)), axis=1)
-    return found
+def _turned(p: Array, angle: Array, radius: Array) -> Array:
+    """On the circle, in the direction of a point turned by an angle (..., 2)."""
+    direction = np.arctan2(p[..., 1], p[..., 0]) + angle
+    return np.stack((radius * np.cos(direction), radius * np.sin(direction)), axis=-1)

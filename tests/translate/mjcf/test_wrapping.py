@@ -51,9 +51,11 @@ def test_as_mujoco(which, kind, distance, request):
     version, lengths = json.loads(made.stdout)
 
     first, second = ends
-    site = None if side is None else np.broadcast_to(side, first.shape)
-    found = bend(kind, RADIUS, first, second, site, version=int(version.partition(".")[0]))
-    around = np.linalg.norm(found.first - first, axis=1) + found.length + np.linalg.norm(second - found.second, axis=1)
-    whole = np.where(found.touches, around, np.linalg.norm(second - first, axis=1))
-    assert 0.05 < found.touches.mean() < 0.95
+    sites = None if side is None else side[None, None]
+    one = np.array([0])
+    found = bend(kind, np.array([[RADIUS]]), first[None], second[None], sites, one, int(version.partition(".")[0]))
+    touches, leaves, returns, length = (way[found.choice[0], 0, np.arange(len(first))] for way in found[:4])
+    around = np.linalg.norm(leaves - first, axis=1) + length + np.linalg.norm(second - returns, axis=1)
+    whole = np.where(touches, around, np.linalg.norm(second - first, axis=1))
+    assert 0.05 < touches.mean() < 0.95
     np.testing.assert_allclose(whole, lengths, rtol=0.0, atol=1e-11)
