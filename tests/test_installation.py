@@ -46,6 +46,10 @@ def test_opensim_comes_where_it_has_a_wheel() -> None:
     assert "opensim" not in names("all", HERE, "3.11")
 
 
+def test_rerun_comes_where_it_has_a_wheel() -> None:
+    assert "rerun-sdk" in names("dev", MAC, "3.13") and "rerun-sdk" not in names("dev", OLD_MAC, "3.13")
+
+
 def test_who_asks_for_pybullet_gets_it() -> None:
     for machine, python in [(HERE, "3.11"), (HERE, "3.13"), (MAC, "3.12")]:
         assert {"pybullet", "numba", "numpy"} <= names("bullet", machine, python)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import ntpath
 import os
+import sys
 from pathlib import Path
 from typing import cast
 
 import pytest
 
+from osimlite import validate
+from osimlite.cli import main
+from osimlite.cli._console import wants_colour
 from osimlite.cli.simulate import _write
 from osimlite.errors import OsimliteError
 from osimlite.files import from_folder, write_atomically
@@ -63,3 +69,39 @@ def test_files_are_checked_by_processes_that_begin_from_nothing(
     monkeypatch.setattr("sys.platform", "darwin")
     spawned = check_files(files, Config(), cached=False, processes=2)
     assert spawned.findings == alone.findings and alone.findings
+
+
+def test_a_library_call_starts_no_processes_that_would_run_the_callers_script_anew(
+    fixtures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("osimlite.lint.many.WORTH_SHARING", 0)
+    monkeypatch.delattr("concurrent.futures.ProcessPoolExecutor")
+    assert validate(fixtures / "lint" / "OSIM301").checked > 1
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.EPIPE])
+def test_who_reads_our_output_may_go(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    class Gone(io.StringIO):
+        def write(self, text: str) -> int:
+            raise OSError(number, "so says the system")
+
+        def fileno(self) -> int:
+            return kept
+
+    kept = os.dup(1)
+    monkeypatch.setattr(sys, "stdout", Gone())
+    with pytest.raises(SystemExit) as ended:
+        main(["rule", "OSIM301"])
+    os.close(kept)
+    assert ended.value.code == 1
+
+
+def test_an_old_console_is_shown_no_codes_of_colours(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("NO_COLOR", "FORCE_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert wants_colour()
+    monkeypatch.setattr("os.name", "nt")
+    for is_old in (True, False):
+        monkeypatch.setattr("rich.console.detect_legacy_windows", lambda is_old=is_old: is_old)
+        assert wants_colour() is not is_old

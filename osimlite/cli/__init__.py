@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import sys
@@ -177,8 +178,11 @@ def _run(words: list[str]) -> None:
     except KeyboardInterrupt:
         complain("interrupted")
         raise SystemExit(130) from None
-    except BrokenPipeError:
-        # Whoever read our output has gone; Python would complain once more when it closes standard output.
+    except OSError as error:
+        # Whoever read our output has gone, which Windows tells as an invalid argument of no file.
+        if not isinstance(error, BrokenPipeError) and (error.errno != errno.EINVAL or error.filename is not None):
+            raise
+        # Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except ModuleNotFoundError as error:

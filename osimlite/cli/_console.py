@@ -98,7 +98,16 @@ def wants_colour() -> bool:
     """Whether what is printed on standard output is coloured."""
     if os.environ.get("NO_COLOR"):
         return False
-    return bool(os.environ.get("FORCE_COLOR")) or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    if not sys.stdout.isatty() or os.environ.get("TERM") == "dumb":
+        return False
+    if os.name != "nt":
+        return True
+    from rich.console import detect_legacy_windows
+
+    # An old console prints the codes of colours instead of obeying them.
+    return not detect_legacy_windows()
 
 
 def plain_console(**choices: Any) -> Console:

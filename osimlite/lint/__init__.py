@@ -59,7 +59,8 @@ def validate(
         if not isinstance(model, Source) and os.path.isdir(model):
             from osimlite.lint.many import check_files
 
-            return check_files(project_files([model]), config, cached=False)
+            # Processes that are not forked would run the caller's script anew.
+            return check_files(project_files([model]), config, cached=False, processes=1)
         return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
 
 

@@ -19,7 +19,7 @@ from zlib import crc32
 
 from osimlite import __version__
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file, stamped
+from osimlite.files import read_file, stamped, write_atomically
 from osimlite.lint import measures
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
 
@@ -88,13 +88,8 @@ class Cache:
                 "findings": [_values(finding) for finding in report],
                 "unmeasured": report.unmeasured,
             }
-            from tempfile import mkstemp
-
-            handle, name = mkstemp(dir=place.parent)
-            with os.fdopen(handle, "w", encoding="utf-8") as stream:
-                json.dump(entry, stream, separators=(",", ":"))
-            os.replace(name, place)
-        except OSError:
+            write_atomically(place, json.dumps(entry, separators=(",", ":")))
+        except (OSError, OsimliteError):
             return
 
     def _entry(self, file: str) -> Path:

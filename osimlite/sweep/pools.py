@@ -145,7 +145,8 @@ class ProcessPool(_LocalPool):
     def __init__(self, plan: Plan, count: int) -> None:
         packed = plan.packed()
         Runner(plan)
-        executor = ProcessPoolExecutor(count, get_context("spawn"))
+        # Windows can wait for no more.
+        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"))
         super().__init__(executor, partial(run_packed, packed), count)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import sys
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -70,6 +71,9 @@ class PageServer:
 
 
 class _QuietServer(ThreadingHTTPServer):
+    # On Windows two programs could listen at one port.
+    allow_reuse_address = sys.platform != "win32"
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that hangs up in the middle is nobody's mistake."""
         _log.debug("a question was not answered", exc_info=True)

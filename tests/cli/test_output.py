@@ -79,7 +79,7 @@ def check(text: str) -> None:
 )  # fmt: skip
 def test_nothing_that_people_read_is_obeyed(folder: Path, words: list[str]) -> None:
     if words[0] in ("simulate", "kinematics"):
-        pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+        pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     _, out, err = call(folder, *words)
     check(out.decode())
     check(err.decode())

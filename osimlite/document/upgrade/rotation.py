@@ -50,7 +50,8 @@ def _matrix(angles: list[float]) -> Matrix:
 
 
 def _times(matrix: Matrix, vector: list[float] | tuple[float, ...]) -> list[float]:
-    return [sum(a * b for a, b in zip(row, vector, strict=True)) for row in matrix]
+    # From Python 3.12 on, sum() rounds otherwise.
+    return [a * vector[0] + b * vector[1] + c * vector[2] for a, b, c in matrix]
 
 
 def _angles(matrix: Matrix) -> list[float]:

@@ -22,8 +22,8 @@ def scale_factors(draft: Draft) -> None:
         for axis in joint.iter("TransformAxis"):
             direction = reals(text_of(axis, "axis"), 3)
             if axis.get("name", "").startswith("translation") and direction is not None:
-                scale = sum(abs(part) * factor for part, factor in zip(direction, scales, strict=True))
-                _multiply(draft, axis.find("function"), scale, factors)
+                x, y, z = (abs(part) * factor for part, factor in zip(direction, scales, strict=True))
+                _multiply(draft, axis.find("function"), x + y + z, factors)
         draft.changed(joint, at=factors)
         draft.remove(factors)
     for point in draft.tagged("MovingPathPoint"):

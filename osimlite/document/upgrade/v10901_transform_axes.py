@@ -64,7 +64,7 @@ def _directions(given: list[str | None]) -> list[str]:
 
 
 def _dot(left: list[float], right: list[float]) -> float:
-    return sum(a * b for a, b in zip(left, right, strict=True))
+    return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
 def _normal(left: list[float], right: list[float]) -> str:
