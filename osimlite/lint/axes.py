@@ -4,26 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from osimlite.lint.subject import Subject, once
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
 
 if TYPE_CHECKING:
-    from osimlite.lint.subject import Subject
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
     from osimlite.schema.joints import Joint
 
 
 def axes_of(joint: CustomJoint) -> list[TransformAxis]:
     """The six axes in order: three rotations, three translations."""
-    transform = joint.spatial_transform
-    return [
-        transform.rotation1,
-        transform.rotation2,
-        transform.rotation3,
-        transform.translation1,
-        transform.translation2,
-        transform.translation3,
-    ]
+    places = [f"{kind}{number}" for kind in ("rotation", "translation") for number in (1, 2, 3)]
+    return [getattr(joint.spatial_transform, place) for place in places]
 
 
 def coordinates_of(joint: Joint) -> list[Coordinate]:
@@ -66,16 +59,12 @@ def axes_refused(joint: CustomJoint) -> bool:
     return moved and len(declared) != len(names)
 
 
+@once
 def made_up_paths(subject: Subject) -> set[str]:
-    """The paths of the coordinates that OpenSim makes up because only an axis names them; made once per subject."""
-    known = subject.kept.get("made-up coordinates")
-    if isinstance(known, set):
-        return known
-    found = {
+    """The paths of the coordinates that OpenSim makes up because only an axis names them."""
+    return {
         f"{subject.path(joint)}/{name}"
         for joint in subject.named("CustomJoint")
         if not axes_refused(joint)
         for name in set(names_on_axes(joint)) - {coordinate.name for coordinate in coordinates_of(joint)}
     }
-    subject.kept["made-up coordinates"] = found
-    return found

@@ -55,14 +55,6 @@ _COMPUTED_WITH_ZERO: Final = {
 }
 """Of what else is refused outside its domain."""
 
-_REFUSED_AT_ZERO: Final = {"CoordinateLimitForce": "transition"}
-
-_NAN_OUTSIDE: Final = {
-    "ElasticFoundationContactParameters": "stiffness",
-    "HuntCrossleyContactParameters": "stiffness",
-    "SmoothSphereHalfSpaceForce": "stiffness constant_contact_force",
-}
-
 _NAN_AT_ZERO: Final = {
     "CoordinateLimitForce": "upper_stiffness lower_stiffness",
     "DeGrooteFregly2016Muscle": "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity",
@@ -77,26 +69,33 @@ _STOPS_AT_ZERO: Final = {
     "ClutchedPathSpring": "relaxation_time_constant",
 }
 
-_NAN_IF_MISSING: Final = {"EllipsoidJoint": "radii_x_y_z", "ScapulothoracicJoint": "thoracic_ellipsoid_radii_x_y_z"}
-
-_STUCK_AT_ZERO: Final = {"Millard2012EquilibriumMuscle": "tendon_slack_length"}
+_FAILURES: Final = (
+    (NAN, "missing", {"EllipsoidJoint": "radii_x_y_z", "ScapulothoracicJoint": "thoracic_ellipsoid_radii_x_y_z"}),
+    ("", "zero", _COMPUTED_WITH_ZERO),
+    (STOPS, "zero", _STOPS_AT_ZERO),
+    (REFUSED, "", _REFUSED_OUTSIDE),
+    (REFUSED, "zero", {"CoordinateLimitForce": "transition"}),
+    (TOUCHING, "", {"ElasticFoundationContactParameters": "stiffness", "HuntCrossleyContactParameters": "stiffness"}),
+    (NAN, "", {"SmoothSphereHalfSpaceForce": "stiffness constant_contact_force"}),
+    (NAN, "zero", _NAN_AT_ZERO),
+    (STUCK, "zero", {"Millard2012EquilibriumMuscle": "tendon_slack_length"}),
+)
+"""What happens, whether with zero alone, without a number, or with any, and to which properties; the first fits."""
 
 _PUSHING: Final = (
     "ActivationCoordinateActuator CoordinateActuator PathActuator PointActuator PointToPointActuator TorqueActuator"
 )
 """Actuators whose force is their control times their optimal force."""
 
+_FLAT: Final = "OpenSim computes with it, on a flat or mirrored surface"
 _DOUBTS: Final = {
     ("CoordinateLimitForce", "damping"): "the limit adds energy",
     ("ContactSphere", "radius"): "it touches nothing",
-    ("EllipsoidJoint", "radii_x_y_z"): "OpenSim computes with it, on a flat or mirrored surface",
+    ("EllipsoidJoint", "radii_x_y_z"): _FLAT,
     ("HuntCrossleyContactParameters", "dissipation"): "each impact adds energy",
     ("HuntCrossleyForce", "transition_velocity"): "friction no longer passes from rest to sliding",
     ("Millard2012EquilibriumMuscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
-    (
-        "ScapulothoracicJoint",
-        "thoracic_ellipsoid_radii_x_y_z",
-    ): "OpenSim computes with it, on a flat or mirrored surface",
+    ("ScapulothoracicJoint", "thoracic_ellipsoid_radii_x_y_z"): _FLAT,
     ("Thelen2003Muscle", "tendon_slack_length"): "OpenSim finds no equilibrium for the muscle",
     **{(name, "optimal_force"): "the actuator does nothing, whatever its control" for name in _PUSHING.split()},
 }
@@ -141,25 +140,13 @@ def consequence(cls: type[Object], name: str, number: float, *, rigid_tendon: bo
 
     A rigid tendon may have no length, where an elastic one needs some.
     """
+    is_allowed = rigid_tendon and name == "tendon_slack_length"
+    cases = {"", "missing" if number != number else "zero" if number == 0 and not is_allowed else ""}
     for base in cls.__mro__:
         known = base.__name__
-        if number != number and name in _NAN_IF_MISSING.get(known, "").split():
-            return NAN, True
-        if number == 0 and name in _COMPUTED_WITH_ZERO.get(known, "").split():
-            return "", False
-        if number == 0 and name in _STOPS_AT_ZERO.get(known, "").split():
-            return STOPS, True
-        if name in _REFUSED_OUTSIDE.get(known, "").split() or (
-            number == 0 and name in _REFUSED_AT_ZERO.get(known, "").split()
-        ):
-            return REFUSED, True
-        if name in _NAN_OUTSIDE.get(known, "").split():
-            return TOUCHING if known.endswith("ContactParameters") else NAN, True
-        allowed = rigid_tendon and name == "tendon_slack_length"
-        if number == 0 and not allowed and name in _NAN_AT_ZERO.get(known, "").split():
-            return NAN, True
-        if number == 0 and not allowed and name in _STUCK_AT_ZERO.get(known, "").split():
-            return STUCK, True
+        for fate, case, properties in _FAILURES:
+            if case in cases and name in properties.get(known, "").split():
+                return fate, bool(fate)
         if (known, name) in _DOUBTS:
             return _DOUBTS[known, name], False
     return "", False

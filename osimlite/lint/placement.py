@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.lint.axes import axes_of, coordinates_of
 from osimlite.lint.skeleton import skeleton
-from osimlite.lint.subject import Subject
+from osimlite.lint.subject import Subject, once
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
 from osimlite.schema.functions import (
@@ -114,13 +114,10 @@ def on_base(subject: Subject, frame: Component | None) -> tuple[Component, Pose]
     return (frame, pose) if isinstance(frame, (Body, Ground)) else None
 
 
+@once
 def default_poses(subject: Subject) -> dict[int, Pose]:
-    """The pose in ground of each body (by identity) whose place is known; worked out once per subject."""
-    known = subject.kept.get("default poses")
-    if isinstance(known, dict):
-        return known
-    subject.kept["default poses"] = found = poses_at(subject)
-    return found
+    """The pose in ground of each body (by identity) whose place is known."""
+    return poses_at(subject)
 
 
 def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dict[int, Pose]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, cast
+from typing import Any
 
 from osimlite.lint.placement import Pose, Vector, on_base, poses_at
 from osimlite.lint.setup import Setup
-from osimlite.lint.subject import Subject
+from osimlite.lint.subject import Subject, once
 from osimlite.lint.table import Table
 from osimlite.schema.states import motions_of
 from osimlite.schema.tree import is_a
@@ -25,37 +25,34 @@ def coordinate_of(column: str) -> str:
     return column.removesuffix("/value").rpartition("/")[2]
 
 
+@once
 def poses_in(setup: Setup, motion: Table, time: float) -> dict[int, Pose]:
-    """The pose in ground of each body (by identity), at a time of a motion given as coordinates; worked out once."""
-    key = f"poses at {time} of {motion.file}"
-    if key in setup.kept:
-        return cast("dict[int, Pose]", setup.kept[key])
+    """The pose in ground of each body (by identity), at a time of a motion given as coordinates."""
     angles = angles_of(setup)
     turn = math.pi / 180.0 if isinstance(motion.header, StorageHeader) and motion.header.in_degrees else 1.0
     values = {
         name: value * turn if name in angles else value
         for name, value in zip(map(coordinate_of, motion.columns), motion.row_at(time)[1:], strict=False)
     }
-    setup.kept[key] = found = poses_at(_model_of(setup), values)
+    return poses_at(_model_of(setup), values)
+
+
+@once
+def marker_places(setup: Setup) -> dict[str, Vector]:
+    """Where the markers of the model are in the default pose, in ground, m."""
+    model = _model_of(setup)
+    poses = poses_at(model, {})
+    found: dict[str, Vector] = {}
+    # What a set of markers adds has absolute paths.
+    added = [item for _, top in setup.added for item in top.walk() if is_a(item, "Marker")]
+    for marker in (*model.named("Marker"), *added):
+        frame = on_base(model, model.tree.walk(str(marker.socket_parent_frame), "/markerset", "Frame").target)
+        if frame is not None and id(frame[0]) in poses:
+            found[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
     return found
 
 
-def marker_places(setup: Setup) -> dict[str, Vector]:
-    """Where the markers of the model are in the default pose, in ground, m; worked out once per setup."""
-    if "marker places" not in setup.kept:
-        model = _model_of(setup)
-        poses = poses_at(model, {})
-        found: dict[str, Vector] = {}
-        # What a set of markers adds has absolute paths.
-        added = [item for _, top in setup.added for item in top.walk() if is_a(item, "Marker")]
-        for marker in (*model.named("Marker"), *added):
-            frame = on_base(model, model.tree.walk(str(marker.socket_parent_frame), "/markerset", "Frame").target)
-            if frame is not None and id(frame[0]) in poses:
-                found[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
-        setup.kept["marker places"] = found
-    return cast("dict[str, Vector]", setup.kept["marker places"])
-
-
+@once
 def _model_of(setup: Setup) -> Subject:
     assert setup.tree is not None
-    return cast("Subject", setup.kept.setdefault("model", Subject(setup.tree.model)))
+    return Subject(setup.tree.model)

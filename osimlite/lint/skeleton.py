@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import cast
 
-from osimlite.lint.subject import Subject
+from osimlite.lint.subject import Subject, once
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.frames import Body, Ground, StationDefinedFrame
 from osimlite.schema.joints import Joint
@@ -53,18 +53,15 @@ class Skeleton:
         return [link for link in self.links if base is link.parent_base or base is link.child_base]
 
 
+@once
 def skeleton(subject: Subject) -> Skeleton:
-    """The skeleton of a model; made once per subject."""
-    known = subject.kept.get("skeleton")
-    if isinstance(known, Skeleton):
-        return known
+    """The skeleton of a model."""
     assert subject.model is not None
     bones = Skeleton([*subject.each(Body)], subject.model.ground)
     for joint in subject.each(Joint):
         parent = subject.target_of(joint, "socket_parent_frame")
         child = subject.target_of(joint, "socket_child_frame")
         bones.links.append(Link(joint, parent, child, base_of(subject, parent), base_of(subject, child)))
-    subject.kept["skeleton"] = bones
     return bones
 
 

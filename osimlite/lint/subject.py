@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterator
+from functools import cached_property, wraps
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, cast
 
 from osimlite.document.notes import Note
 from osimlite.document.source import Position
@@ -27,6 +27,22 @@ if TYPE_CHECKING:
     from osimlite.lint.engine import Rule
 
 T = TypeVar("T", bound=Object)
+S = TypeVar("S", bound="Subject")
+Made = TypeVar("Made")
+P = ParamSpec("P")
+
+
+def once(make: Callable[Concatenate[S, P], Made]) -> Callable[Concatenate[S, P], Made]:
+    """Let a function work a thing out once per subject, and once for each of its other arguments."""
+
+    @wraps(make)
+    def kept(subject: S, /, *args: P.args, **named: P.kwargs) -> Made:
+        key = (make, *args, *named.items())
+        if key not in subject.kept:
+            subject.kept[key] = make(subject, *args, **named)
+        return cast("Made", subject.kept[key])
+
+    return kept
 
 
 class Subject(Checked):
@@ -43,7 +59,7 @@ class Subject(Checked):
         self.notes: list[Note] = []
         self.changes: list[Change] = []
         self.refusals: list[Refusal] = []
-        self.kept: dict[str, object] = {}
+        self.kept: dict[object, object] = {}
         if isinstance(found, Model):
             self.model = self.top = found
         else:

@@ -10,9 +10,8 @@ from osimlite.schema.fields import Value
 from osimlite.schema.registry import MODULES, class_for
 from osimlite.schema.specs import field_specs
 
-TABLES = ("_REFUSED_OUTSIDE", "_REFUSED_AT_ZERO", "_NAN_OUTSIDE", "_NAN_AT_ZERO")
 ENTRIES = [
-    (cls, name) for table in TABLES for cls, words in getattr(consequences, table).items() for name in words.split()
+    (cls, name) for _, _, table in consequences._FAILURES for cls, words in table.items() for name in words.split()
 ]
 ENTRIES += [*consequences._DOUBTS, *consequences.STRICTER]
 

@@ -1,26 +1,10 @@
-"""To 10900 and 10904: tools speak of forces, and controllers stand in a set."""
+"""To 10904: the controllers of a tool stand in a set."""
 
 from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, plain, step
 
 _SPRINGS = [f"body{number}_{kind}_corrective_spring_active" for number in (1, 2) for kind in ("linear", "torsional")]
-
-
-@step(below=10900)
-def replaced_forces(draft: Draft) -> None:
-    """<replace_actuator_set> is called replace_force_set."""
-    for tool in draft.every("AbstractTool"):
-        if draft.rename_child(tool, "replace_actuator_set", "replace_force_set"):
-            draft.changed(tool)
-
-
-@step(below=10904)
-def force_files(draft: Draft) -> None:
-    """<actuator_set_files> is called force_set_files."""
-    for tool in draft.every("AbstractTool"):
-        if draft.rename_child(tool, "actuator_set_files", "force_set_files"):
-            draft.changed(tool)
 
 
 @step(below=10904)

@@ -16,11 +16,3 @@ def muscle_paths(draft: Draft) -> None:
         for part in parts:
             draft.move(part, path)
         draft.changed(muscle)
-
-
-@step(below=20302)
-def pennation_angles(draft: Draft) -> None:
-    """<pennation_angle> is called <pennation_angle_at_optimal>."""
-    for muscle in draft.every("Muscle"):
-        if draft.rename_child(muscle, "pennation_angle", "pennation_angle_at_optimal"):
-            draft.changed(muscle)

@@ -1,11 +1,10 @@
-"""To 30500: a body has one inertia, and a joint says in whose frame its places are."""
+"""To 30500: a body has one inertia."""
 
 from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, plain, reals, step
 
 _INERTIA = {"xx": "1", "yy": "1", "zz": "1", "xy": "0", "xz": "0", "yz": "0"}
-_JOINT = {"location": "location_in_child", "orientation": "orientation_in_child"}
 
 
 @step(below=30500)
@@ -23,11 +22,3 @@ def body_inertia(draft: Draft) -> None:
         for part in given:
             draft.remove(part)
         draft.changed(body, at=given[0] if given else body)
-
-
-@step(below=30500)
-def joint_child_places(draft: Draft) -> None:
-    """<location> and <orientation> of a joint are those in the child."""
-    for joint in draft.every("Joint"):
-        if any([draft.rename_child(joint, old, new) for old, new in _JOINT.items()]):
-            draft.changed(joint)

@@ -10,7 +10,7 @@ from osimlite.lint.config import Threshold
 from osimlite.lint.diagnostic import Fix
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
-from osimlite.lint.inertia import possible_inertia
+from osimlite.lint.inertia import possible_inertia, principal_axes
 from osimlite.lint.placement import on_base
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
@@ -208,30 +208,7 @@ def _nearest(subject: Subject, body: Body) -> _Mend:
 def _inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:
     """Each body with a finite inertia that is not zero, and its principal moments in rising order."""
     return [
-        (body, principal_moments(body.inertia))
+        (body, sorted(principal_axes(body.inertia)[0]))
         for body in subject.each(Body)
         if any(body.inertia) and all(map(math.isfinite, body.inertia))
     ]
-
-
-def principal_moments(inertia: Sequence[float]) -> tuple[float, float, float]:
-    """Eigenvalues, in rising order, of a symmetric matrix given as xx yy zz xy xz yz.
-
-    The roots of the characteristic polynomial in trigonometric form (O. K. Smith, Commun. ACM 4, 168, 1961).
-    """
-    # A power of 2 keeps the digits; squares of what is left are numbers.
-    scale = math.ldexp(1.0, math.frexp(max(map(abs, inertia)))[1] - 1)
-    xx, yy, zz, xy, xz, yz = (part / scale for part in inertia)
-    off = xy * xy + xz * xz + yz * yz
-    if off < 1e-300:
-        low, middle, high = sorted(inertia[:3])
-        return low, middle, high
-    mean = (xx + yy + zz) / 3
-    spread = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * off) / 6)
-    a, b, c = (xx - mean) / spread, (yy - mean) / spread, (zz - mean) / spread
-    d, e, f = xy / spread, xz / spread, yz / spread
-    half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / 2
-    angle = math.acos(max(-1.0, min(1.0, half))) / 3
-    high = mean + 2 * spread * math.cos(angle)
-    low = mean + 2 * spread * math.cos(angle + 2 * math.pi / 3)
-    return low * scale, (3 * mean - high - low) * scale, high * scale

@@ -6,11 +6,11 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from osimlite.lint.consequences import REFUSED, STRICTER, consequence
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.subject import Subject
+from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import quantity, shown
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
@@ -161,11 +161,10 @@ _NAN_FATE = "what is computed with it becomes NaN, without a message"
 _Outside = tuple[Object, FieldSpec, Any, Verdict]
 
 
+@once
 def outside(subject: Subject) -> list[_Outside]:
-    """Every number outside its domain; they are looked for once."""
-    if "outside domains" not in subject.kept:
-        subject.kept["outside domains"] = list(_find_outside(subject))
-    return cast("list[_Outside]", subject.kept["outside domains"])
+    """Every number outside its domain."""
+    return list(_find_outside(subject))
 
 
 def _find_outside(subject: Subject) -> Iterator[_Outside]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import Broken, broken_references
-from osimlite.lint.subject import Subject
+from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import called, times
-from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.joints import Joint
@@ -45,7 +43,7 @@ def duplicate_name(subject: Subject, found: Found) -> None:
         # Of what has no name in the file nobody expects one.
         if not item.name or not subject.names_itself(item) or isinstance(item, Unknown):
             continue
-        users = _who_names(subject, renamed.first)
+        users = list(_holders(subject).get(id(renamed.first), ()))
         message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"
         if users:
             message += f", and {listed(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the first"
@@ -190,11 +188,11 @@ def _last(text: str) -> str:
     return text.rpartition("/")[2]
 
 
-def _who_names(subject: Subject, target: Object) -> list[str]:
-    """Who holds a reference that leads to a component."""
-    known = cast("dict[int, dict[str, None]]", subject.kept.setdefault("holders", {}))
-    if not known:
-        for use in subject.uses:
-            if use.reference.rule not in ("file", "column", "input"):
-                known.setdefault(id(subject.resolution(use).target), {})[called(use.owner)] = None
-    return list(known.get(id(target), ()))
+@once
+def _holders(subject: Subject) -> dict[int, dict[str, None]]:
+    """Who holds a reference that leads to a component, by its identity."""
+    known: dict[int, dict[str, None]] = {}
+    for use in subject.uses:
+        if use.reference.rule not in ("file", "column", "input"):
+            known.setdefault(id(subject.resolution(use).target), {})[called(use.owner)] = None
+    return known

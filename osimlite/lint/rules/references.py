@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 from osimlite.lint.axes import axes_refused, made_up_paths
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.fixes import replaced
-from osimlite.lint.subject import Subject
+from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import a, called, closest, nearest_name
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
@@ -179,11 +179,10 @@ def _broken(subject: Subject, why: str) -> Iterator[Broken]:
     return (broken for broken in broken_references(subject) if broken.why == why)
 
 
+@once
 def broken_references(subject: Subject) -> list[Broken]:
-    """Every broken reference of the model; they are looked for once."""
-    if "broken references" not in subject.kept:
-        subject.kept["broken references"] = list(_find(subject))
-    return cast("list[Broken]", subject.kept["broken references"])
+    """Every broken reference of the model."""
+    return list(_find(subject))
 
 
 def _find(subject: Subject) -> Iterator[Broken]:
