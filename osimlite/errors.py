@@ -43,15 +43,11 @@ class UnitWarning(DoubtfulWarning):
 
 
 class DocumentError(OsimliteError):
-    """The text cannot be read as an OpenSim document."""
-
-    exit_code = 1
+    """A file cannot be read as what it should be."""
 
 
 class MissingFileError(DocumentError):
     """A file is not there or may not be read."""
-
-    exit_code = 2
 
 
 class SpecialFileError(MissingFileError):

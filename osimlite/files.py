@@ -17,6 +17,9 @@ from osimlite.project import LARGEST_FILE, largest_file
 GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
 """Environment variable with folders to look for mesh files in, besides OpenSim's own places, separated as in PATH."""
 
+NAMED_SO = f"in the environment variable {GEOMETRY_VARIABLE}, or with --geometry"
+"""How people name such a folder, for messages."""
+
 
 def named_mesh_folders() -> tuple[Path, ...]:
     """The folders that the environment names."""

@@ -90,6 +90,11 @@ def or_known(word: str, known: Iterable[str], *more: str) -> str:
     return did_you_mean(word, choices) or f"; there is {listed([*choices, *more])}"
 
 
+def span(low: float, high: float, form: str) -> str:
+    """``"0.1 to 0.5"``, ``"0.3"`` if both are written so, ``"-"`` for what is no number."""
+    return "-" if low != low else " to ".join(dict.fromkeys((format(low, form), format(high, form))))
+
+
 def counted(number: int, noun: str) -> str:
     """``"1 step"``, ``"2 steps"``."""
     return f"{number} {noun}" + ("" if number == 1 else "s")

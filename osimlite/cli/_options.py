@@ -39,10 +39,11 @@ Engine = Annotated[
 ]
 Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
 Integrator = Annotated[
-    str,
+    str | None,
     typer.Option(
+        show_default="merson",
         help="'merson', whose steps are OpenSim's; 'adams' for smooth motion, as of few muscles; 'bdf' for stiff "
-        "motion, as of many; 'rosenbrock' for stiff motion at loose accuracy."
+        "motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
     ),
 ]
 Wrapping = Annotated[
@@ -113,7 +114,7 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
     """Text by name from the ``NAME=VALUE`` words of an option; `form` is what the user is told to write.
 
     Raises:
-        SettingError: a word is not of that form.
+        SettingError: a word is not of that form, or two have one name.
     """
     from osimlite.errors import SettingError
 
@@ -122,6 +123,8 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
         name, equals, value = (part.strip() for part in word.partition("="))
         if not equals:
             raise SettingError(f"{option} takes {form}, got '{word}'")
+        if name in found:
+            raise SettingError(f"{option} names '{name}' twice; leave one out")
         found[name] = value
     return found
 

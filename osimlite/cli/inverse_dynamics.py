@@ -15,6 +15,7 @@ def inverse_dynamics(
     output: options.Folder = None,
     external_loads: options.ExternalLoads = None,
     lowpass: options.Lowpass = None,
+    wrapping: options.Wrapping = "opensim",
     exclude: Annotated[
         list[str] | None,
         typer.Option(
@@ -40,6 +41,8 @@ def inverse_dynamics(
     model = read(file)
     recorded = opened(model, motion, lowpass)
     exclude_forces(model, exclude or ["Muscles"])
-    forces = force_elements(model, recorded.mechanism, external_loads=external_loads, folder=file.parent)
+    forces = force_elements(
+        model, recorded.mechanism, wrapping=wrapping, external_loads=external_loads, folder=file.parent
+    )
     tables = {"inverse_dynamics.sto": recorded.inverse_dynamics(forces)}
     written(recorded, tables, options.results_folder(file, output))

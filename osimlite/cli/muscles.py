@@ -111,13 +111,18 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
     """Values of each coordinate that is swept."""
     from math import isfinite
 
-    from osimlite.errors import SettingError
+    from osimlite.errors import ModelError, SettingError
     from osimlite.simulation.start import in_units_of, suspect_value
 
     found = {}
     for word in words:
         name, equals, given = (part.strip() for part in word.partition("="))
-        info = mechanism.coordinates[mechanism.coordinate_index(name)]
+        if name in found:
+            raise SettingError(f"--coordinate names '{name}' twice; leave one out")
+        try:
+            info = mechanism.coordinates[mechanism.coordinate_index(name)]
+        except ModelError as error:
+            raise SettingError(f"--coordinate: {error.message}") from None
         low, high = info.range
         if equals:
             parts = given.split(":")
@@ -159,29 +164,24 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     import numpy as np
 
     from osimlite.cli._console import add_row, plain_console, plain_table, say
+    from osimlite.text import span
 
-    first = curves[0]
+    first, *others = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
     lengths = {"length": "length (mm)"} if len(arms) < 2 else {}
     shown = {**lengths, **arms, "normalized_fiber_length": "fiber / optimal", "tendon_force": "tendon (N)"}
     table = plain_table(f"Largest differences of {compare.name} from {file.name}" if compare is not None else "")
     table.add_column("Muscle")
-    for label in shown.values():
+    columns = [[path.rpartition("/")[2] for path in first.muscles]]
+    for name, label in shown.items():
         table.add_column(label, justify="right")
-    for place, path in enumerate(first.muscles):
-        cells = []
-        for name, label in shown.items():
-            factor, digits = (1000.0, 1) if label.endswith("(mm)") else (1.0, 0 if label.endswith("(N)") else 3)
-            numbers = factor * first.columns[name][:, place]
-            if compare is not None:
-                numbers = np.abs(factor * curves[1].columns[name][:, place] - numbers)
-                cells.append(f"{np.nanmax(numbers):.{digits}f}" if np.isfinite(numbers).any() else "-")
-            elif not np.isfinite(numbers).any():
-                cells.append("-")
-            else:
-                low, high = (f"{bound(numbers):.{digits}f}" for bound in (np.nanmin, np.nanmax))
-                cells.append(low if low == high else f"{low} to {high}")
-        add_row(table, path.rpartition("/")[2], *cells)
+        factor, form = (1000.0, ".1f") if label.endswith("(mm)") else (1.0, ".0f" if label.endswith("(N)") else ".3f")
+        low, high = first.bounds(name)
+        if others:
+            low = high = np.fmax.reduce(np.abs(others[0].columns[name] - first.columns[name]))
+        columns.append([span(factor * least, factor * most, form) for least, most in zip(low, high, strict=True)])
+    for row in zip(*columns, strict=True):
+        add_row(table, *row)
     plain_console().print(table)
     unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
     if unsettled:
@@ -192,17 +192,15 @@ def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
     """One row for each model, pose and muscle."""
     import io
 
+    import numpy as np
+
     from osimlite.files import write_atomically
 
     columns: dict[str, list[Any]] = {}
     for file, curves in found.items():
-        poses, muscles_ = len(curves.poses), len(curves.muscles)
-        columns.setdefault("model", []).extend([file] * (poses * muscles_))
-        columns.setdefault("muscle", []).extend(list(curves.muscles) * poses)
-        for place, name in enumerate(curves.coordinates):
-            columns.setdefault(name, []).extend(curves.poses[:, place].repeat(muscles_).tolist())
-        for name, rows in curves.columns.items():
-            columns.setdefault(name, []).extend(rows.ravel().tolist())
+        rows, numbers = curves.table
+        for name, column in {"model": np.full(len(rows["muscle"]), file), **rows, **numbers}.items():
+            columns.setdefault(name, []).extend(column.tolist())
     if output.suffix == ".parquet":
         from osimlite._require import require
 

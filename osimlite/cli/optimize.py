@@ -63,7 +63,8 @@ def optimize(
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
     accuracy: options.Accuracy = None,
-    integrator: options.Integrator = "merson",
+    integrator: options.Integrator = None,
+    wrapping: options.Wrapping = "opensim",
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
@@ -95,7 +96,7 @@ def optimize(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, report_interval=report_interval, integrator=integrator,
+        accuracy=accuracy, report_interval=report_interval, integrator=integrator, wrapping=wrapping,
         interpolation=interpolation, is_planted=planted,
         feet=tuple(foot) if foot else None, equilibrate=equilibrate, skip_unsupported=skip_unsupported,
     )  # fmt: skip

@@ -24,7 +24,7 @@ def simulate(
     to: options.To = 2.0,
     engine: options.Engine = "auto",
     accuracy: options.Accuracy = None,
-    integrator: options.Integrator = "merson",
+    integrator: options.Integrator = None,
     fixed_step: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Take the engine's own steps instead of controlling the error."),
@@ -77,10 +77,8 @@ def simulate(
     """
     from osimlite._require import require
     from osimlite.document.reader import read
-    from osimlite.errors import OsimliteError, SimulationError
+    from osimlite.errors import SimulationError
 
-    if accuracy is not None and (fixed_step is not None or gui):
-        raise OsimliteError("--accuracy does not go with fixed steps (--fixed-step, --gui); take one of them")
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
@@ -88,7 +86,6 @@ def simulate(
     model = read(file)
     if controls:
         from osimlite.simulation.given_controls import words_to_controls
-    from osimlite.simulation.integrators import DEFAULT_ACCURACY
     from osimlite.simulation.run import Simulation
     from osimlite.simulation.trajectory import Interrupted
 
@@ -111,7 +108,7 @@ def simulate(
             with motion_bar("simulating", to) as progress:
                 trajectory = simulation.run(
                     to,
-                    accuracy=DEFAULT_ACCURACY if accuracy is None else accuracy,
+                    accuracy=accuracy,
                     integrator=integrator,
                     fixed_step=LIVE_STEP if gui and fixed_step is None else fixed_step,
                     report_interval=report_interval,

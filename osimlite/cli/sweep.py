@@ -43,7 +43,8 @@ def sweep(
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
     accuracy: options.Accuracy = None,
-    integrator: options.Integrator = "merson",
+    integrator: options.Integrator = None,
+    wrapping: options.Wrapping = "opensim",
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
@@ -74,7 +75,7 @@ def sweep(
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None, to=to,
-        engine=engine, accuracy=accuracy, report_interval=report_interval, integrator=integrator,
+        engine=engine, accuracy=accuracy, report_interval=report_interval, integrator=integrator, wrapping=wrapping,
         interpolation=interpolation,
         is_planted=planted, feet=tuple(foot) if foot else None, equilibrate=equilibrate,
         skip_unsupported=skip_unsupported,

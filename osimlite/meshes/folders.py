@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
-from osimlite.files import GEOMETRY_VARIABLE, named_mesh_folders
+from osimlite.files import NAMED_SO, named_mesh_folders
 
 
 class OutsideError(OsimliteError):
@@ -56,7 +56,7 @@ class MeshFolders:
         if elsewhere is not None:
             raise OutsideError(
                 f"the file '{name}' is in '{elsewhere.resolve().parent}', outside the model's folder; if you trust the "
-                f"model, name that folder (--geometry, or {GEOMETRY_VARIABLE})"
+                f"model, name that folder {NAMED_SO}"
             )
         return None
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
-from osimlite.files import GEOMETRY_VARIABLE, read_file
+from osimlite.files import NAMED_SO, read_file
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.stl import binary_stl, is_binary
@@ -73,7 +73,7 @@ class MeshFiles:
             if source is None:
                 raise MeshProblem(
                     "left out: the file is neither beside the model, nor in its folder Geometry, nor in the folders "
-                    f"named by --geometry or {GEOMETRY_VARIABLE}"
+                    f"named {NAMED_SO}"
                 )
             content, converted = _written(source, kind, signs)
         except OsimliteError as error:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.errors import ModelError, SettingError, SimulationError
+from osimlite._lazy import shown_in_notebooks
+from osimlite._require import require
+from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.spatial import Array
@@ -23,7 +25,8 @@ from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.system import System
-from osimlite.text import did_you_mean
+from osimlite.simulation.tabular import Tabular
+from osimlite.text import did_you_mean, listed
 
 Progress = Callable[[int, int], None]
 
@@ -40,26 +43,60 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class MuscleCurves:
+class MuscleCurves(Tabular):
     """Muscles in p poses, at rest.
 
     Attributes:
         muscles: paths of the m muscles, in the order of the model.
-        coordinates: names of the k coordinates that are swept, as they were given.
-        poses: their values (p, k), rad or m.
+        values: of the k coordinates that are swept by their names, as they were given, rad or m.
         columns: numbers (p, m) by the names of :data:`QUANTITIES`, and ``moment_arm_<coordinate>`` for each of the
             coordinates (m); NaN where a muscle has no equilibrium.
     """
 
     muscles: tuple[str, ...]
-    coordinates: tuple[str, ...]
-    poses: Array
+    values: Mapping[str, Sequence[float]]
     columns: Mapping[str, Array]
+
+    _repr_html_ = shown_in_notebooks("muscle_curves")
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates that are swept."""
+        return tuple(self.values)
+
+    @property
+    def poses(self) -> Array:
+        """Their values (p, k): all combinations, the last coordinate changing first."""
+        rows = list(product(*self.values.values()))
+        return np.array(rows, dtype=float).reshape(len(rows), len(self.values))
 
     def of(self, places: Sequence[int]) -> MuscleCurves:
         """The same of some of the muscles, by their places."""
         columns = {name: rows[:, list(places)] for name, rows in self.columns.items()}
-        return MuscleCurves(tuple(self.muscles[k] for k in places), self.coordinates, self.poses, columns)
+        return MuscleCurves(tuple(self.muscles[k] for k in places), self.values, columns)
+
+    @property
+    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """The `columns` over ``muscle`` and the coordinates: a row for each muscle in each pose."""
+        poses, count = self.poses, len(self.muscles)
+        rows = {"muscle": np.tile(np.array(self.muscles, dtype=object), len(poses))}
+        rows |= {name: poses[:, place].repeat(count) for place, name in enumerate(self.values)}
+        return rows, {name: column.ravel() for name, column in self.columns.items()}
+
+    def to_xarray(self) -> Any:
+        """The `columns` as an xarray Dataset over the coordinates and ``muscle``.
+
+        Raises:
+            MissingDependency: xarray is not installed.
+        """
+        xarray = require("xarray", extra="frame", purpose="a data set of xarray")
+        over = {name: list(places) for name, places in {**self.values, "muscle": self.muscles}.items()}
+        shape = [len(places) for places in over.values()]
+        return xarray.Dataset({name: (list(over), rows.reshape(shape)) for name, rows in self.columns.items()}, over)
+
+    def bounds(self, name: str) -> tuple[Array, Array]:
+        """What is least and greatest (m,) of a column; NaN where a muscle has no number."""
+        return np.fmin.reduce(self.columns[name]), np.fmax.reduce(self.columns[name])
 
     @property
     def crossing(self) -> list[int]:
@@ -93,15 +130,18 @@ def muscle_curves(
         progress: called with the number of poses done and of all.
 
     Raises:
-        ModelError: there is no such coordinate or muscle, or the model is no mechanism.
+        ModelError: there is no such coordinate, or the model is no mechanism.
         UnsupportedError: a muscle, a joint or a constraint of an unknown class.
         SimulationError: no pose fulfils the constraints.
-        SettingError: the activation is not from 0 to 1, or there is no such wrapping.
+        SettingError: the activation is not from 0 to 1, there is no such muscle or wrapping, or a coordinate is swept
+            twice.
     """
     if not 0.0 <= activation <= 1.0:
         raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
     mechanism = build_mechanism(model)
     places = [mechanism.coordinate_index(name) for name in values]
+    if len(set(places)) < len(places):
+        raise SettingError(f"{listed(values)} are one coordinate; leave one out")
     forces = force_elements(model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder)
     tree = model.tree()
     optimal = {tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)}
@@ -118,9 +158,9 @@ def muscle_curves(
         for path in named
     ]
     paths = Paths(model, wrapping)
-    rows = list(product(*values.values()))
-    poses = np.array(rows, dtype=float).reshape(len(rows), len(values))
     names = [*QUANTITIES, *(f"moment_arm_{name}" for name in values)]
+    curves = MuscleCurves(tuple(named), dict(values), {})
+    poses = curves.poses
     columns = {name: np.full((len(poses), len(named)), np.nan) for name in names}
     start = mechanism.default_state()[0]
     for number, pose in enumerate(poses):
@@ -136,7 +176,7 @@ def muscle_curves(
                 columns[f"moment_arm_{name}"][number, place] = arm
         if progress is not None:
             progress(number + 1, len(poses))
-    return MuscleCurves(tuple(named), tuple(values), poses, columns)
+    return replace(curves, columns=columns)
 
 
 def _chosen(paths: list[str], names: Sequence[str]) -> list[str]:
@@ -144,7 +184,7 @@ def _chosen(paths: list[str], names: Sequence[str]) -> list[str]:
     known = {key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)}
     for name in names:
         if name not in known:
-            raise ModelError(f"the model has no muscle '{name}'{did_you_mean(name, known)}")
+            raise SettingError(f"the model has no muscle '{name}'{did_you_mean(name, known)}")
     wanted = {known[name] for name in names}
     return [path for path in paths if path in wanted or not names]
 

@@ -10,7 +10,6 @@ from typing import Any
 from osimlite.errors import SettingError
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON
 from osimlite.simulation.stepper import Progress
 from osimlite.text import or_known
 
@@ -35,9 +34,9 @@ class Options:
     Those in `PER_RUN` can be chosen for every run of a `Simulation`.
 
     Attributes:
-        accuracy: of the integrator, with the meaning it has in OpenSim.
-        integrator: "merson", whose steps are OpenSim's; "adams" for smooth motion that is a little stiff, as of few
-            muscles; "bdf" for stiff motion, as of many; or "rosenbrock" for stiff motion at loose accuracy.
+        accuracy: of the integrator, with the meaning it has in OpenSim; 0.001 if left out.
+        integrator: "merson", whose steps are OpenSim's, if left out; "adams" for smooth motion that is a little stiff,
+            as of few muscles; "bdf" for stiff motion, as of many; or "rosenbrock" for stiff motion at loose accuracy.
         fixed_step: take the engine's own steps of this length (s) instead of controlling the error.
         report_interval: time between the recorded moments, s; the last one is the end in any case.
         initial: values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their
@@ -71,8 +70,8 @@ class Options:
         show: show the motion in Bullet's window, in real time, and return when it is closed; needs `fixed_step`.
     """
 
-    accuracy: float = DEFAULT_ACCURACY
-    integrator: str = MERSON
+    accuracy: float | None = None
+    integrator: str | None = None
     fixed_step: float | None = None
     report_interval: float = 0.01
     initial: Mapping[str, float | str] | str | Path | None = None

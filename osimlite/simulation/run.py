@@ -24,7 +24,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.integrators import MERSON, check_integrator
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
 from osimlite.simulation.options import Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
@@ -88,7 +88,7 @@ class Simulation:
     Errors are those of :func:`simulate`.
 
     Attributes:
-        model: what moves.
+        model: a copy of what moves.
         options: that were chosen.
         constraints: names of what the coordinates of the state must fulfil.
         paths: of all states, in the order of OpenSim.
@@ -96,12 +96,13 @@ class Simulation:
 
     def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
         self.options = chosen = Options.of(choices)
-        self.model = model
         # Only Bullet has a window.
         make = engine_factory("bullet" if chosen.show and engine == AUTO else engine)
         self.mechanism: Mechanism = build_mechanism(
             model, opensim_derivatives=chosen.opensim_derivatives, rolling=chosen.rolling
         )
+        # What becomes of the model later changes neither runs nor what is shown of them.
+        self.model = model.copy_deep()
         _require_finite_start(self.mechanism)
         self.forces = force_elements(
             model,
@@ -147,11 +148,12 @@ class Simulation:
         times = report_times(to, chosen.report_interval)
         if fixed_step is not None:
             _check_step(fixed_step, to)
-        check_integrator(chosen.integrator)
-        if fixed_step is not None and chosen.integrator != MERSON:
-            raise SettingError(
-                f"the integrator '{chosen.integrator}' chooses its steps; leave it out, or the fixed step"
-            )
+            for name in ("accuracy", "integrator"):
+                if getattr(chosen, name) is not None:
+                    raise SettingError(f"the {name} means nothing for a fixed step; leave one of them out")
+        accuracy = DEFAULT_ACCURACY if chosen.accuracy is None else chosen.accuracy
+        integrator = MERSON if chosen.integrator is None else chosen.integrator
+        check_integrator(integrator)
         if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
@@ -176,7 +178,7 @@ class Simulation:
         self.engine.drive(controls)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
-        settings = Settings(chosen.accuracy, chosen.integrator, fixed_step, self.engine.route, chosen.show)
+        settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
         recorder, stepper, states = self._moved(y, settings, times, chosen.progress)
         times = times[: len(states)]
         if times[-1] < stepper.time:
@@ -187,11 +189,7 @@ class Simulation:
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
-            **(
-                {"accuracy": chosen.accuracy, "integrator": chosen.integrator}
-                if fixed_step is None
-                else {"fixed_step": fixed_step}
-            ),
+            **({"accuracy": accuracy, "integrator": integrator} if fixed_step is None else {"fixed_step": fixed_step}),
             "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from osimlite.errors import ModelError, SettingError, SimulationError
+from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, doubt, quantity
 from osimlite.simulation.files.storage import read_sto
@@ -70,7 +70,7 @@ def starting(
 
     Raises:
         ModelError: there is no such coordinate.
-        SimulationError: a coordinate is locked or prescribed, or a number is not finite.
+        SimulationError: a coordinate is locked or prescribed, or set twice, or a number is not finite.
     """
     infos = mechanism.coordinates
     q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
@@ -85,6 +85,8 @@ def starting(
         places.append([])
         for name, value in numbers.items():
             place = mechanism.coordinate_index(name)
+            if place in places[-1]:
+                raise SettingError(f"coordinate '{name}' is set twice, by its name and by its path; leave one out")
             if infos[place].locked:
                 raise SimulationError(
                     f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
@@ -118,14 +120,13 @@ def state_in(
         time: of the row that is taken, the nearest in the file, s; the last one if left out.
 
     Raises:
-        DocumentError: it is no table.
-        ModelError: it has no states of the mechanism, or no rows.
+        DocumentError: it is no table, has no states of the mechanism, or no rows.
     """
     table = read_sto(path)
     columns = [(place, label) for place, label in enumerate(table.columns) if label in names]
     if not columns or not len(table.times):
         what = f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'" if not columns else "row"
-        raise ModelError(f"no {what}; give a file of its states", file=str(path))
+        raise DocumentError(f"no {what}; give a file of its states", file=str(path))
     row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
     turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
     return {

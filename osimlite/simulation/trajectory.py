@@ -19,9 +19,10 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import sto_text
+from osimlite.simulation.tabular import Tabular
 
 
-class Trajectory:
+class Trajectory(Tabular):
     """The motion of a mechanism over time, with its forces, energies and summary.
 
     Forces, energies and events are worked out when they are asked for.
@@ -35,7 +36,7 @@ class Trajectory:
         auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
             a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it.
         paths: of all states, in the order of OpenSim: ".../value" and ".../speed" of the coordinates, and `auxiliary`.
-        model: what was simulated, if that is known: notebooks show it.
+        model: a copy of what was simulated, if that is known: notebooks show it.
     """
 
     _repr_html_ = shown_in_notebooks("trajectory")
@@ -138,22 +139,10 @@ class Trajectory:
             columns[f"{name}/speed"] = self.speeds[:, place]
         return {**columns, **self.auxiliary, **self.forces, **self.probes}
 
-    def to_frame(self) -> Any:
-        """The `columns` as a pandas DataFrame over time (s).
-
-        Raises:
-            MissingDependency: pandas is not installed.
-        """
-        pandas = require("pandas", extra="frame", purpose="a data frame")
-        return pandas.DataFrame(self.columns, index=pandas.Index(self.times, name="time"))
-
-    def to_arrow(self) -> Any:
-        """The `columns`, after ``time`` (s), as a pyarrow Table, which Polars, DuckDB and Parquet take as it is.
-
-        Raises:
-            MissingDependency: pyarrow is not installed.
-        """
-        return require("pyarrow", extra="frame", purpose="an Arrow table").table({"time": self.times, **self.columns})
+    @property
+    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """The `columns` over ``time`` (s)."""
+        return {"time": self.times}, self.columns
 
     def to_xarray(self) -> Any:
         """An xarray Dataset over ``time`` (s), in SI units and radians.

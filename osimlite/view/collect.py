@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
+from osimlite.files import NAMED_SO
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.surface import Surface
@@ -306,7 +307,7 @@ class _Collector:
         """The mesh in a file; the same for the same file."""
         found = self.folders.find(name)
         if found is None:
-            raise ModelError(f"the mesh file {name} is in none of the folders searched; name one by --geometry")
+            raise ModelError(f"the mesh file {name} is in none of the folders searched; name its folder {NAMED_SO}")
         if found not in self.meshes:
             self.meshes[found] = read_surface(found)
         return self.meshes[found]

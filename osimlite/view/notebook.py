@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 from osimlite._require import require
 from osimlite.errors import OsimliteError
-from osimlite.text import counted
+from osimlite.text import counted, listed, span
 
 if TYPE_CHECKING:
     from osimlite.lint.diagnostic import Report
     from osimlite.schema.base import Component
     from osimlite.schema.model import Model
+    from osimlite.simulation.muscle_curves import MuscleCurves
     from osimlite.simulation.paths import Paths
     from osimlite.simulation.trajectory import Trajectory
     from osimlite.sweep.optimize import Optimum
@@ -103,6 +104,15 @@ def paths(item: Paths) -> str:
         for name in item.names
     )
     return "<div>in the default pose</div>" + _table(("path", "length (m)", "moment arms (m)"), cells, len(lengths))
+
+
+def muscle_curves(item: MuscleCurves) -> str:
+    """What is least and greatest of each muscle."""
+    spans = (map(span, *item.bounds(name), [".4g"] * len(item.muscles)) for name in item.columns)
+    cells = zip(map(escape, item.muscles), *spans, strict=True)
+    over = f" over {escape(listed(item.coordinates))}" if item.coordinates else ""
+    words = f"<div>{counted(len(item.muscles), 'muscle')} in {counted(len(item.poses), 'pose')}{over}</div>"
+    return words + _table(("muscle", *map(escape, item.columns)), cells, len(item.muscles))
 
 
 def runs(item: Outcome) -> str:

@@ -132,7 +132,7 @@ def test_errors_are_one_sentence(tmp_path: Path) -> None:
     )
     assert run("format", ".", folder=tmp_path) == (2, "", said)
     (tmp_path / "empty.osim").touch()
-    assert run("format", "empty.osim", folder=tmp_path)[0] == 1
+    assert run("format", "empty.osim", folder=tmp_path)[0] == 2
 
 
 def test_build_takes_data(fixtures: Path, tmp_path: Path) -> None:

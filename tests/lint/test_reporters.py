@@ -249,4 +249,4 @@ def test_missing_meshes_are_one_finding_of_a_model(tmp_path, monkeypatch):
     assert text.count("OSIM701") == 1 and "1 more like this" in text
     for place in (tmp_path, tmp_path / "Geometry", tmp_path / "bones"):
         assert str(place) in report.findings[0].message
-    assert "--geometry or in OSIMLITE_GEOMETRY" in text
+    assert "in the environment variable OSIMLITE_GEOMETRY, or with --geometry" in text

@@ -159,3 +159,8 @@ def test_a_path_in_place_of_a_model_is_told_to_be_read(function: str) -> None:
 def test_a_class_that_is_not_there_is_answered_with_the_nearest() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'PinJont'; did you mean 'PinJoint'"):
         osimlite.PinJont  # noqa: B018
+
+
+def test_parts_of_the_package_are_there_without_being_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(osimlite, "gait", raising=False)
+    assert osimlite.gait.__name__ == "osimlite.gait"

@@ -92,6 +92,9 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"accuracy": 0.0}, "between 0 and 1"),
         ({"fixed_step": -1e-3}, "positive and finite"),
         ({"fixed_step": 5.0}, "5 s is too long"),
+        ({"fixed_step": 1e-3, "integrator": "merson"}, "the integrator means nothing for a fixed step"),
+        ({"fixed_step": 1e-3, "accuracy": 1e-3}, "the accuracy means nothing for a fixed step"),
+        ({"initial": {"swing": 0.1, "/jointset/hinge/swing": 0.2}}, "set twice, by its name and by its path"),
         ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
         ({"engine": "bulet"}, r"did you mean 'bullet'\?$"),
@@ -364,6 +367,17 @@ def test_trajectory_goes_to_another_process(walker):
     assert again.summary == trajectory.summary and again.forces.keys() == trajectory.forces.keys()
     assert np.array_equal(again.values, trajectory.values)
     assert "6 moments" in repr(again)
+
+
+def test_what_becomes_of_the_model_changes_no_run_and_no_trajectory(walker):
+    walker = walker.copy_deep()
+    with Simulation(walker, "compiled") as simulation:
+        before = simulation.run(0.02)
+        text = osimlite.to_text(walker)
+        walker.find("/bodyset/Pelvis").mass = 1000.0
+        after = simulation.run(0.02)
+    assert np.array_equal(before.values, after.values)
+    assert osimlite.to_text(before.model) == osimlite.to_text(after.model) == text
 
 
 def test_frame_says_what_to_install(walker):

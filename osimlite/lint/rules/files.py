@@ -6,7 +6,7 @@ import os
 from functools import lru_cache
 
 from osimlite.document.source import Source
-from osimlite.files import GEOMETRY_VARIABLE
+from osimlite.files import NAMED_SO
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, times
@@ -41,7 +41,7 @@ def missing_mesh(subject: Subject, found: Found) -> None:
     beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
     places = [str(path) for path in beside]
     tried = listed(dict.fromkeys(places))
-    remedy = f"name its folder with --geometry or in {GEOMETRY_VARIABLE}"
+    remedy = f"name its folder {NAMED_SO}"
     folders = _Folders()
     for item, tag, name in items:
         severity = ERROR if isinstance(item, ContactMesh) else None

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.errors import DocumentError, ModelError
+from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import derivatives_of_samples
@@ -41,7 +41,7 @@ def exclude_forces(model: Model, names: Iterable[str]) -> None:
         names: of forces or of groups of them; "All", "Actuators" or "Muscles".
 
     Raises:
-        ModelError: there is no such force, nor such a group.
+        SettingError: there is no such force, nor such a group.
     """
     forces = {force.name: force for force in model.components(Force)}
     groups = {group.name: group.members for group in model.force_set.groups}
@@ -51,7 +51,7 @@ def exclude_forces(model: Model, names: Iterable[str]) -> None:
         if not kind:
             if name not in groups and name not in forces:
                 near = did_you_mean(name, [*forces, *groups])
-                raise ModelError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
+                raise SettingError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
             named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
             members = [forces[member] for member in named if member in forces]
         for force in members:
@@ -86,8 +86,9 @@ class RecordedMotion:
         the file is in degrees, rotational coordinates are converted, coupled ones are not, as in OpenSim.
 
         Raises:
-            DocumentError: it is not a storage file, its times do not increase, or a coordinate is no number.
-            ModelError: no column names a coordinate of the mechanism.
+            DocumentError: it is not a storage file, its times do not increase, a coordinate is no number, or no column
+                names one of the mechanism.
+            ModelError: the mechanism has no coordinates.
         """
         table = read_sto(path)
         names = {info.path: place for place, info in enumerate(mechanism.coordinates)}
@@ -109,7 +110,7 @@ class RecordedMotion:
         if not mechanism.coordinates:
             raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=str(path))
         if not found:
-            raise ModelError(
+            raise DocumentError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
                 f"{listed(mechanism.coordinate_names)}",
                 file=str(path),
@@ -134,7 +135,7 @@ class RecordedMotion:
         """First and second derivatives (t, n) of the values, by natural splines of fifth degree through them.
 
         Raises:
-            ModelError: there are fewer than six times.
+            SettingError: there are fewer than six times.
         """
         self._require_times("accelerations need")
         first, second = derivatives_of_samples(
@@ -146,8 +147,7 @@ class RecordedMotion:
         """The motion through OpenSim's low-pass filter of `cutoff` Hz, at even times.
 
         Raises:
-            SettingError: the frequency is not positive, or too high for the times.
-            ModelError: there are fewer than six times.
+            SettingError: the frequency is not positive, or too high for the times, or there are fewer than six.
         """
         self._require_times("a filter needs")
         times, values = lowpassed(self.times, self.values, cutoff)
@@ -158,7 +158,7 @@ class RecordedMotion:
 
     def _require_times(self, what: str) -> None:
         if len(self.times) < 2 * _HALF_ORDER:
-            raise ModelError(f"the motion has {len(self.times)} times; {what} at least {2 * _HALF_ORDER}")
+            raise SettingError(f"the motion has {len(self.times)} times; {what} at least {2 * _HALF_ORDER}")
 
     def assembled(self) -> RecordedMotion:
         """The motion with every pose changed as little as the constraints demand.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from osimlite.errors import DocumentError, ModelError
+from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import rotation_xyz
@@ -95,7 +95,7 @@ def test_files_name_coordinates_in_either_way_and_in_degrees(arm, tmp_path: Path
 def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     path = tmp_path / "motion.mot"
     write_sto(path, "motion", [0.0, 0.1], ("knee",), [[1.0], [2.0]])
-    with pytest.raises(ModelError, match="no column is a coordinate of 'arm'; its coordinates are shoulder_0"):
+    with pytest.raises(DocumentError, match="no column is a coordinate of 'arm'; its coordinates are shoulder_0"):
         RecordedMotion.read(arm, path)
     with pytest.raises(ModelError, match="'stone' has no coordinates"):
         RecordedMotion.read(build_mechanism(Model(name="stone")), path)
@@ -106,7 +106,7 @@ def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     with pytest.raises(DocumentError, match=r"'elbow_0' is nan at 0\.1 s; fill the gaps"):
         RecordedMotion.read(arm, path)
     write_sto(path, "motion", [0.0, 0.1, 0.2], ("elbow_0",), [[1.0], [2.0], [3.0]])
-    with pytest.raises(ModelError, match="the motion has 3 times; accelerations need at least 6"):
+    with pytest.raises(SettingError, match="the motion has 3 times; accelerations need at least 6"):
         RecordedMotion.read(arm, path).inverse_dynamics()
 
 
@@ -127,5 +127,5 @@ def test_forces_are_excluded_by_name_by_group_and_by_kind():
     assert on() == ["motor"]
     exclude_forces(model, ["Actuators"])
     assert on() == []
-    with pytest.raises(ModelError, match="no force and no group of forces 'solus'; did you mean 'soleus'"):
+    with pytest.raises(SettingError, match="no force and no group of forces 'solus'; did you mean 'soleus'"):
         exclude_forces(model, ["solus"])
