@@ -1,143 +1,257 @@
-"""``osimlite demo``: the whole tour on the dynamic walker."""
+"""``osimlite demo``: the whole tour, from a file that is written to three motions in the browser."""
 
 from __future__ import annotations
 
+import os
+import sys
+import textwrap
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from osimlite.cli._console import add_row, plain_console, plain_table, say, show
-from osimlite.cli._progress import motion_bar, progress_bar
+from osimlite.cli._console import say, show
+from osimlite.cli._progress import motion_bar
+from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
 MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
+
+
+class Motion(NamedTuple):
+    """A motion of the tour.
+
+    Attributes:
+        model: the built-in model that moves.
+        to: how long, s.
+        title: what becomes of it.
+        told: says what came out, from the motion.
+        seen: what else there is to see on its page.
+        command: what to try with it next; {} is the folder of the tour.
+    """
+
+    model: str
+    to: float
+    title: str
+    told: Callable[[Trajectory], str]
+    seen: str
+    command: str
 
 
 def demo(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes.")
     ] = Path("osimlite-demo"),
-    pictures: Annotated[bool, typer.Option(help="Draw the plots and the animation.")] = True,
+    pictures: Annotated[bool, typer.Option(help="Draw the plots, and write the pages for the browser.")] = True,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the pages in the browser, if there is a display.")
+    ] = True,
 ) -> None:
-    """Build, check, translate and simulate the dynamic walker, and leave the results in a folder.
+    """Build, check, translate and simulate: a walker that falls, one that walks, a human who jumps by muscles.
 
-    The walker is the model of the OpenSim exercise "Building a Dynamic Walker". The tour takes about ten seconds,
-    most of it for the pictures.
+    The first is the model of the OpenSim exercise "Building a Dynamic Walker". All three then play in the browser, with
+    the forces of the ground and the muscles in the colours of their activations. The tour takes about five seconds, the
+    first time some twenty, since code is compiled then.
+
+    Example: osimlite demo -o tour --no-browser
     """
     from osimlite._require import require
-    from osimlite.files import make_folder
-    from osimlite.simulation.engines import AUTO, engine_factory
+    from osimlite.simulation.engines import engine_factory
 
-    engine_factory(AUTO)
+    engine_factory("compiled")
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
-    make_folder(output)
     tour = _Tour(output)
-    model, trajectory = _work(tour)
-    if pictures:
-        _pictures(tour, model, trajectory)
-    tour.table()
+    _check(tour)
+    pages = _move(tour, pictures)
+    say(f"Everything is in {output}{os.sep}")
+    if pages:
+        say(f"Look at {pages[-1]}: choose among the three there")
+        if browser and _has_display():
+            import webbrowser
+
+            webbrowser.open(pages[-1].resolve().as_uri())
+    say("Next, with models of yours: osimlite validate FOLDER")
 
 
 @dataclass
 class _Tour:
-    """What has been done so far, for the closing table."""
+    """The folder of the tour, and how many steps there were."""
 
     folder: Path
-    rows: list[tuple[str, str, str, float]] = field(default_factory=list)
+    steps: int = 0
 
     @contextmanager
-    def step(self, title: str) -> Iterator[Callable[[str, str], None]]:
-        """Announce a step; the caller says what came out and which file holds it."""
-        say(f"{len(self.rows) + 1}. {title}")
+    def step(self, title: str) -> Iterator[Callable[..., None]]:
+        """Announce a step; the caller says what came out, and the files that hold it."""
+        self.steps += 1
+        say(f"{self.steps}. {title}")
         start = time.perf_counter()
-        said = ["", ""]
 
-        def tell(result: str, file: str = "") -> None:
-            said[:] = [result, file]
+        def tell(result: str, *files: Path) -> None:
+            took = f"({time.perf_counter() - start:.1f} s)"
+            for line in textwrap.wrap(f"{result} {took}", 76):
+                say(f"   {line}")
+            if files:
+                say(f"   -> {', '.join(file.relative_to(self.folder).as_posix() for file in files)}")
+            say()
 
         yield tell
-        self.rows.append((title, said[0], said[1], time.perf_counter() - start))
-        say(f"   {said[0]}")
-        say()
-
-    def table(self) -> None:
-        """Print everything that was done."""
-        table = plain_table(f"Everything is in {self.folder}/")
-        table.add_column("step", overflow="fold")
-        table.add_column("result", overflow="fold")
-        table.add_column("file", no_wrap=True)
-        table.add_column("s", justify="right", no_wrap=True)
-        for title, result, file, seconds in self.rows:
-            add_row(table, title, result, file, f"{seconds:.2f}")
-        plain_console().print(table)
 
 
-def _work(tour: _Tour) -> tuple[Model, Trajectory]:
+def _check(tour: _Tour) -> None:
+    """Build the walker of the exercise, validate it, and translate it."""
     from osimlite.document.printer import write
+    from osimlite.files import make_folder
     from osimlite.lint import validate
     from osimlite.lint.reporters import render
     from osimlite.models.dynamic_walker import dynamic_walker
-    from osimlite.simulation import simulate
     from osimlite.translate import to_urdf
 
-    folder = tour.folder
-    with tour.step("Build in Python") as tell:
+    with tour.step("Build the Dynamic Walker in Python") as tell:
         model = dynamic_walker()
-        file = folder / f"{model.name}.osim"
+        file = make_folder(tour.folder / MOTIONS[0].model) / f"{model.name}.osim"
         write(model, file)
-        tell(f"{sum(1 for _ in model.components())} components written", file.name)
+        tell(f"{sum(1 for _ in model.components())} components, for OpenSim too", file)
 
     with tour.step("Validate the file") as tell:
         report = validate(file)
-        tell(f"{len(report.errors)} errors, {len(report.warnings)} warnings", file.name)
+        tell(f"{len(report.errors)} errors, {len(report.warnings)} warnings")
 
-    with tour.step("Validate a misspelt copy") as tell:
+    with tour.step("Validate a copy in which the name of a contact is misspelt") as tell:
         text = file.read_text(encoding="utf-8")
         assert text.count(MISSPELT[0]) == 1
-        broken = folder / "misspelt.osim"
+        broken = file.with_name("misspelt.osim")
         broken.write_text(text.replace(*MISSPELT), encoding="utf-8")
         found = validate(broken)
-        errors = replace(found, findings=found.errors)
-        show(render(errors, "full"))
-        tell(f"{len(found.errors)} error on line {found.errors[0].line}: {found.errors[0].name}", broken.name)
+        show(render(replace(found, findings=found.errors), "full"))
+        tell("OpenSim reads such a file, and refuses to simulate it", broken)
 
-    with tour.step("Translate to URDF") as tell:
+    with tour.step("Translate it to URDF, for robotics") as tell:
         urdf = to_urdf(model)
-        urdf.write(folder / "urdf")
-        tell(f"{len(urdf.fidelity)} things URDF cannot say are listed", "urdf/")
-
-    with tour.step("Simulate two seconds") as tell, motion_bar("   simulating", 2.0) as progress:
-        trajectory = simulate(model, to=2.0, report_interval=0.01, progress=progress)
-        trajectory.write(folder)
-        difference = distance_to_opensim(trajectory)
-        tell(
-            f"{trajectory.summary['engine']}: {trajectory.summary['steps']} steps; at most {difference:.1e} from "
-            "OpenSim's converged motion",
-            "states.sto",
-        )
-    return model, trajectory
+        urdf.write(file.with_name("urdf"))
+        tell(f"{len(urdf.fidelity)} things that URDF cannot say are listed in fidelity.json", file.with_name("urdf"))
 
 
-def _pictures(tour: _Tour, model: Model, trajectory: Trajectory) -> None:
-    from osimlite.view.animation import animate
-    from osimlite.view.plots import plot_simulation
+def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
+    """Simulate the three models, and write what there is to look at; the pages of that."""
+    from osimlite.document.printer import write
+    from osimlite.models.source import make_model
+    from osimlite.simulation.run import Simulation
 
-    with tour.step("Plot motion, forces, energy") as tell:
-        files = plot_simulation(trajectory, tour.folder)
-        tell(", ".join(file.stem for file in files), "*.png")
-    with tour.step("Animate the walker") as tell, progress_bar("   drawing", None) as progress:
-        target = tour.folder / "animation.gif"
-        animate(model, trajectory, target, progress=progress)
-        tell(f"{target.stat().st_size / 1e6:.1f} MB", target.name)
+    found = []
+    with ExitStack() as work:
+        with tour.step("Make three models ready to move") as tell:
+            ready = [work.enter_context(Simulation(make_model(motion.model), "compiled")) for motion in MOTIONS]
+            tell(f"{listed(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}")
+        for motion, simulation in zip(MOTIONS, ready, strict=True):
+            with tour.step(f"{motion.title}: {motion.model}") as tell, motion_bar("   simulating", motion.to) as bar:
+                trajectory = simulation.run(motion.to, accuracy=1e-5, report_interval=0.01, progress=bar)
+                folder = tour.folder / motion.model
+                trajectory.write(folder)
+                write(simulation.model, folder / f"{simulation.model.name}.osim")
+                tell(motion.told(trajectory), folder)
+            found.append(trajectory)
+    if not pictures:
+        return []
+    from osimlite.view import Shown, Story, plot_simulation
+
+    with tour.step("Plot the jump: coordinates, activations, forces, energy") as tell:
+        plots = plot_simulation(found[-1], tour.folder / MOTIONS[-1].model)
+        tell(f"{len(plots)} pictures", plots[0].with_name("*.png"))
+    with tour.step("Write a page for the browser of each motion") as tell:
+        pages = []
+        titles = [(motion.title, f"{motion.model}.html") for motion in MOTIONS]
+        for motion, trajectory in zip(MOTIONS, found, strict=True):
+            assert trajectory.model is not None
+            shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
+            words = f"{motion.told(trajectory)} {motion.seen}"
+            story = Story(words, motion.command.format(tour.folder), f"{motion.model}.html", titles)
+            pages.append(shown.write_page(tour.folder / story.page, story))
+        size = sum(page.stat().st_size for page in pages) / 1e6
+        tell(f"{size:.1f} MB; they need no network", *pages)
+    return pages
+
+
+def _falls(motion: Trajectory) -> str:
+    events = motion.summary["contact_events"]
+    knee = next(event["time_s"] for event in events if "Knee" in event["contact"])
+    apart = distance_to_opensim(motion)
+    return (
+        f"Let go at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee is on the ground. So it does in "
+        f"OpenSim, from whose converged motion no coordinate is ever farther than {apart:.1e} rad or m."
+    )
+
+
+def _walks(motion: Trajectory) -> str:
+    import numpy as np
+
+    events = motion.summary["contact_events"]
+    steps = [event["time_s"] for event in events if event["event"] == "begin" and event["time_s"] > 0.0]
+    way = np.interp(steps, motion.times, motion.values[:, motion.coordinates.index("Pelvis_tx")])
+    return (
+        "The same walker, but for the moment of inertia of its shanks (0.0921 instead of 1 kg·m²) and its feet, 7.4 cm "
+        f"further ahead, makes {len(steps)} steps in {motion.times[-1]:g} s, at {np.ptp(way) / np.ptp(steps):.2f} m/s, "
+        "and does not stop. No motor drives it, only gravity."
+    )
+
+
+def _jumps(motion: Trajectory) -> str:
+    import numpy as np
+
+    heights = [motion.mechanism.center_of_mass(q)[1] for q in motion.values]
+    middle = motion.times[int(np.argmax(heights))]
+    events = motion.summary["contact_events"]
+    off = max(event["time_s"] for event in events if event["event"] == "end" and event["time_s"] < middle)
+    on = min(event["time_s"] for event in events if event["event"] == "begin" and event["time_s"] > middle)
+    pushes = [column for label, column in motion.forces.items() if ".foot_" in label and label.endswith(".force.Y")]
+    push, mass = np.sum(pushes, axis=0)[motion.times < off].max(), motion.mechanism.total_mass
+    return (
+        f"A human of {mass:.0f} kg jumps by 16 muscles, whose excitations a search found: the feet push with "
+        f"{push / (9.80665 * mass):.1f} times the body weight, the mass center rises from {heights[0]:.2f} to "
+        f"{max(heights):.2f} m, and for {on - off:.2f} s nothing touches the ground."
+    )
+
+
+MOTIONS = (
+    Motion(
+        "dynamic-walker",
+        2.0,
+        "It falls",
+        _falls,
+        "The arrows are the forces of the ground.",
+        "osimlite optimize dynamic-walker --objective distance --vary RHip_rz=0:60deg --vary LHip_rz=-60deg:0",
+    ),
+    Motion(
+        "steady-walker",
+        5.0,
+        "It walks",
+        _walks,
+        "The lines on the slope are half a meter apart.",
+        "osimlite gait steady-walker --perturb 0.05 --starts 10",
+    ),
+    Motion(
+        "jumper",
+        1.6,
+        "It jumps",
+        _jumps,
+        "Muscles are blue at rest and red when active; click on one for its length and its moment arms.",
+        "osimlite muscles {}/jumper/Jumper.osim --coordinate knee_angle_r",
+    ),
+)
+
+
+def _has_display() -> bool:
+    """Whether somebody sits here who can see a page: elsewhere, a browser for terminals would take this one."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return False
+    return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
 def distance_to_opensim(trajectory: Trajectory) -> float:

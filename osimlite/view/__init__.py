@@ -8,6 +8,7 @@ from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate
+    from osimlite.view.page import Story as Story
     from osimlite.view.plots import plot_simulation as plot_simulation
     from osimlite.view.shown import Shown as Shown
 
@@ -15,6 +16,7 @@ __getattr__ = imported_when_used(
     __name__,
     {
         "Shown": "osimlite.view.shown",
+        "Story": "osimlite.view.page",
         "animate": "osimlite.view.animation",
         "plot_simulation": "osimlite.view.plots",
     },

@@ -18,10 +18,10 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.view.collect import build_scene
-from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order
+from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order, moving
 from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw
 from osimlite.view.pushes import Pushes
-from osimlite.view.scene import Bodies, Scene
+from osimlite.view.scene import STEEPEST, Scene
 
 Plane = Literal["xy", "yz", "xz"]
 
@@ -38,9 +38,6 @@ LONGEST_ARROW = 0.7
 
 SCENERY = 3.0
 """How many times larger than what moves something that stands still may be and still be shown whole."""
-
-STEEPEST = 0.5
-"""Cosine between the vertical of the picture and the normal of a half space from which on it is ground, no wall."""
 
 Progress = Callable[[int, int], None]
 
@@ -135,7 +132,7 @@ class _Film:
         values = in_mechanism_order(motion, self.mechanism, np.asarray(motion.values, dtype=float))
         self.q = at_times(motion, values, self.times)
         self.poses = [self.scene.at(row) for row in self.q]
-        self.moving = _moving(self.poses)
+        self.moving = moving(self.poses)
         self.pushes = Pushes.of(self.scene, motion, self.times)
         self.activity = {
             path: np.interp(self.times, recorded, levels) for path, levels in activity(self.scene, motion).items()
@@ -188,17 +185,6 @@ class _Film:
                 if abs(inward @ self.up) > STEEPEST * np.linalg.norm(inward):
                     below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (inward @ self.up)
                     yield False, self.flat(below[None])
-
-
-def _moving(poses: list[Bodies]) -> Array:
-    """Which bodies (b + 1,) change place over the film; all of them if none does."""
-    rotations, origins = np.array([p.rotations for p in poses]), np.array([p.origins for p in poses])
-    change = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
-    moving = change > 1e-9
-    if not moving.any():
-        moving[:-1] = True
-    result: Array = moving
-    return result
 
 
 class _Painter:

@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.view.scene import Color, Scene
+from osimlite.view.scene import Bodies, Color, Scene
 
 
 class Motion(Protocol):
@@ -85,6 +85,16 @@ def activity(scene: Scene, motion: Motion) -> dict[str, Array]:
 def activity_color(activation: float) -> Color:
     """The colour of a muscle, as OpenSim has it: from blue to red."""
     return activation, 0.0, 1.0 - activation
+
+
+def moving(poses: Sequence[Bodies]) -> Array:
+    """Which bodies (b + 1,) change place from pose to pose; all but ground if none does."""
+    rotations, origins = np.array([p.rotations for p in poses]), np.array([p.origins for p in poses])
+    change = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
+    found: Array = change > 1e-9
+    if not found.any():
+        found[:-1] = True
+    return found
 
 
 def at_times(motion: Motion, columns: Array, times: Array) -> Array:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from itertools import count
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,10 @@ from osimlite.schema.model import Model
 from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
-from osimlite.view.motion import Motion, activity, in_mechanism_order
+from osimlite.view.motion import Motion, activity, in_mechanism_order, moving
 from osimlite.view.pushes import Pushes
 from osimlite.view.routes import kernels_text, routes_data, text_of
-from osimlite.view.scene import LAYERS, Scene
+from osimlite.view.scene import LAYERS, STEEPEST, Scene
 from osimlite.view.surfaces import normals_of
 
 SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "curves.js", "viewer.js")
@@ -34,6 +34,25 @@ SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "curv
 
 TRAVELS = 0.5
 """The camera follows a motion at first if its middle goes further than this part of the model's size."""
+
+MOMENTS = 25
+"""At so many moments of a motion it is looked how much of space it takes."""
+
+
+class Story(NamedTuple):
+    """What a page tells of its motion, which it then plays at once.
+
+    Attributes:
+        words: what there is to see.
+        command: that makes more of it, for a terminal.
+        page: name of the file of this page.
+        pages: titles and files of all pages that belong together, in one folder.
+    """
+
+    words: str
+    command: str
+    page: str
+    pages: Sequence[tuple[str, str]]
 
 
 def page_text(data: Mapping[str, Any]) -> str:
@@ -67,6 +86,7 @@ def page_data(
     q: Array,
     *,
     server: bool = False,
+    story: Story | None = None,
 ) -> dict[str, Any]:
     """Everything the page shows, as data for JSON.
 
@@ -77,11 +97,12 @@ def page_data(
         findings: of the validator.
         q: coordinate values (n,) at first.
         server: whether a program answers the page, which then asks it for poses that fulfil the constraints.
+        story: what it tells of the motion.
     """
     mechanism = scene.mechanism
     recorded = None if motion is None else _motion(scene, motion)
     start = q if motion is None else in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))[0]
-    low, high = scene.box(start)
+    low, high = np.array(scene.box(q) if recorded is None else recorded["box"])
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
@@ -92,12 +113,13 @@ def page_data(
             "facts": f"{len(mechanism.bodies)} bodies, {len(mechanism.coordinates)} coordinates, "
             f"{len(tree)} components",
             "server": server,
+            "story": None if story is None else story._asdict(),
             "layers": LAYERS,
             "shown": sorted(scene.shown),
             "labelled": hints.show_labels,
             "up": scene.up.tolist(),
             "gravity": mechanism.gravity.tolist(),
-            "floor": scene.floor(start),
+            "floor": _floor(scene, start),
             "center": (0.5 * (low + high)).tolist(),
             "size": float(np.linalg.norm(high - low)),
             "directions": _directions(scene.up),
@@ -135,8 +157,9 @@ def _drawn(scene: Scene) -> dict[str, Any]:
                 "color": list(item.color),
                 "opacity": item.opacity,
                 "visible": item.visible,
+                "scenery": place in scene.large,
             }
-            for item in scene.items
+            for place, item in enumerate(scene.items)
         ],
         "lines": [
             {
@@ -228,8 +251,6 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
     times = np.asarray(motion.times, dtype=float)
     values = in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
     pushes = Pushes.of(scene, motion, times).pushes
-    first, last = (scene.at(row).origins[:-1].mean(axis=0) for row in (values[0], values[-1]))
-    low, high = scene.box(values[0])
     forces = []
     for push in pushes:
         torques = np.zeros_like(push.forces) if push.torques is None else push.torques
@@ -246,7 +267,7 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
         "times": text_of(times.astype("<f8")),
         "values": text_of(values.astype("<f8")),
         "ends": np.column_stack((values.min(axis=0), values.max(axis=0))).tolist(),
-        "travels": bool(np.linalg.norm(last - first) > TRAVELS * np.linalg.norm(high - low)),
+        **_view(scene, values),
         "forces": forces,
         "activations": {
             path: text_of(np.rint(255.0 * level).astype(np.uint8)) for path, level in activity(scene, motion).items()
@@ -254,14 +275,53 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
     }
 
 
-def _directions(up: Array) -> dict[str, list[float]]:
-    """From where to look: towards the viewer, in ground. OpenSim's models face +X, and have Z on their right."""
+def _view(scene: Scene, values: Array) -> dict[str, Any]:
+    """What the camera follows, if it does, and the room that the motion takes: around that, if it is followed."""
+    rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
+    poses = [scene.at(row) for row in rows]
+    moves = moving(poses)[:-1]
+    middles = np.array([pose.origins[:-1][moves].mean(axis=0) for pose in poses])
+    boxes = np.array([scene.box(row) for row in rows])
+    travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(boxes[0, 1] - boxes[0, 0])
+    if travels:
+        boxes -= (middles - middles[0])[:, None]
+    return {
+        "moves": np.flatnonzero(moves).tolist(),
+        "middle": middles[0].tolist(),
+        "travels": bool(travels),
+        "way": float(np.linalg.norm(middles[-1] - middles[0])),
+        "box": [boxes[:, 0].min(axis=0).tolist(), boxes[:, 1].max(axis=0).tolist()],
+    }
+
+
+def _across(up: Array) -> tuple[Array, Array]:
+    """Unit vectors (3,) to the front and to the right. OpenSim's models face +X, and have Z on their right."""
     if abs(up[1]) > 0.9:
-        front, side = np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
-    else:
-        front = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
-        front /= np.linalg.norm(front)
-        side = np.cross(front, up)
+        return np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
+    front = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+    front /= np.linalg.norm(front)
+    return front, np.cross(front, up)
+
+
+def _floor(scene: Scene, q: Array) -> dict[str, Any]:
+    """Where the grid lies, in X and Z of a frame: on the model's own ground, or on a level floor."""
+    bodies = scene.at(q)
+    for item in scene.drawn():
+        outward = -bodies.matrix(item.body, item.matrix)[:3, 0]
+        size = float(np.linalg.norm(outward))
+        if item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
+            matrix = item.matrix.copy()
+            matrix[:3, :3] = np.column_stack((matrix[:3, 1], -matrix[:3, 0], matrix[:3, 2])) / size
+            return {"body": item.body, "matrix": _rows(matrix)}
+    front, side = _across(scene.up)
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack((front, scene.up, side, scene.floor(q) * scene.up))
+    return {"body": -1, "matrix": _rows(matrix)}
+
+
+def _directions(up: Array) -> dict[str, list[float]]:
+    """From where to look: towards the viewer, in ground."""
+    front, side = _across(up)
     home = front + 0.35 * up + 1.3 * side
     # Straight from above, up is no direction in the picture.
     return {

@@ -27,6 +27,9 @@ LAYERS: tuple[Layer, ...] = ("geometry", "contact", "wrap", "markers", "paths", 
 SCENERY = 12.0
 """How many times larger than the usual shape one may be and still be wanted whole in a picture; a long floor is not."""
 
+STEEPEST = 0.5
+"""Cosine between the vertical and the normal of a half space from which on it is ground, no wall."""
+
 _FEW = 1500
 """So many points of a surface are no effort to follow."""
 

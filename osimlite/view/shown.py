@@ -22,7 +22,7 @@ from osimlite.text import listed
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
 from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order
-from osimlite.view.page import page_data, page_text
+from osimlite.view.page import Story, page_data, page_text
 from osimlite.view.picture import Arrow, Camera, Style, draw
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.recording import Recording, read_recording
@@ -101,13 +101,13 @@ class Shown:
         q = mechanism.assemble(values or {})
         return cls(model, scene, q, motion, findings, tuple(remarks))
 
-    def page_text(self) -> str:
+    def page_text(self, story: Story | None = None) -> str:
         """One self-contained page (HTML)."""
-        return page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q))
+        return page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q, story=story))
 
-    def write_page(self, path: str | Path) -> Path:
-        """Write one self-contained page (HTML)."""
-        write_atomically(path, self.page_text())
+    def write_page(self, path: str | Path, story: Story | None = None) -> Path:
+        """Write one self-contained page (HTML), which may tell something of the motion and play it at once."""
+        write_atomically(path, self.page_text(story))
         return Path(path)
 
     def write_glb(self, path: str | Path) -> Path:

@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
-from osimlite.view import Shown
+from osimlite.view import Shown, Story
 from tests.view.motions import Recorded, stroll
 
 WALKER, GAIT, SHOULDER = "walker", "m0014", "m0163"
@@ -245,6 +245,40 @@ def test_a_motion_plays_and_stops_and_can_be_scrubbed(open_page, tmp_path):
     page.page.click("#play")
     page.until("!v.playing")
     assert page.run("v.time") == 0.5
+
+
+def test_a_page_that_tells_something_plays_at_once_and_leads_to_others(open_page, tmp_path):
+    model, motion = dynamic_walker(), stroll()
+    view = Shown.of(model, build_mechanism(model), motion=motion)
+    pages = [("It strolls", "one.html"), ("It strolls again", "two.html")]
+    for _, name in pages:
+        view.write_page(tmp_path / name, Story(f"this is {name}", "osimlite --help", name, pages))
+    page = open_page(tmp_path / "one.html")
+    page.until("v.playing && v.time > 0.01")
+    assert page.page.locator("#story p").inner_text() == "this is one.html"
+    assert page.page.locator("#story code").inner_text().split() == ["osimlite", "--help"]
+    assert page.page.locator("#story [aria-current]").inner_text() == "It strolls"
+    for size in ({"width": 390, "height": 800}, {"width": 800, "height": 390}):
+        page.page.set_viewport_size(size)
+        assert page.page.locator("#story a").last.is_visible() and page.page.locator("#play").is_visible()
+    page.page.locator("#story a").last.click()
+    page.page.get_by_text("this is two.html").wait_for()
+
+
+def test_the_camera_has_all_of_a_motion_in_sight_and_follows_what_travels(open_page, tmp_path):
+    model = dynamic_walker()
+    mechanism = build_mechanism(model)
+    for name, course in (("Pelvis_ty", lambda t: np.sin(2.0 * np.pi * t)), ("Pelvis_tx", lambda t: 18.0 * t)):
+        motion = stroll()
+        motion.values[:, mechanism.coordinate_index(name)] += course(motion.times)
+        page = open_page(Shown.of(model, mechanism, motion=motion).write_page(tmp_path / f"{name}.html"))
+        assert page.run("v.data.motion.travels") == (name == "Pelvis_tx")
+        for moment in (0.0, 0.25, 0.5):
+            page.run("v.setTime(x)", moment)
+            page.until("!v.stage.waiting")
+            x, y = page.run("v.stage.onPage(1, [0, 0, 0])")
+            wide, high = page.run("[v.stage.canvas.clientWidth, v.stage.canvas.clientHeight]")
+            assert 0.1 * wide < x < 0.9 * wide and 0.1 * high < y < 0.9 * high
 
 
 def test_an_arrow_starts_where_the_force_acts(open_page, tmp_path):

@@ -42,6 +42,17 @@ def test_the_page_holds_everything_and_asks_for_nothing(tmp_path: Path):
     assert len(data["motion"]["forces"]) == 2 and not data["motion"]["travels"]
 
 
+def test_the_grid_lies_on_the_ground_of_the_model():
+    view = walker()
+    data = page_data(view.model, view.scene, None, (), view.q)
+    matrix = np.reshape(data["floor"]["matrix"], (3, 4))
+    body = view.scene.mechanism.bodies[data["floor"]["body"]]
+    assert body.name == "Platform"
+    assert np.linalg.det(matrix[:, :3]) == pytest.approx(1.0, abs=1e-12)
+    # The exercise turns its plane by -1.57, and not by a right angle.
+    assert matrix[:, 1] == pytest.approx([-np.cos(1.57), np.sin(1.57), 0.0], abs=1e-12)
+
+
 def test_words_of_a_model_cannot_end_the_data():
     model = dynamic_walker()
     model.name = "a</script><script>alert(1)</script>"

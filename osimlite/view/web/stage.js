@@ -88,6 +88,7 @@
         mesh.userData = item;
         mesh.matrixAutoUpdate = false;
         matrix4(item.matrix, mesh.matrix);
+        if (item.scenery) mesh.renderOrder = -2;
         this.bodyGroup(item.body).add(mesh);
         this.shapes.push(mesh);
         (this.layered[item.layer] ||= []).push(mesh);
@@ -162,14 +163,26 @@
     }
 
     ground() {
-      const { size, floor, gravity } = this.data;
+      const { size, floor, gravity, motion } = this.data;
       const step = size > 4 ? 10 ** Math.ceil(Math.log10(size / 8)) : size > 1 ? 0.5 : size > 0.3 ? 0.1 : 0.02;
-      const count = 2 * Math.ceil(3 * Math.max(size, step) / step);
-      const grid = new T.GridHelper(count * step, count, 0xaab4c0, 0xd5dbe3);
-      grid.quaternion.setFromUnitVectors(new T.Vector3(0, 1, 0), this.up);
-      grid.position.copy(this.up).multiplyScalar(floor);
-      grid.name = "floor";
-      this.layers.ground.add(grid);
+      const count = Math.ceil((3 * Math.max(size, step) + (motion?.way || 0)) / step), end = count * step, ends = [];
+      // In pieces: what draws in software leaves out a line that goes on behind the camera.
+      for (let x = -count; x <= count; x++) {
+        for (let from = -24; from < 24; from++) {
+          for (const to of [from, from + 1]) ends.push(vector([x * step, 0, to * end / 24]));
+          for (const to of [from, from + 1]) ends.push(vector([to * end / 24, 0, x * step]));
+        }
+      }
+      const grid = new T.GridHelper();
+      grid.geometry = new T.BufferGeometry().setFromPoints(ends);
+      grid.material = new T.LineBasicMaterial({ color: 0xcbd3dc, depthTest: false, depthWrite: false });
+      grid.matrixAutoUpdate = false;
+      matrix4(floor.matrix, grid.matrix);
+      grid.userData = { visible: true };
+      // Drawn between scenery and all else: what is drawn of the ground may be higher than where it pushes.
+      grid.renderOrder = -1;
+      this.bodyGroup(floor.body).add(grid);
+      this.layered.ground = [grid];
       const axes = [0xcc3333, 0x2e8b57, 0x3366cc].map((color, axis) => {
         const end = new T.Vector3().setComponent(axis, 0.15 * size);
         return new T.Line(
@@ -334,6 +347,7 @@
     look(direction) {
       const { center, size } = this.data;
       const middle = vector(center), back = vector(direction).normalize();
+      if (this.followed) middle.add(this.followed).sub(vector(this.data.motion.middle));
       const tall = Math.min(1, this.camera.aspect) * Math.tan(0.5 * this.camera.fov * Math.PI / 180);
       this.controls.target.copy(middle);
       this.camera.position.copy(middle).addScaledVector(back, 0.56 * size / tall);
@@ -357,11 +371,11 @@
       this.controls.target.add(step);
     }
 
+    // The middle of the bodies that move.
     middle() {
-      const sum = new T.Vector3();
-      const own = this.poses.slice(0, -1);
-      own.forEach((pose) => sum.add(new T.Vector3(pose[3], pose[7], pose[11])));
-      return sum.divideScalar(Math.max(own.length, 1));
+      const sum = new T.Vector3(), { moves } = this.data.motion;
+      moves.forEach((body) => sum.add(new T.Vector3(this.poses[body][3], this.poses[body][7], this.poses[body][11])));
+      return sum.divideScalar(moves.length);
     }
 
     // The component under a point of the page, or null.

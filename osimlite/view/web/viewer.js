@@ -24,6 +24,7 @@
       this.time = 0;
       if (data.motion) this.setTime(data.motion.times[0]); else this.show(data.q);
       this.stage.look(data.directions.home);
+      if (data.story) this.story(data.story);
     }
 
     unpack() {
@@ -49,6 +50,21 @@
         $("#notice").hidden = false;
         $("#notice").textContent = `Sliders do not keep up ${kept.map((path) => path.split("/").pop()).join(", ")}; 'osimlite view' without --html does.`;
       }
+    }
+
+    // What is told of the motion, the pages beside this one, and the motion itself at once.
+    story({ words, command, page, pages }) {
+      $("#story nav").append(...pages.map(([title, file]) => {
+        const link = make("a", { textContent: title, href: file });
+        if (file === page) link.setAttribute("aria-current", "page");
+        return link;
+      }));
+      $("#story p").textContent = words;
+      // Lines break between words, and not at the hyphens of an option.
+      $("#story code").append(...command.split(" ").flatMap((word) => [make("span", { textContent: word }), " "]));
+      $("#story").hidden = false;
+      document.body.className = "told";
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
     }
 
     // ------------------------------------------------------------------------------------------------ poses
