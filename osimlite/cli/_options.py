@@ -222,3 +222,6 @@ def checked_numbers(numbers: str) -> NumberStyle:
     if numbers not in ("shortest", "opensim"):
         raise SettingError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
     return "opensim" if numbers == "opensim" else "shortest"
+
+
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from osimlite.cli import _options as options
 from osimlite.cli._console import say, show
 from osimlite.cli._progress import motion_bar
 from osimlite.text import listed
@@ -49,15 +50,13 @@ def demo(
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes.")
     ] = Path("osimlite-demo"),
     pictures: Annotated[bool, typer.Option(help="Draw the plots, and write the pages for the browser.")] = True,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the pages in the browser, if there is a display.")
-    ] = True,
+    browser: options.Browser = True,
 ) -> None:
     """Build, check, translate and simulate: a walker that falls, one that walks, a human who jumps by muscles.
 
     The first is the model of the OpenSim exercise "Building a Dynamic Walker". All three then play in the browser, with
     the forces of the ground and the muscles in the colours of their activations. The tour takes about five seconds, the
-    first time some twenty, since code is compiled then.
+    first time some twenty, since code is compiled then. It needs no display.
 
     Example: osimlite demo -o tour --no-browser
     """

@@ -59,7 +59,7 @@ def view(
         typer.Option("--at", metavar="SECONDS", help="The moment of the screenshot.", show_default="the first"),
     ] = None,
     port: Annotated[int, typer.Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    browser: options.Browser = True,
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
 
