@@ -43,6 +43,7 @@ PAGES = {
     "osimlite.models.source": "docs/errors.md#sources-of-models",
     "osimlite.multibody": "docs/constraints.md",
     "osimlite.multibody.assembly": "docs/constraints.md#the-start",
+    "osimlite.multibody.mechanism": "docs/from-opensim.md#kinematics-and-dynamics",
     "osimlite.project": "docs/lint-in-ci.md#settings",
     "osimlite.schema": "docs/from-opensim.md#making-components",
     "osimlite.schema.tree": "docs/from-opensim.md#finding-components",

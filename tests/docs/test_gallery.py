@@ -1,0 +1,29 @@
+"""Every part of the gallery has a picture and what makes it; the site's build makes them all, this makes one."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+pytest.importorskip("mkdocs", reason="needs mkdocs (extra 'dev')")
+from docs import _gallery as gallery
+
+PNG = b"\x89PNG\r\n"
+
+
+def test_every_part_has_a_picture_what_makes_it_and_a_page() -> None:
+    parts = gallery.sections(gallery.PAGE.read_text(encoding="utf-8"))
+    assert len(parts) > 5
+    for part in parts:
+        (name,) = re.findall(r"^!\[[^]]+\]\(gallery/(.+\.png)\)$", part, re.M)
+        assert name.split("/")[0].split(".")[0] in part.split("```")[1]
+        assert re.search(r"\]\(\w[\w-]*\.md(#[\w-]+)?\)", part), part
+
+
+def test_a_part_makes_its_picture() -> None:
+    pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    (elbow,) = (part for part in gallery.sections(gallery.PAGE.read_text(encoding="utf-8")) if "elbow.png" in part)
+    name, picture = gallery.made(elbow)
+    assert name == "elbow.png" and picture.startswith(PNG)
