@@ -17,18 +17,11 @@ from __future__ import annotations
 
 from math import sqrt
 
+from osimlite.forces.vectors import ZERO, Vector, along, dot, minus, norm, over, times
+
 
 def combine_materials(
-    K1: float,
-    c1: float,
-    us1: float,
-    ud1: float,
-    uv1: float,
-    K2: float,
-    c2: float,
-    us2: float,
-    ud2: float,
-    uv2: float,
+    K1: float, c1: float, us1: float, ud1: float, uv1: float, K2: float, c2: float, us2: float, ud2: float, uv2: float
 ) -> tuple[float, float, float, float, float, float]:
     """Effective parameters of a pair of surfaces, to be computed once per pair.
 
@@ -63,143 +56,102 @@ def combine_materials(
     return k1 * a, a, c1 * a + c2 * (1.0 - a), us, ud, uv
 
 
-def half_space_sphere(
-    ox: float,
-    oy: float,
-    oz: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    x: float,
-    y: float,
-    z: float,
-    r: float,
-    a: float,
-) -> tuple[float, float, float, float]:
+def half_space_sphere(o: Vector, n: Vector, center: Vector, r: float, a: float) -> tuple[float, Vector]:
     """Depth and point of application of a sphere (surface 2) in a half space (surface 1).
 
     The half space has no bottom: a centre far below its plane gives a depth greater than 2 r. R of the pair
     is r.
 
     Args:
-        ox: point o = (ox, oy, oz) on the plane, m.
-        nx: unit normal n = (nx, ny, nz) of the plane, out of the half space, 1.
-        x: centre (x, y, z) of the sphere, m.
+        o: point on the plane, m.
+        n: unit normal of the plane, out of the half space, 1.
+        center: of the sphere, m.
         r: radius of the sphere, m.
         a: part of the depth that is the half space's, from `combine_materials`, 1.
 
     Returns:
-        (d, px, py, pz), m. They touch where d > 0; otherwise -d is the gap and the point means nothing.
+        d and P, m. They touch where d > 0; otherwise -d is the gap and the point means nothing.
     """
-    s = (x - ox) * nx + (y - oy) * ny + (z - oz) * nz
+    s = dot(minus(center, o), n)
     d = r - s
-    if d <= 0.0:
-        return d, 0.0, 0.0, 0.0
-    s += a * d
-    return d, x - s * nx, y - s * ny, z - s * nz
+    return (d, along(center, -(s + a * d), n)) if d > 0.0 else (d, ZERO)
 
 
-def sphere_sphere(
-    x1: float,
-    y1: float,
-    z1: float,
-    r1: float,
-    x2: float,
-    y2: float,
-    z2: float,
-    r2: float,
-    a: float,
-) -> tuple[float, float, float, float, float, float, float, float]:
+def sphere_sphere(c1: Vector, r1: float, c2: Vector, r2: float, a: float) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of application of two spheres.
 
     Spheres with one and the same centre have no normal and, as in Simbody, do not touch.
 
     Args:
-        x1: centre (x1, y1, z1) of the sphere that is surface 1, m; (x2, y2, z2) likewise.
+        c1: centre of the sphere that is surface 1, m; c2 likewise.
         r1: its radius, m; r2 likewise.
         a: part of the depth that is surface 1's, from `combine_materials`, 1.
 
     Returns:
-        (d, R, nx, ny, nz, px, py, pz): d, R = r1 r2 / (r1 + r2) and the point in m; n, 1. They touch where
-        d > 0; otherwise -d is the gap (0 for one centre) and the rest means nothing.
+        d, R = r1 r2 / (r1 + r2), n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise -d is the
+        gap (0 for one centre) and the rest means nothing.
     """
-    nx = x2 - x1
-    ny = y2 - y1
-    nz = z2 - z1
-    distance = sqrt(nx * nx + ny * ny + nz * nz)
+    way = minus(c2, c1)
+    distance = norm(way)
     d = r1 + r2 - distance
-    if d <= 0.0:
-        return d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if distance == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    nx /= distance
-    ny /= distance
-    nz /= distance
-    s = r1 - a * d
-    return d, r1 * r2 / (r1 + r2), nx, ny, nz, x1 + s * nx, y1 + s * ny, z1 + s * nz
+    if d <= 0.0 or distance == 0.0:
+        return min(d, 0.0), 0.0, ZERO, ZERO
+    n = over(way, distance)
+    return d, r1 * r2 / (r1 + r2), n, along(c1, r1 - a * d, n)
+
+
+def friction(w: float, us: float, ud: float, uv: float, vt: float) -> float:
+    """Coefficient of friction at a slip w: min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
+
+    At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction then drives the
+    slip instead of opposing it.
+
+    Args:
+        w: slip, m/s, greater than 0.
+        us: coefficient of static friction, 1.
+        ud: coefficient of dynamic friction, 1.
+        uv: coefficient of viscous friction, s/m.
+        vt: transition velocity, m/s. Where it is 0 (or less), the coefficient is ud + uv w, the limit for vt -> 0.
+    """
+    if not vt > 0.0:
+        return ud + uv * w
+    r = w / vt
+    mu = ud + 2.0 * (us - ud) / (1.0 + r * r)
+    return (r * mu if r < 1.0 else mu) + uv * w
 
 
 def contact_force(
-    d: float,
-    R: float,
-    k: float,
-    c: float,
-    us: float,
-    ud: float,
-    uv: float,
-    vt: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    vx: float,
-    vy: float,
-    vz: float,
-) -> tuple[float, float, float]:
+    d: float, R: float, k: float, c: float, us: float, ud: float, uv: float, vt: float, n: Vector, v: Vector
+) -> Vector:
     """Force on surface 2 at the point of application.
 
-    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, nothing where that is not positive (no contact pulls);
-    and f mu along the slip vT of surface 1 over surface 2, with w = |vT|, r = w / vt and
-    mu = min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w. At w = vt, mu is us + uv vt and has a kink.
-    With us < ud / 2 the curve is negative for small r: friction then drives the slip instead of opposing it.
+    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, nothing where that is not positive (no contact pulls); and f mu
+    along the slip of surface 1 over surface 2, mu being its `friction`.
 
     Args:
         d: depth, m; no force where d <= 0.
         R: effective radius of curvature, m.
         k: effective stiffness from `combine_materials`, Pa^(2/3); no force where it is 0.
         c: effective dissipation, s/m.
-        us: effective coefficient of static friction, 1.
-        ud: effective coefficient of dynamic friction, 1.
-        uv: effective coefficient of viscous friction, s/m.
-        vt: transition velocity, m/s. Where it is 0 (or less), mu = ud + uv w for every w > 0, the limit for
-            vt -> 0.
-        nx: unit normal (nx, ny, nz) from surface 1 to surface 2, 1.
-        vx: velocity (vx, vy, vz) of surface 1 relative to surface 2 at the point of application, m/s.
+        us: effective coefficient as of `friction`, with ud and uv.
+        vt: transition velocity, m/s.
+        n: unit normal from surface 1 to surface 2, 1.
+        v: velocity of surface 1 relative to surface 2 at the point of application, m/s.
 
     Returns:
-        (fx, fy, fz), N. A depth or velocity that is not a number gives a force that is not a number.
+        Force, N. A depth or velocity that is not a number gives a force that is not a number.
     """
     if d <= 0.0:
-        return 0.0, 0.0, 0.0
-    vn = vx * nx + vy * ny + vz * nz
+        return ZERO
+    vn = dot(v, n)
     f = (4.0 / 3.0) * k * d * sqrt(R * k * d) * (1.0 + 1.5 * c * vn)
     if f <= 0.0:
-        return 0.0, 0.0, 0.0
-    tx = vx - vn * nx
-    ty = vy - vn * ny
-    tz = vz - vn * nz
-    w = sqrt(tx * tx + ty * ty + tz * tz)
+        return ZERO
+    slip = along(v, -vn, n)
+    w = norm(slip)
     if w == 0.0:
-        return f * nx, f * ny, f * nz
-    if w < vt:
-        r = w / vt
-        mu = r * (ud + 2.0 * (us - ud) / (1.0 + r * r)) + uv * w
-    elif vt > 0.0:
-        r = w / vt
-        mu = ud + 2.0 * (us - ud) / (1.0 + r * r) + uv * w
-    else:
-        mu = ud + uv * w
-    g = f * mu / w
-    return f * nx + g * tx, f * ny + g * ty, f * nz + g * tz
+        return times(f, n)
+    return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
 
 
 def contact_energy(d: float, R: float, k: float) -> float:

@@ -10,6 +10,9 @@ from __future__ import annotations
 
 from math import sqrt, tanh
 
+from osimlite.forces.hunt_crossley import friction
+from osimlite.forces.vectors import Vector, along, dot, times
+
 
 def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
     """Elastic force (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2, k = E^(2/3) / 2, in N.
@@ -27,49 +30,30 @@ def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
 
 
 def smooth_contact_force(
-    hertz: float,
-    c: float,
-    us: float,
-    ud: float,
-    uv: float,
-    vt: float,
-    cf: float,
-    bv: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    vx: float,
-    vy: float,
-    vz: float,
-) -> tuple[float, float, float]:
+    hertz: float, c: float, us: float, ud: float, uv: float, vt: float, cf: float, bv: float, n: Vector, v: Vector
+) -> Vector:
     """Force on the sphere, in N, at the point midway between the two surfaces.
 
     f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT
-    f (min(w / vt, 1) (ud + 2 (us - ud) / (1 + (w / vt)^2)) + uv w) / w with w = sqrt(|vT|^2 + cf).
+    f mu / w with w = sqrt(|vT|^2 + cf) and mu its `friction`.
 
     Args:
         hertz: fh from `smooth_hertz`, N.
         c: dissipation, s/m. With 0, f = fh.
-        us: coefficient of static friction, 1.
-        ud: coefficient of dynamic friction, 1.
-        uv: coefficient of viscous friction, s/m.
+        us: coefficient as of :func:`osimlite.forces.hunt_crossley.friction`, with ud and uv.
         vt: transition velocity, m/s.
         cf: what keeps w from vanishing, m^2/s^2 (the same number as in `smooth_hertz`).
         bv: how sharply the force goes when the surfaces separate, s/m.
-        nx: unit normal (nx, ny, nz) out of the half space, 1.
-        vx: velocity (vx, vy, vz) of the half space relative to the sphere at the point, m/s.
+        n: unit normal out of the half space, 1.
+        v: velocity of the half space relative to the sphere at the point, m/s.
     """
-    vn = vx * nx + vy * ny + vz * nz
+    vn = dot(v, n)
     f = hertz * (1.0 + 1.5 * c * vn)
     if c != 0.0:
         f *= 0.5 + 0.5 * tanh(bv * (vn + 2.0 / (3.0 * c)))
-    tx = vx - vn * nx
-    ty = vy - vn * ny
-    tz = vz - vn * nz
-    w = sqrt(tx * tx + ty * ty + tz * tz + cf)
-    r = w / vt
-    g = f * ((r if r < 1.0 else 1.0) * (ud + 2.0 * (us - ud) / (1.0 + r * r)) + uv * w) / w
-    return f * nx + g * tx, f * ny + g * ty, f * nz + g * tz
+    slip = along(v, -vn, n)
+    w = sqrt(dot(slip, slip) + cf)
+    return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
 
 
 def smooth_contact_energy(hertz: float, d: float) -> float:

@@ -8,7 +8,7 @@ from math import inf
 from osimlite.forces.hunt_crossley import contact_energy, contact_force
 
 Contact = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
-"""d, R, k, c, us, ud, uv, nx, ny, nz, vx, vy, vz: the arguments of `contact_force` but for vt."""
+"""d, R, k, c, us, ud, uv, and the numbers of n and v: the arguments of `contact_force` but for vt."""
 
 
 def contact_forces(
@@ -37,7 +37,7 @@ def contact_forces(
             forces.append((0.0, 0.0, 0.0))
             continue
         energy += contact_energy(d, R, k)
-        force = contact_force(d, R, k, c, us, ud, uv, vt, nx, ny, nz, vx, vy, vz)
+        force = contact_force(d, R, k, c, us, ud, uv, vt, (nx, ny, nz), (vx, vy, vz))
         forces.append(force)
         ended = simbody_early_return and d > 0.0 and force == (0.0, 0.0, 0.0)
     return forces, energy

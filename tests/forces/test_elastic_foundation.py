@@ -9,24 +9,31 @@ from osimlite.forces.elastic_foundation import (
     spring_in_sphere,
     spring_load,
 )
+from osimlite.forces.vectors import ZERO
 
 MATERIAL = 100.0, 0.5, 0.8, 0.4, 0.1, 0.2
 
 
+UP = 0.0, 1.0, 0.0
+
+
 def test_nearest_points():
-    assert spring_in_half_space(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 2.0, 0.7, 3.0) == pytest.approx((0.3, 2.0, 1.0, 3.0))
-    assert spring_in_half_space(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 2.0, 1.7, 3.0)[0] == pytest.approx(-0.7)
-    assert spring_in_sphere(1.0, 0.0, 0.0, 2.0, 1.0, 0.5, 0.0) == pytest.approx((1.5, 1.0, 2.0, 0.0))
-    assert spring_in_sphere(1.0, 0.0, 0.0, 2.0, 1.0, 2.5, 0.0)[0] == pytest.approx(-0.5)
+    depth, point = spring_in_half_space(UP, UP, (2.0, 0.7, 3.0))
+    assert (depth, *point) == pytest.approx((0.3, 2.0, 1.0, 3.0))
+    assert spring_in_half_space(UP, UP, (2.0, 1.7, 3.0))[0] == pytest.approx(-0.7)
+    center = 1.0, 0.0, 0.0
+    depth, point = spring_in_sphere(center, 2.0, (1.0, 0.5, 0.0))
+    assert (depth, *point) == pytest.approx((1.5, 1.0, 2.0, 0.0))
+    assert spring_in_sphere(center, 2.0, (1.0, 2.5, 0.0))[0] == pytest.approx(-0.5)
     # In the centre no way out is shortest.
-    assert spring_in_sphere(1.0, 0.0, 0.0, 2.0, 1.0, 0.0, 0.0)[0] == 0.0
+    assert spring_in_sphere(center, 2.0, center)[0] == 0.0
 
 
 def force(d, v, material=MATERIAL):
     """Force and energy where the middle is the origin and everything is about the nearest point."""
-    fx, fy, fz, *torque, energy = spring_load(*material, 0.0, 0.0, 0.0, *d, *d, *v, 0.0, 0.0, 0.0)
-    assert torque == [0.0, 0.0, 0.0]
-    return (fx, fy, fz), energy
+    pushed, torque, energy = spring_load(*material, ZERO, d, d, v, ZERO)
+    assert torque == ZERO
+    return pushed, energy
 
 
 def test_force_by_hand():
@@ -55,7 +62,7 @@ TRIPLE = st.tuples(NUMBER, NUMBER, NUMBER)
 def test_torque_and_motion_about_any_point(middle, end, about, velocity, spin):
     (rx, ry, rz), (wx, wy, wz) = [b - a for a, b in zip(about, end, strict=True)], spin
     there = [v + x for v, x in zip(velocity, (wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx), strict=True)]
-    fx, fy, fz, *torque, energy = spring_load(*MATERIAL, *middle, *end, *about, *velocity, *spin)
-    same = spring_load(*MATERIAL, *middle, *end, *end, *there, *spin)
-    assert (fx, fy, fz, 0.0, 0.0, 0.0, energy) == pytest.approx(same)
+    (fx, fy, fz), torque, energy = spring_load(*MATERIAL, middle, end, about, velocity, spin)
+    same, none, stored = spring_load(*MATERIAL, middle, end, end, tuple(there), spin)
+    assert (fx, fy, fz, energy) == pytest.approx((*same, stored)) and none == ZERO
     assert torque == pytest.approx([ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx], abs=1e-12)

@@ -21,6 +21,7 @@ from osimlite.forces.hunt_crossley import (
     half_space_sphere,
     sphere_sphere,
 )
+from osimlite.forces.vectors import ZERO
 from tests.forces.contact_sets import contact_forces, simbody_pair_order
 
 # --------------------------------------------------------------------------------------- the table of OpenSim
@@ -49,15 +50,14 @@ def evaluate(row):
     k, a, c, us, ud, uv = combine_materials(*materials)
     if row["kind"] == "halfspace-sphere":
         n = R1 @ body_fixed_xyz(vector("b1_ori")) @ [-1.0, 0.0, 0.0]
-        d, *P = half_space_sphere(*centre1, *n, *centre2, row["R2"], a)
+        d, P = half_space_sphere(centre1, n, centre2, row["R2"], a)
         R = row["R2"]
     else:
-        d, R, nx, ny, nz, *P = sphere_sphere(*centre1, row["R1"], *centre2, row["R2"], a)
-        n = np.array([nx, ny, nz])
+        d, R, n, P = sphere_sphere(centre1, row["R1"], centre2, row["R2"], a)
     P = np.array(P)
     v1 = vector("b1_v") + np.cross(vector("b1_w"), P - p1)
     v2 = vector("b2_v") + np.cross(vector("b2_w"), P - p2)
-    F = np.array(contact_force(d, R, k, c, us, ud, uv, row["vt"], *n, *(v1 - v2)))
+    F = np.array(contact_force(d, R, k, c, us, ud, uv, row["vt"], n, v1 - v2))
     parts = F, np.cross(P - p2, F), -F, np.cross(P - p1, -F)
     return np.concatenate(parts), contact_energy(d, R, k)
 
@@ -91,7 +91,7 @@ def test_table_forces_and_energies(table):
 
 # ------------------------------------------------------------------- several spheres in one HuntCrossleyForce
 
-RADIUS, DEPTH = 0.05, 0.01
+RADIUS, DEPTH, UP = 0.05, 0.01, (0.0, 1.0, 0.0)
 MATERIAL = 1e6, 1.0, 0.8, 0.4, 0.4
 
 
@@ -103,9 +103,9 @@ def plane_contacts(positions, separating, names):
     contacts, order = [], []
     for first, second in simbody_pair_order(centres, radii):
         if first != 0:
-            assert sphere_sphere(*centres[first], RADIUS, *centres[second], RADIUS, a)[0] <= 0.0
+            assert sphere_sphere(centres[first], RADIUS, centres[second], RADIUS, a)[0] <= 0.0
             continue
-        d, *_ = half_space_sphere(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, *centres[second], RADIUS, a)
+        d, *_ = half_space_sphere(ZERO, UP, centres[second], RADIUS, a)
         vy = -1.0 if separating[second - 1] else 0.0
         contacts.append((d, RADIUS, k, c, us, ud, uv, 0.0, 1.0, 0.0, 0.0, vy, 0.0))
         order.append(names[second - 1])
@@ -154,9 +154,9 @@ def test_spheres_of_one_force_touch_each_other(measured):
     values, energy = measured_case(measured, "one_force_sphere_sphere_pair")
     k, a, c, us, ud, uv = combine_materials(*MATERIAL, *MATERIAL)
     assert simbody_pair_order([(0, 0, 0), (0, 1, 0), (0.09, 1, 0)], [inf, 0.05, 0.05])[-1] == (1, 2)
-    d, R, *n, _, _, _ = sphere_sphere(0.0, 1.0, 0.0, 0.05, 0.09, 1.0, 0.0, 0.05, a)
+    d, R, n, _ = sphere_sphere(UP, 0.05, (0.09, 1.0, 0.0), 0.05, a)
     assert contact_energy(d, R, k) == pytest.approx(energy, rel=1e-9)
-    force = contact_force(d, R, k, c, us, ud, uv, 0.2, *n, 0.0, 0.0, 0.0)
+    force = contact_force(d, R, k, c, us, ud, uv, 0.2, n, ZERO)
     assert force == pytest.approx(values[6:9], rel=1e-9)
 
 
@@ -164,8 +164,8 @@ def test_no_friction_transition(measured):
     """Transition velocity 0: the friction of every slip is dynamic and viscous."""
     values, energy = measured_case(measured, "zero_vt")
     k, a, c, us, ud, uv = combine_materials(*MATERIAL, *MATERIAL)
-    d, px, py, _ = half_space_sphere(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.04, 0.0, 0.05, a)
-    fx, fy, fz = contact_force(d, 0.05, k, c, us, ud, uv, 0.0, 0.0, 1.0, 0.0, -0.3, 0.0, 0.0)
+    d, (px, py, _) = half_space_sphere(ZERO, UP, (0.0, 0.04, 0.0), 0.05, a)
+    fx, fy, fz = contact_force(d, 0.05, k, c, us, ud, uv, 0.0, UP, (-0.3, 0.0, 0.0))
     assert (fx, fy, fz) == pytest.approx(values[0:3], rel=1e-9)
     assert (px - 0.0) * fy - (py - 0.04) * fx == pytest.approx(values[5], rel=1e-9)
     assert px * -fy - py * -fx == pytest.approx(values[11], rel=1e-9)
@@ -175,9 +175,9 @@ def test_no_friction_transition(measured):
 def test_half_space_has_no_bottom(measured):
     values, energy = measured_case(measured, "deep_plane")
     k, a, c, us, ud, uv = combine_materials(*MATERIAL, *MATERIAL)
-    d, *_ = half_space_sphere(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.05, a)
+    d, *_ = half_space_sphere(ZERO, UP, (0.0, -1.0, 0.0), 0.05, a)
     assert d == pytest.approx(1.05)
-    force = contact_force(d, 0.05, k, c, us, ud, uv, 0.2, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    force = contact_force(d, 0.05, k, c, us, ud, uv, 0.2, UP, ZERO)
     assert force[1] == pytest.approx(values[1], rel=1e-9)
     assert contact_energy(d, 0.05, k) == pytest.approx(energy, rel=1e-9)
 
@@ -187,9 +187,9 @@ def test_no_radius_or_no_stiffness_no_force(measured, name):
     values, energy = measured_case(measured, name)
     radius, stiffness = (0.0, 1e6) if name == "zero_radius" else (0.05, 0.0)
     k, a, *rest = combine_materials(*MATERIAL, stiffness, *MATERIAL[1:])
-    d, *_ = half_space_sphere(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, radius - 0.01, 0.0, radius, a)
+    d, *_ = half_space_sphere(ZERO, UP, (0.0, radius - 0.01, 0.0), radius, a)
     assert d > 0.0
-    force = contact_force(d, radius, k, *rest, 0.2, 0.0, 1.0, 0.0, 0.3, 0.1, 0.0)
+    force = contact_force(d, radius, k, *rest, 0.2, UP, (0.3, 0.1, 0.0))
     assert list(force) == values[0:3] == [0.0, 0.0, 0.0]
     assert contact_energy(d, radius, k) == energy == 0.0
 
@@ -198,7 +198,7 @@ def test_no_stiffness_on_both_sides_is_no_force():
     """OpenSim gives NaN here; a surface without stiffness cannot push."""
     k, a, *rest = combine_materials(0.0, *MATERIAL[1:], 0.0, *MATERIAL[1:])
     assert (k, a) == (0.0, 0.5)
-    assert contact_force(0.01, 0.05, k, *rest, 0.2, 0.0, 1.0, 0.0, 0.3, 0.1, 0.0) == (0.0, 0.0, 0.0)
+    assert contact_force(0.01, 0.05, k, *rest, 0.2, UP, (0.3, 0.1, 0.0)) == ZERO
     assert contact_energy(0.01, 0.05, k) == 0.0
 
 
@@ -210,7 +210,7 @@ def test_negative_stiffness_is_refused(stiffness):
 
 def test_concentric_spheres_do_not_touch(measured):
     assert not any(measured_case(measured, "concentric")[0])
-    assert sphere_sphere(1.0, 2.0, 3.0, 0.1, 1.0, 2.0, 3.0, 0.2, 0.5) == (0.0,) * 8
+    assert sphere_sphere((1.0, 2.0, 3.0), 0.1, (1.0, 2.0, 3.0), 0.2, 0.5) == (0.0, 0.0, ZERO, ZERO)
 
 
 def test_a_contact_without_depth_does_not_end_simbodys_loop():
@@ -247,7 +247,7 @@ def test_no_touching_pair_is_pruned(spheres):
     assert len({frozenset(pair) for pair in pairs}) == len(pairs)
     for j, b in enumerate(spheres):
         for i, a in enumerate(spheres[:j]):
-            if sphere_sphere(*a, *b, 0.5)[0] > 1e-12:
+            if sphere_sphere(a[:3], a[3], b[:3], b[3], 0.5)[0] > 1e-12:
                 assert (i, j) in pairs or (j, i) in pairs
 
 
@@ -281,7 +281,7 @@ def dot(a, b):
 
 
 def law(contact, vt):
-    return contact_force(*contact[:7], vt, *contact[7:])
+    return contact_force(*contact[:7], vt, contact[7:10], contact[10:])
 
 
 @given(contacts(), slip_scale)
@@ -333,12 +333,13 @@ def test_exchanging_the_materials(first, second):
 
 @given(sphere, sphere, st.floats(0.0, 1.0))
 def test_exchanging_the_spheres(first, second, a):
-    d, R, *rest = sphere_sphere(*first, *second, a)
-    d_turned, R_turned, *turned = sphere_sphere(*second, *first, 1.0 - a)
+    one, two = (first[:3], first[3]), (second[:3], second[3])
+    d, R, n, P = sphere_sphere(*one, *two, a)
+    d_turned, R_turned, turned, same = sphere_sphere(*two, *one, 1.0 - a)
     assert (d, R) == pytest.approx((d_turned, R_turned), abs=1e-12)
     if d > 0.0:
-        assert rest[:3] == pytest.approx([-x for x in turned[:3]], abs=1e-12)
-        assert rest[3:] == pytest.approx(turned[3:], abs=1e-9)
+        assert n == pytest.approx([-x for x in turned], abs=1e-12)
+        assert pytest.approx(same, abs=1e-9) == P
 
 
 @given(contacts(), slip_scale, unit_vectors(), st.floats(0.0, 2.0))
@@ -372,7 +373,7 @@ def test_force_vanishes_with_depth_and_with_slip(contact, vt):
 def test_energy_derivative_is_the_elastic_force(d, R, k):
     h = 1e-5 * d
     slope = (contact_energy(d + h, R, k) - contact_energy(d - h, R, k)) / (2 * h)
-    elastic = contact_force(d, R, k, 0.7, 0.8, 0.4, 0.4, 0.2, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    elastic = contact_force(d, R, k, 0.7, 0.8, 0.4, 0.4, 0.2, (0.0, 0.0, 1.0), ZERO)
     assert elastic[2] == pytest.approx(slope, rel=1e-7)
 
 
@@ -392,7 +393,7 @@ def test_the_law_knows_no_frame(contact, vt, angle):
 
 @given(st.tuples(*[number] * 3), unit_vectors(), st.tuples(*[number] * 3), radius, st.floats(0.0, 1.0))
 def test_point_of_application_divides_the_overlap(o, n, c, r, a):
-    d, *P = half_space_sphere(*o, *n, *c, r, a)
+    d, P = half_space_sphere(o, n, c, r, a)
     if d > 0.0:
         # a of the depth lies on the half space's side of the point, the rest between the point and the
         # sphere's pole.

@@ -17,7 +17,8 @@ from osimlite.simulation.elements.kind import Kind, kinds
 
 BUILT_IN = {"abs", "bool", "float", "int", "max", "min", "range"}
 SCALARS = {"bool", "float", "int"}
-TABLE = "Sequence[float]"
+TRIPLES = {"Vector", "Axes"}
+TABLES = {"Sequence[float]", "Numbers"}
 
 
 def is_of_forces(value):
@@ -61,16 +62,17 @@ def test_all_laws_are_here():
 def test_stands_alone(law):
     """A function that closes over nothing, and that calls none but laws and those of `math`, can be compiled."""
     for name, value in globals_of(law).items():
-        assert is_of_forces(value) or vars(math).get(name) is value or isinstance(value, (float, int)), name
+        assert is_of_forces(value) or vars(math).get(name) is value or isinstance(value, float | int | tuple), name
     assert not law.__code__.co_freevars and not law.__code__.co_cellvars
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_takes_and_gives_scalars(law):
-    """And tables of numbers, and named tuples."""
+    """And triples, tables of numbers, and named tuples."""
     named = {name: value for name, value in law.__globals__.items() if inspect.isclass(value) and is_of_forces(value)}
     for value in named.values():
         assert set(get_type_hints(value).values()) <= {bool, float}
-    assert {p.annotation for p in inspect.signature(law).parameters.values()} <= {*SCALARS, TABLE, *named}
+    known = {*SCALARS, *TRIPLES, *named}
+    assert {p.annotation for p in inspect.signature(law).parameters.values()} <= {*known, *TABLES}
     returned = inspect.signature(law).return_annotation
-    assert set(returned.removeprefix("tuple[").removesuffix("]").split(", ")) <= {*SCALARS, *named}
+    assert set(returned.removeprefix("tuple[").removesuffix("]").split(", ")) <= {*known, "None"}

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy, contact_force
 from osimlite.forces.smooth_contact import smooth_contact_energy, smooth_contact_force, smooth_hertz
 
+UP = 0.0, 1.0, 0.0
 SHARP = 1e-18, 1e7
 """cf and bd or bv with which the smooth law is nearly that of Hunt and Crossley."""
 
@@ -21,8 +22,8 @@ def test_sharp_limit_is_hunt_crossley(d, R, v):
     E, c, us, ud, uv, vt = 1e5, 0.5, 0.8, 0.4, 0.1, 0.2
     k, *_ = combine_materials(E, c, us, ud, uv, E, c, us, ud, uv)
     hertz = smooth_hertz(d, R, E, *SHARP)
-    found = smooth_contact_force(hertz, c, us, ud, uv, vt, *SHARP, 0.0, 1.0, 0.0, *v)
-    expected = contact_force(d, R, k, c, us, ud, uv, vt, 0.0, 1.0, 0.0, *v)
+    found = smooth_contact_force(hertz, c, us, ud, uv, vt, *SHARP, UP, v)
+    expected = contact_force(d, R, k, c, us, ud, uv, vt, UP, v)
     size = max(map(abs, expected))
     assert np.abs(np.subtract(found, expected)).max() <= 1e-6 * size + 1e-9
     assert smooth_contact_energy(hertz, d) == pytest.approx(contact_energy(d, R, k), rel=1e-9)
@@ -30,5 +31,5 @@ def test_sharp_limit_is_hunt_crossley(d, R, v):
 
 def test_apart_there_is_nearly_nothing():
     assert 0.0 < smooth_hertz(-0.01, 0.1, 1e5, 1e-5, 300.0) < smooth_hertz(0.0, 0.1, 1e5, 1e-5, 300.0)
-    force = smooth_contact_force(100.0, 0.5, 0.8, 0.4, 0.1, 0.2, *SHARP, 0.0, 1.0, 0.0, 0.0, -5.0, 0.0)
+    force = smooth_contact_force(100.0, 0.5, 0.8, 0.4, 0.1, 0.2, *SHARP, UP, (0.0, -5.0, 0.0))
     assert force == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)

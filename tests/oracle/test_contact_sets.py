@@ -76,11 +76,10 @@ def by_osimlite(radii, positions, velocities, simbody_early_return):
     for first, second in simbody_pair_order(centres, [inf, *radii]):
         if first == 0:
             n, R = NORMAL, radii[second - 1]
-            d, *_ = half_space_sphere(0.0, 0.0, 0.0, *n, *centres[second], R, a)
+            d, _ = half_space_sphere(centres[0], n, centres[second], R, a)
         else:
-            one, two = ((*centres[i], radii[i - 1]) for i in (first, second))
-            d, R, *found = sphere_sphere(*one, *two, a)
-            n = tuple(found[:3])
+            one, two = ((centres[i], radii[i - 1]) for i in (first, second))
+            d, R, n, _ = sphere_sphere(*one, *two, a)
         v = (p - q for p, q in zip(moves[first], moves[second], strict=True))
         contacts.append((d, R, k, *rest, *n, *v))
         bodies.append((first, second))

@@ -8,6 +8,7 @@ import pytest
 from osimlite import ContactHalfSpace, ContactSphere, HuntCrossleyForce
 from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid
 from osimlite.forces.hunt_crossley import combine_materials, contact_force
+from osimlite.forces.vectors import ZERO
 from osimlite.multibody.spatial import rotation_xyz
 from osimlite.schema.contact import ContactEllipsoid
 
@@ -42,8 +43,8 @@ def touching_pair(rng, round_one):
 
 
 def law(radii, angles, center, a=0.5):
-    one, two = (rotation_xyz(turn).ravel() for turn in angles)
-    return ellipsoid_ellipsoid(0.0, 0.0, 0.0, *one, *radii[0], *center, *two, *radii[1], a)
+    one, two = (rotation_xyz(turn).T for turn in angles)
+    return ellipsoid_ellipsoid(ZERO, one, radii[0], center, two, radii[1], a)
 
 
 def by_opensim(radii, angles, center, velocity):
@@ -87,11 +88,11 @@ def test_random_pairs(round_one):
         radii, angles, center = touching_pair(rng, round_one)
         velocity = rng.normal(size=3)
         (force, torque), _ = by_opensim(radii, angles, center, velocity)
-        d, R, *found = law(radii, angles, center, a)
-        ours = np.array(contact_force(d, R, k, *rest, TRANSITION, *found[:3], *(-velocity)))
+        d, R, n, point = law(radii, angles, center, a)
+        ours = np.array(contact_force(d, R, k, *rest, TRANSITION, n, -velocity))
         scale = 1e-9 * max(1.0, np.abs(force).max())
         assert np.abs(ours - force).max() < scale
-        assert np.abs(np.cross(np.array(found[3:]) - center, ours) - torque).max() < scale
+        assert np.abs(np.cross(np.array(point) - center, ours) - torque).max() < scale
 
 
 @pytest.mark.parametrize("kinds", list(JOINTS.values()), ids=list(JOINTS))

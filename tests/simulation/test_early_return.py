@@ -49,7 +49,7 @@ def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return
         stored = engine.energies(0.0, engine.state.pack([0.04, 0.04], speeds))[2]
     (element,) = forces.elements
     k, a, *rest = element.pairs[0].effective
-    d, *_ = half_space_sphere(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.04, 0.0, 0.05, a)
+    d, *_ = half_space_sphere((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.04, 0.0), 0.05, a)
     contacts = {n: (d, 0.05, k, *rest, 0.0, 1.0, 0.0, 0.0, -speeds[n], 0.0) for n in range(2)}
     order = [
         max(pair) if 2 not in pair else min(pair)

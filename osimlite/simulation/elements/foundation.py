@@ -15,6 +15,7 @@ import numpy as np
 
 from osimlite.errors import ModelError
 from osimlite.forces.elastic_foundation import spring_load
+from osimlite.forces.vectors import ZERO, Vector, minus, plus, times
 from osimlite.multibody.spatial import Array, transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
@@ -27,7 +28,7 @@ from osimlite.simulation.elements.contact import (
     place_of,
     surface_of,
 )
-from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.gather import ElementBuilder, triple
 from osimlite.simulation.elements.items import Item, Placement, Places
 from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 from osimlite.simulation.kernels.layout import LINK_WORK, RECORD, WORK_LINK
@@ -35,11 +36,8 @@ from osimlite.simulation.kernels.meshes import MESH_WORK, load_mesh
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.points import angular_velocity, station, velocity
 
-Load = tuple[float, float, float, float, float, float, float]
+Load = tuple[Vector, Vector, float]
 """Force (N), torque about a point (N·m), and energy (J)."""
-
-Moving = tuple[float, float, float, float, float, float]
-"""Velocity of a point (m/s), and angular velocity (1/s)."""
 
 
 @dataclass(frozen=True)
@@ -133,14 +131,15 @@ class Springs:
             0.5 * surface.material[0] * mesh.areas for surface, mesh in ((one, one.mesh), (two, two.mesh))
         ]
 
-    def load(self, one: Pose, two: Pose, about: Triple, motion: Moving) -> Load:
+    def load(self, one: Pose, two: Pose, about: Vector, v: Vector, turning: Vector) -> Load:
         """The load on surface 2.
 
         Args:
             one: where the body of surface 1 is, in ground.
             two: where the body of surface 2 is.
             about: point for the torque, m.
-            motion: velocity at that point (m/s) and angular velocity (1/s) of surface 1 relative to surface 2.
+            v: velocity at that point (m/s) of surface 1 relative to surface 2.
+            turning: its angular velocity likewise, 1/s.
         """
         first, second = self._first, self._second
         own = _inside(self._stiffness[0], first, one, second, two)
@@ -153,32 +152,22 @@ class Springs:
             )
             or first.crosses(second.moved(one.inverse_times(two)))
         ):
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        vx, vy, vz, wx, wy, wz = motion
-        *first_load, first_energy = self._sum(self.one, own, about, (-vx, -vy, -vz, -wx, -wy, -wz))
-        *second_load, second_energy = self._sum(self.two, others, about, motion)
-        fx, fy, fz, tx, ty, tz = (b - a for a, b in zip(first_load, second_load, strict=True))
-        return fx, fy, fz, tx, ty, tz, first_energy + second_energy
+            return ZERO, ZERO, 0.0
+        force1, torque1, energy1 = self._sum(self.one, own, about, times(-1.0, v), times(-1.0, turning))
+        force2, torque2, energy2 = self._sum(self.two, others, about, v, turning)
+        return minus(force2, force1), minus(torque2, torque1), energy1 + energy2
 
-    def _sum(self, surface: ContactSurface, acting: Iterable[Sequence[float]], about: Triple, motion: Moving) -> Load:
+    def _sum(
+        self, surface: ContactSurface, acting: Iterable[Sequence[float]], about: Vector, v: Vector, turning: Vector
+    ) -> Load:
         """The load on a mesh of the springs that act: stiffness, middle and end of each."""
         _, c, us, ud, uv = surface.material
-        ax, ay, az = about
-        vx, vy, vz, wx, wy, wz = motion
-        vt, law = self.vt, spring_load
-        fx = fy = fz = tx = ty = tz = energy = 0.0
-        for k, x, y, z, ex, ey, ez in acting:
-            px, py, pz, qx, qy, qz, stored = law(
-                k, c, us, ud, uv, vt, x, y, z, ex, ey, ez, ax, ay, az, vx, vy, vz, wx, wy, wz
-            )
-            fx += px
-            fy += py
-            fz += pz
-            tx += qx
-            ty += qy
-            tz += qz
-            energy += stored
-        return fx, fy, fz, tx, ty, tz, energy
+        force = torque = ZERO
+        energy = 0.0
+        for k, x, y, z, *end in acting:
+            push, turn, stored = spring_load(k, c, us, ud, uv, self.vt, (x, y, z), triple(end), about, v, turning)
+            force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
+        return force, torque, energy
 
 
 class Pose(NamedTuple):
@@ -229,14 +218,13 @@ class _Meshes:
         one, two = self._pose(s, w, self.one), self._pose(s, w, self.two)
         first, second = self.springs.one, self.springs.two
         about, other = two.points(np.array(second.center)), one.points(np.array(first.center))
-        ax, ay, az = about.tolist()
-        load: Sequence[float] = [0.0] * 7
+        point: Vector = tuple(about.tolist())
+        load: Load = ZERO, ZERO, 0.0
         if np.linalg.norm(about - other) < first.radius + second.radius:
-            u, v = (np.array(velocity(s, w, link, ax, ay, az)) for link in (self.one.link, self.two.link))
-            a, b = (np.array(angular_velocity(s, w, link)) for link in (self.one.link, self.two.link))
-            (vx, vy, vz), (wx, wy, wz) = (u - v).tolist(), (a - b).tolist()
-            load = self.springs.load(one, two, (ax, ay, az), (vx, vy, vz, wx, wy, wz))
-        load_mesh(s, w, item, ax, ay, az, *load)
+            links = self.one.link, self.two.link
+            v = minus(*(velocity(s, w, link, *point) for link in links))
+            load = self.springs.load(one, two, point, v, minus(*(angular_velocity(s, w, link) for link in links)))
+        load_mesh(s, w, item, point, *load)
 
     @staticmethod
     def _pose(s: Ints, w: Floats, placement: Placement) -> Pose:

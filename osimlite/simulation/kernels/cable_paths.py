@@ -17,6 +17,21 @@ from __future__ import annotations
 
 from math import isnan, nan, radians
 
+from osimlite.forces.vectors import (
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    norm,
+    plus,
+    put,
+    times,
+    turned,
+    turned_back,
+    unit,
+    vector,
+)
 from osimlite.simulation.kernels.cable_surfaces import (
     A_RATE,
     ACROSS,
@@ -44,21 +59,6 @@ from osimlite.simulation.kernels.least_squares import factor_room, factorise, mi
 from osimlite.simulation.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
-from osimlite.simulation.kernels.vectors import (
-    Vector,
-    along,
-    cross,
-    dot,
-    minus,
-    norm,
-    plus,
-    put,
-    times,
-    turned,
-    turned_back,
-    unit,
-    vector,
-)
 
 COUNT, SOLVER, ELEMENTS = OWN + 1, OWN + 2, OWN + 3
 """Integers of a cable: how many elements it has, where in its record room for the search is, and the elements."""

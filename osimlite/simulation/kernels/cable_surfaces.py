@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from osimlite.simulation.kernels.pointers import Floats, at
-from osimlite.simulation.kernels.vectors import (
+from osimlite.forces.vectors import (
     EPSILON,
     Vector,
     along,
@@ -27,6 +26,7 @@ from osimlite.simulation.kernels.vectors import (
     unit,
     vector,
 )
+from osimlite.simulation.kernels.pointers import Floats, at
 
 SPHERE, CYLINDER, ELLIPSOID, TORUS = 0.0, 1.0, 2.0, 3.0
 KIND, RADIUS, SQUARE, WEIGHTS, TUBE = 0, 1, 2, 3, 2

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import sqrt
 
+from osimlite.forces.vectors import Vector, along, component, minus, norm, plus, unit
 from osimlite.simulation.kernels.pointers import Floats
-from osimlite.simulation.kernels.vectors import Vector, along, component, minus, norm, plus, unit
 
 FLAT = 2e-13
 """Distance from a plane of symmetry up to which OpenSim takes a point for one of the plane."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import Vector, dot, put, turned_back, vector
 from osimlite.simulation.kernels.cable_paths import (
     AT,
     ELEMENT_INTS,
@@ -27,7 +28,6 @@ from osimlite.simulation.kernels.path_wraps import in_ground, in_surface
 from osimlite.simulation.kernels.paths import ALONG, COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.vectors import Vector, dot, put, turned_back, vector
 from osimlite.simulation.kernels.wrap_curves import pieces
 
 

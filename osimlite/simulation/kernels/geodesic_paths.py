@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from math import inf
 
+from osimlite.forces.vectors import Vector, dot, minus, norm, put, times, vector
 from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
 from osimlite.simulation.kernels.cable_surfaces import (
     ARC,
@@ -69,7 +70,6 @@ from osimlite.simulation.kernels.paths import (
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import direction, station
-from osimlite.simulation.kernels.vectors import Vector, dot, minus, norm, put, times, vector
 
 WRAP_INTS = 4
 PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from math import inf
 
+from osimlite.forces.vectors import Vector, cross, dot, minus, norm, times, vector
 from osimlite.simulation.kernels.cable_paths import (
     GEODESIC,
     GROUND_END,
@@ -38,7 +39,6 @@ from osimlite.simulation.kernels.cable_surfaces import (
 )
 from osimlite.simulation.kernels.least_squares import factor_room, factorise, minimum_norm
 from osimlite.simulation.kernels.pointers import Floats, at
-from osimlite.simulation.kernels.vectors import Vector, cross, dot, minus, norm, times, vector
 
 OWNER = OBSTACLE_WORK + SURFACE_NUMBERS
 SLOT = OWNER + 1

@@ -19,19 +19,7 @@ from __future__ import annotations
 
 from math import atan2, cos, inf, pi, sin, sqrt
 
-from osimlite.simulation.kernels.cable_surfaces import (
-    CYLINDER,
-    ELLIPSOID,
-    KIND,
-    RADIUS,
-    SQUARE,
-    TORUS,
-    TUBE,
-    WEIGHTS,
-    value,
-)
-from osimlite.simulation.kernels.pointers import Floats, at
-from osimlite.simulation.kernels.vectors import (
+from osimlite.forces.vectors import (
     Vector,
     along,
     component,
@@ -47,6 +35,18 @@ from osimlite.simulation.kernels.vectors import (
     unit,
     vector,
 )
+from osimlite.simulation.kernels.cable_surfaces import (
+    CYLINDER,
+    ELLIPSOID,
+    KIND,
+    RADIUS,
+    SQUARE,
+    TORUS,
+    TUBE,
+    WEIGHTS,
+    value,
+)
+from osimlite.simulation.kernels.pointers import Floats, at
 from osimlite.simulation.kernels.wrap_cylinder import closest_to_axis
 from osimlite.simulation.kernels.wrap_sides import action, on_side
 from osimlite.simulation.kernels.wrapping import NONE

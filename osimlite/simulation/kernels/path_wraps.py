@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from math import inf
 
+from osimlite.forces.vectors import Vector, minus, norm, plus, put, turned, turned_back, vector
 from osimlite.simulation.kernels.layout import LAW, NUMBERS, OK, RECORD
 from osimlite.simulation.kernels.paths import (
     AT,
@@ -39,7 +40,6 @@ from osimlite.simulation.kernels.paths import (
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
-from osimlite.simulation.kernels.vectors import Vector, minus, norm, plus, put, turned, turned_back, vector
 from osimlite.simulation.kernels.wrapping import (
     ENDS,
     FIRST_END,

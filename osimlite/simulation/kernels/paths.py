@@ -7,12 +7,12 @@ order in which the path runs through them, so that nothing is computed twice.
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import Vector, along, dot, minus, norm, plus, put, times, turned, vector
 from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.layout import FREEDOMS, ITEM_AT, ITEMS, LAW, NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
-from osimlite.simulation.kernels.vectors import Vector, along, dot, minus, norm, plus, put, times, turned, vector
 
 PULL = OWN
 """The first integer of the item of any path."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
+from osimlite.forces.ellipsoid_contact import Axes, ellipsoid_ellipsoid, half_space_ellipsoid
+from osimlite.forces.vectors import dot, minus, vector
 from osimlite.simulation.kernels.contacts import press
 from osimlite.simulation.kernels.layout import (
     CONTACT_AT,
@@ -24,17 +25,11 @@ def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
     """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
     i = at(s, item)
     one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
-    ox, oy, oz = station(s, w, one, p[0], p[1], p[2])
-    nx, ny, nz = direction(s, w, one, p[3], p[4], p[5])
-    cx, cy, cz = station(s, w, two, p[7], p[8], p[9])
-    xx, yx, zx = direction(s, w, two, p[18], p[19], p[20])
-    xy, yy, zy = direction(s, w, two, p[21], p[22], p[23])
-    xz, yz, zz = direction(s, w, two, p[24], p[25], p[26])
-    d, radius, px, py, pz = half_space_ellipsoid(
-        ox, oy, oz, nx, ny, nz, cx, cy, cz, xx, xy, xz, yx, yy, yz, zx, zy, zz, p[27], p[28], p[29], p[12]
-    )
+    o, n = station(s, w, one, p[0], p[1], p[2]), direction(s, w, one, p[3], p[4], p[5])
+    center = station(s, w, two, p[7], p[8], p[9])
+    d, radius, point = half_space_ellipsoid(o, n, center, axes(s, w, two, at(p, 18)), vector(p, 27), p[12])
     if d > 0.0:
-        press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
+        press(s, x, w, item, d, radius, n, point)
     return OK
 
 
@@ -42,24 +37,21 @@ def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
     i = at(s, item)
     one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
-    ax, ay, az = station(s, w, one, p[0], p[1], p[2])
-    bx, by, bz = station(s, w, two, p[7], p[8], p[9])
-    gx, gy, gz = bx - ax, by - ay, bz - az
-    if gx * gx + gy * gy + gz * gz >= (p[6] + p[10]) * (p[6] + p[10]):
+    a, b = station(s, w, one, p[0], p[1], p[2]), station(s, w, two, p[7], p[8], p[9])
+    way = minus(b, a)
+    if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OK
-    axx, ayx, azx = direction(s, w, one, p[18], p[19], p[20])
-    axy, ayy, azy = direction(s, w, one, p[21], p[22], p[23])
-    axz, ayz, azz = direction(s, w, one, p[24], p[25], p[26])
-    bxx, byx, bzx = direction(s, w, two, p[30], p[31], p[32])
-    bxy, byy, bzy = direction(s, w, two, p[33], p[34], p[35])
-    bxz, byz, bzz = direction(s, w, two, p[36], p[37], p[38])
-    d, radius, nx, ny, nz, px, py, pz = ellipsoid_ellipsoid(
-        ax, ay, az, axx, axy, axz, ayx, ayy, ayz, azx, azy, azz, p[27], p[28], p[29],
-        bx, by, bz, bxx, bxy, bxz, byx, byy, byz, bzx, bzy, bzz, p[39], p[40], p[41], p[12],
-    )  # fmt: skip
+    axes1, axes2 = axes(s, w, one, at(p, 18)), axes(s, w, two, at(p, 30))
+    d, radius, n, point = ellipsoid_ellipsoid(a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12])
     if d > 0.0:
-        press(s, x, w, item, d, radius, nx, ny, nz, px, py, pz)
+        press(s, x, w, item, d, radius, n, point)
     return OK
+
+
+def axes(s: Ints, w: Floats, link: int, p: Floats) -> Axes:
+    """The axes of an ellipsoid in ground."""
+    one, two = direction(s, w, link, p[0], p[1], p[2]), direction(s, w, link, p[3], p[4], p[5])
+    return one, two, direction(s, w, link, p[6], p[7], p[8])
 
 
 def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -111,9 +103,8 @@ def near(a: Floats, b: Floats, one: float, two: float) -> bool:
     """Whether the bounding spheres of two surfaces are not apart; two half spaces never are a pair."""
     if one == inf and two == inf:
         return False
-    reach = one + two
-    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return bool(dx * dx + dy * dy + dz * dz <= reach * reach)
+    way = minus(vector(a, 0), vector(b, 0))
+    return dot(way, way) <= (one + two) * (one + two)
 
 
 def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:

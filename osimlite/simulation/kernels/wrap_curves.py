@@ -8,11 +8,7 @@ from __future__ import annotations
 
 from math import cos, isnan, nan, pi, sin, sqrt
 
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
-from osimlite.simulation.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground
-from osimlite.simulation.kernels.paths import COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
-from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
-from osimlite.simulation.kernels.vectors import (
+from osimlite.forces.vectors import (
     Vector,
     along,
     cross,
@@ -23,6 +19,10 @@ from osimlite.simulation.kernels.vectors import (
     unit,
     vector,
 )
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground
+from osimlite.simulation.kernels.paths import COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
+from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.wrap_ellipsoid import around_axis, inverted
 from osimlite.simulation.kernels.wrap_torus import in_cylinder, out_of_cylinder
 from osimlite.simulation.kernels.wrapping import CURVE, FIRST_TANGENT, SECOND_TANGENT, SIZES

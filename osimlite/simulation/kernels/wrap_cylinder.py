@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from math import atan2, cos, inf, pi, radians, sin, sqrt, tan
 
+from osimlite.forces.vectors import EPSILON, Vector, along, cross, dot, minus, plus, put, unit, vector
 from osimlite.simulation.kernels.layout import NUMBERS, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.vectors import EPSILON, Vector, along, cross, dot, minus, plus, put, unit, vector
 from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, on_side, tangents
 from osimlite.simulation.kernels.wrapping import (
     ALONE,

@@ -12,10 +12,7 @@ from __future__ import annotations
 
 from math import acos, cos, isnan, nan, pi, sin, sqrt
 
-from osimlite.simulation.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.vectors import (
+from osimlite.forces.vectors import (
     Vector,
     along,
     component,
@@ -31,6 +28,9 @@ from osimlite.simulation.kernels.vectors import (
     unit,
     vector,
 )
+from osimlite.simulation.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_sides import nowhere, on_side
 from osimlite.simulation.kernels.wrapping import (
     AXIAL,

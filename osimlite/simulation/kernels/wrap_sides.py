@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import nan, sqrt
 
+from osimlite.forces.vectors import Vector, along, component, cross, dot, norm, put, times
 from osimlite.simulation.kernels.pointers import Floats
-from osimlite.simulation.kernels.vectors import Vector, along, component, cross, dot, norm, put, times
 from osimlite.simulation.kernels.wrapping import (
     FIRST_TANGENT,
     MANDATORY,

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from math import atan2, pi, sqrt
 
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.vectors import (
+from osimlite.forces.vectors import (
     Vector,
     along,
     component,
@@ -22,6 +20,8 @@ from osimlite.simulation.kernels.vectors import (
     unit,
     vector,
 )
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, nowhere, on_side, tangents
 from osimlite.simulation.kernels.wrapping import (
     AXIS,

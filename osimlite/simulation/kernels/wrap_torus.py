@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from math import nan, sqrt
 
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.vectors import (
+from osimlite.forces.vectors import (
     Vector,
     along,
     cross,
@@ -22,6 +20,8 @@ from osimlite.simulation.kernels.vectors import (
     times,
     vector,
 )
+from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_cylinder import around_cylinder
 from osimlite.simulation.kernels.wrap_sides import nowhere, on_side
 from osimlite.simulation.kernels.wrapping import (

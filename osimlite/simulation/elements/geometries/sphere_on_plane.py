@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError
+from osimlite.forces.vectors import Vector, along, dot, minus, put, vector
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.contact import ContactSurface, surface_of
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
@@ -19,23 +20,20 @@ from osimlite.simulation.kernels.points import apply_force, direction, station, 
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def sphere_depth(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float, float]:
+def sphere_depth(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, Vector]:
     """Depth, radius and normal; the point of contact goes into the record."""
-    ox, oy, oz = station(s, w, g[0], gp[0], gp[1], gp[2])
-    nx, ny, nz = direction(s, w, g[0], gp[3], gp[4], gp[5])
-    cx, cy, cz = station(s, w, g[1], gp[6], gp[7], gp[8])
-    d = gp[9] - ((cx - ox) * nx + (cy - oy) * ny + (cz - oz) * nz)
+    o, n = station(s, w, g[0], gp[0], gp[1], gp[2]), direction(s, w, g[0], gp[3], gp[4], gp[5])
+    center = station(s, w, g[1], gp[6], gp[7], gp[8])
+    d = gp[9] - dot(minus(center, o), n)
     # Half the depth is either surface's.
-    below = 0.5 * d - gp[9]
-    room[3], room[4], room[5] = cx + below * nx, cy + below * ny, cz + below * nz
-    return d, gp[9], nx, ny, nz
+    put(room, 3, along(center, 0.5 * d - gp[9], n))
+    return d, gp[9], n
 
 
-def approach(s: Ints, w: Floats, g: Ints, room: Floats) -> tuple[float, float, float]:
+def approach(s: Ints, w: Floats, g: Ints, room: Floats) -> Vector:
     """Velocity of the half space relative to the sphere, at the point of contact."""
-    ux, uy, uz = velocity(s, w, g[0], room[3], room[4], room[5])
-    vx, vy, vz = velocity(s, w, g[1], room[3], room[4], room[5])
-    return ux - vx, uy - vy, uz - vz
+    px, py, pz = vector(room, 3)
+    return minus(velocity(s, w, g[0], px, py, pz), velocity(s, w, g[1], px, py, pz))
 
 
 def push_both(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
@@ -51,8 +49,8 @@ class SphereOnPlane(Geometry):
     The outputs fx, fy, fz (N) push the sphere.
     """
 
-    inputs = ("d", "radius", "nx", "ny", "nz", "vx", "vy", "vz")
-    before = ("d, radius, nx, ny, nz = sphere_depth(s, w, g, gp, room)", "vx, vy, vz = approach(s, w, g, room)")
+    inputs = ("d", "radius", "n", "v")
+    before = ("d, radius, n = sphere_depth(s, w, g, gp, room)", "v = approach(s, w, g, room)")
     after = ("push_both(s, w, g, room, fx, fy, fz)",)
     calls = (sphere_depth, approach, push_both)
 

@@ -4,6 +4,7 @@ from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.forces.smooth_contact import smooth_contact_energy, smooth_contact_force, smooth_hertz
+from osimlite.forces.vectors import Vector
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
@@ -13,12 +14,8 @@ from osimlite.simulation.elements.kind import Kind
 def contact(
     d: float,
     radius: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    vx: float,
-    vy: float,
-    vz: float,
+    n: Vector,
+    v: Vector,
     E: float,
     cf: float,
     bd: float,
@@ -31,7 +28,7 @@ def contact(
 ) -> tuple[float, float, float, float]:
     """Force on the sphere, and energy."""
     hertz = smooth_hertz(d, radius, E, cf, bd)
-    fx, fy, fz = smooth_contact_force(hertz, c, us, ud, uv, vt, cf, bv, nx, ny, nz, vx, vy, vz)
+    fx, fy, fz = smooth_contact_force(hertz, c, us, ud, uv, vt, cf, bv, n, v)
     return fx, fy, fz, smooth_contact_energy(hertz, d)
 
 

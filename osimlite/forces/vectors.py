@@ -1,22 +1,24 @@
-"""Vectors of three floats, for kernels."""
+"""Vectors of three floats, as laws and kernels have them."""
 
 from __future__ import annotations
 
 from math import sqrt
-
-from osimlite.simulation.kernels.pointers import Floats
+from typing import Any
 
 Vector = tuple[float, float, float]
+Numbers = Any
+"""An array, or in machine code its address."""
 
+ZERO = 0.0, 0.0, 0.0
 EPSILON = 2.220446049250313e-16
 
 
-def vector(numbers: Floats, place: int) -> Vector:
+def vector(numbers: Numbers, place: int) -> Vector:
     """The three numbers from a place on."""
     return numbers[place], numbers[place + 1], numbers[place + 2]
 
 
-def put(numbers: Floats, place: int, a: Vector) -> None:
+def put(numbers: Numbers, place: int, a: Vector) -> None:
     """Put a vector into the three numbers from a place on."""
     numbers[place], numbers[place + 1], numbers[place + 2] = a
 
@@ -51,6 +53,12 @@ def times(k: float, a: Vector) -> Vector:
     """k a."""
     x, y, z = a
     return k * x, k * y, k * z
+
+
+def over(a: Vector, k: float) -> Vector:
+    """a / k."""
+    x, y, z = a
+    return x / k, y / k, z / k
 
 
 def along(a: Vector, k: float, b: Vector) -> Vector:
@@ -92,7 +100,7 @@ def unit(a: Vector) -> Vector:
     return times(1.0 / size, a) if size >= EPSILON else (0.0, 0.0, 0.0)
 
 
-def turned(rows: Floats, a: Vector) -> Vector:
+def turned(rows: Numbers, a: Vector) -> Vector:
     """R a for a rotation R by rows."""
     x, y, z = a
     return (
@@ -102,7 +110,7 @@ def turned(rows: Floats, a: Vector) -> Vector:
     )
 
 
-def turned_back(rows: Floats, a: Vector) -> Vector:
+def turned_back(rows: Numbers, a: Vector) -> Vector:
     """The transpose of R times a."""
     x, y, z = a
     return (
