@@ -16,7 +16,6 @@ from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
 from osimlite.schema.prescribed import PrescribedForce
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, along, carrier, compare, drive  # noqa: E402

@@ -18,7 +18,6 @@ from tests.oracle.opensim_runs import simulated
 from tests.simulation.meshes import ball, block, write_obj, write_vtp
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 UP = (0.0, 0.0, -1.5707963267948966)

@@ -26,7 +26,6 @@ from osimlite.sweep.plan import plan
 from osimlite.sweep.variants import Variants
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, along, carrier, compare, drive  # noqa: E402

@@ -13,7 +13,6 @@ from osimlite.multibody.spatial import rotation_xyz
 from osimlite.schema.contact import ContactEllipsoid
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402

@@ -26,7 +26,6 @@ from osimlite.simulation import read_sto
 from tests.oracle.opensim_runs import simulated
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 ACCURACY = 1e-9

@@ -11,7 +11,6 @@ from osimlite.schema.contact_forces import ElasticFoundationForce
 from tests.simulation.meshes import WRITERS, ball, block
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402

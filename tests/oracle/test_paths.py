@@ -13,7 +13,6 @@ from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402

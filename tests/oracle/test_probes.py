@@ -38,7 +38,6 @@ from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.system import System
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, TIME, along, carrier, drive  # noqa: E402

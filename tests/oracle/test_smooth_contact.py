@@ -10,7 +10,6 @@ from osimlite.schema.contact_forces import MeyerFregly2016Force, SmoothSphereHal
 from osimlite.schema.markers import Station
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402

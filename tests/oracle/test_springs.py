@@ -21,7 +21,6 @@ from osimlite.schema.springs import (
 )
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import DAMPING, JOINTS, along, between, carrier, compare, drive  # noqa: E402

@@ -37,14 +37,14 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.system import System
+
+NO_BULLET = "needs pybullet (extra 'bullet')"
 
 
 def within(ours, expected, tolerance=1e-9):
@@ -212,6 +212,9 @@ def contact_chain():
 
 
 def test_forces_are_those_of_the_bullet_engine():
+    pytest.importorskip("pybullet", reason=NO_BULLET)
+    from osimlite.simulation.engines.bullet.engine import BulletEngine
+
     model = contact_chain()
     mechanism = build_mechanism(model)
     forces = force_elements(model, mechanism)
@@ -267,6 +270,7 @@ def test_motion_at_high_accuracy(fast, reference):
 
 
 def test_same_motion_and_reports_as_with_bullet(fast, simulation):
+    pytest.importorskip("pybullet", reason=NO_BULLET)
     ours, theirs = fast.run(2.0), simulation.run(2.0)
     assert ours.summary["integrator"] == theirs.summary["integrator"]
     for count in ("steps", "attempted_steps", "evaluations"):
@@ -359,6 +363,7 @@ def test_why_there_is_no_step_is_told_late_too():
     pin = osimlite.PinJoint(name="j", coordinates=[coordinate])
     body = model.add(Body(name="b", mass=1.0, mass_center=(0, -0.1, 0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
     model.add(pin.between(model.ground, body))
+    pytest.importorskip("pybullet", reason=NO_BULLET)
     messages = []
     for engine in ("compiled", "bullet"):
         with pytest.raises(

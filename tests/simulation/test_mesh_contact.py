@@ -15,8 +15,6 @@ from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.view.shown import Shown
 from tests.simulation.meshes import ball, block, write_obj
 
-pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-
 
 def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
     """An egg that falls on a hexagonal stone, which stands on the floor it may reach too."""
