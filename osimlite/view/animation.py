@@ -18,7 +18,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.view.collect import build_scene
-from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order, moving
+from osimlite.view.motion import Motion, activity, activity_color, at_times, moving, values_of
 from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw
 from osimlite.view.pushes import Pushes
 from osimlite.view.scene import STEEPEST, Scene
@@ -129,7 +129,7 @@ class _Film:
         recorded = np.asarray(motion.times, dtype=float)
         count = int(np.floor((recorded[-1] - recorded[0]) * fps / speed + 1e-9)) + 1
         self.times = recorded[0] + np.arange(count) * speed / fps
-        values = in_mechanism_order(motion, self.mechanism, np.asarray(motion.values, dtype=float))
+        values = values_of(motion, self.mechanism)
         self.q = at_times(motion, values, self.times)
         self.poses = [self.scene.at(row) for row in self.q]
         self.moving = moving(self.poses)

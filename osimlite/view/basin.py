@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite._require import require
 from osimlite.gait.basin import Basin
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.plots import save
+from osimlite.view.plots import figure_of, save
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
@@ -29,9 +28,7 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
 
 
 def _draw(basin: Basin, path: Path, title: str) -> Path:
-    figures = require("matplotlib.figure", extra="plot", purpose="a picture of a basin")
-    require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture of a basin")
-    figure = figures.Figure(figsize=(6.4, 5.2), layout="constrained")
+    figure = figure_of("", (6.4, 5.2))
     axes = figure.subplots()
     half = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
     x, y = basin.x.values, basin.y.values

@@ -17,7 +17,7 @@ import numpy as np
 from osimlite import __version__
 from osimlite.files import write_atomically
 from osimlite.multibody.spatial import Array, quaternion
-from osimlite.view.motion import Motion, at_times, in_mechanism_order
+from osimlite.view.motion import Motion, at_times, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.scene import Bodies, Color, Scene
@@ -46,7 +46,7 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
         recorded = np.asarray(motion.times, dtype=float)
         usual = round((recorded[-1] - recorded[0]) * RATE) + 1
         times = recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
-        values = in_mechanism_order(motion, scene.mechanism, np.asarray(motion.values, dtype=float))
+        values = values_of(motion, scene.mechanism)
         rows = at_times(motion, values, times)
     poses = [scene.at(row) for row in rows]
     written = _Writer(times - times[0], _turning(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1]))

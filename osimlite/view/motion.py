@@ -104,6 +104,11 @@ def at_times(motion: Motion, columns: Array, times: Array) -> Array:
     return np.array(rows).reshape(len(rows), len(times)).T
 
 
+def values_of(motion: Motion, mechanism: Mechanism) -> Array:
+    """Coordinate values (n, c) of the motion in the order of the mechanism's coordinates."""
+    return in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
+
+
 def in_mechanism_order(motion: Motion, mechanism: Mechanism, columns: Array) -> Array:
     """Columns (n, k) of the motion in the order of the mechanism's coordinates (n, c); defaults where it has none."""
     result = np.tile(mechanism.default_state()[0], (len(columns), 1))

@@ -23,7 +23,7 @@ from osimlite.schema.model import Model
 from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
-from osimlite.view.motion import Motion, activity, in_mechanism_order, moving
+from osimlite.view.motion import Motion, activity, moving, values_of
 from osimlite.view.pushes import Pushes
 from osimlite.view.routes import kernels_text, routes_data, text_of
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
@@ -101,7 +101,7 @@ def page_data(
     """
     mechanism = scene.mechanism
     recorded = None if motion is None else _motion(scene, motion)
-    start = q if motion is None else in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))[0]
+    start = q if motion is None else values_of(motion, mechanism)[0]
     low, high = np.array(scene.box(q) if recorded is None else recorded["box"])
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
@@ -148,26 +148,12 @@ def _drawn(scene: Scene) -> dict[str, Any]:
     return {
         "surfaces": [_surface(surface) for surface in scene.surfaces],
         "items": [
-            {
-                "path": item.path,
-                "layer": item.layer,
-                "body": item.body,
-                "surface": item.surface,
-                "matrix": _rows(item.matrix),
-                "color": list(item.color),
-                "opacity": item.opacity,
-                "visible": item.visible,
-                "scenery": place in scene.large,
-            }
+            {**vars(item), "matrix": _rows(item.matrix), "scenery": place in scene.large}
             for place, item in enumerate(scene.items)
         ],
         "lines": [
             {
-                "path": line.path,
-                "layer": line.layer,
-                "color": list(line.color),
-                "radius": line.radius,
-                "visible": line.visible,
+                **{name: value for name, value in vars(line).items() if name not in ("course", "wraps")},
                 **(
                     {"points": [{"body": point.body, "at": point.location.tolist()} for point in line.course]}
                     if isinstance(line.course, tuple)
@@ -177,10 +163,7 @@ def _drawn(scene: Scene) -> dict[str, Any]:
             for line in scene.lines
         ],
         "routes": routes_data(scene.polylines),
-        "axes": [
-            {"path": axes.path, "body": axes.body, "matrix": _rows(axes.matrix), "length": axes.length}
-            for axes in scene.axes
-        ],
+        "axes": [{**vars(axes), "matrix": _rows(axes.matrix)} for axes in scene.axes],
     }
 
 
@@ -249,7 +232,7 @@ def _coordinates(
 def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
     mechanism = scene.mechanism
     times = np.asarray(motion.times, dtype=float)
-    values = in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
+    values = values_of(motion, mechanism)
     pushes = Pushes.of(scene, motion, times).pushes
     forces = []
     for push in pushes:

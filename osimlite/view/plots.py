@@ -113,13 +113,11 @@ def _figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str,
     if acting:
         idle = [label for label in others if label not in acting]
         note = f"never acting: {', '.join(idle)}" if idle else ""
-        yield (
-            "other_forces.png",
-            _alike(times, "Forces of muscles, springs and others", "force (N) or torque (N·m)", acting, note),
-        )
+        kinds = {"force (N) or torque (N·m)": acting}
+        yield "other_forces.png", _panels(times, "Forces of muscles, springs and others", kinds, note)
     probes = getattr(motion, "probes", {})
     if probes:
-        yield "probes.png", _alike(times, "Probes", "what a probe reports", probes)
+        yield "probes.png", _panels(times, "Probes", {"what a probe reports": probes})
     if mechanism is not None:
         yield "energy.png", _energy(*energies(motion, mechanism))
 
@@ -143,13 +141,7 @@ def _coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> A
             held.append(f"{name} is locked at {column[0]:.4g} {unit}".rstrip())
         else:
             kinds.setdefault(label, {})[name] = column
-    panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
-    figure, axes = sheet("Coordinates", [3.0] * max(1, len(panels)))
-    for panel, (label, lines) in zip(axes, panels, strict=False):
-        lines_in(panel, times, lines)
-        panel.set_ylabel(label)
-    finish(axes, times, "; ".join(held))
-    return figure
+    return _panels(times, "Coordinates", kinds, "; ".join(held))
 
 
 def _states(times: Array, states: Mapping[str, Array]) -> Any:
@@ -158,13 +150,7 @@ def _states(times: Array, states: Mapping[str, Array]) -> Any:
         owner, _, kind = path.rpartition("/")
         label = kind.replace("_", " ") + _UNITS.get(kind, "")
         kinds.setdefault(label, {})[owner.rpartition("/")[2]] = column
-    panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
-    figure, axes = sheet("States of muscles and other forces", [3.0] * len(panels))
-    for panel, (label, lines) in zip(axes, panels, strict=True):
-        lines_in(panel, times, lines)
-        panel.set_ylabel(label)
-    finish(axes, times, "")
-    return figure
+    return _panels(times, "States of muscles and other forces", kinds)
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
@@ -196,12 +182,13 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     return figure
 
 
-def _alike(times: Array, title: str, unit: str, lines: Mapping[str, Array], note: str = "") -> Any:
-    parts = shared_out(lines)
-    figure, axes = sheet(title, [3.0] * len(parts))
-    for panel, part in zip(axes, parts, strict=True):
-        lines_in(panel, times, part)
-        panel.set_ylabel(unit)
+def _panels(times: Array, title: str, kinds: Mapping[str, Mapping[str, Array]], note: str = "") -> Any:
+    """A figure with as many panels as the lines of each kind, which has one unit, take."""
+    panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
+    figure, axes = sheet(title, [3.0] * max(1, len(panels)))
+    for panel, (label, lines) in zip(axes, panels, strict=False):
+        lines_in(panel, times, lines)
+        panel.set_ylabel(label)
     finish(axes, times, note)
     return figure
 

@@ -15,7 +15,7 @@ import numpy as np
 from osimlite._require import require
 from osimlite.files import write_atomically
 from osimlite.multibody.spatial import Array
-from osimlite.view.motion import Motion, activity, activity_color, in_mechanism_order
+from osimlite.view.motion import Motion, activity, activity_color, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.scene import Color, Scene
@@ -38,7 +38,7 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
     times, rows = np.zeros(1), q[None, :]
     if motion is not None:
         times = np.asarray(motion.times, dtype=float)
-        rows = in_mechanism_order(motion, scene.mechanism, np.asarray(motion.values, dtype=float))
+        rows = values_of(motion, scene.mechanism)
     poses = [scene.at(row) for row in rows]
     recording = rr.RecordingStream(scene.mechanism.name or "osimlite")
     stream = recording.binary_stream()

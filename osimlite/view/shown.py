@@ -21,7 +21,7 @@ from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.text import listed
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
-from osimlite.view.motion import Motion, activity, activity_color, at_times, in_mechanism_order
+from osimlite.view.motion import Motion, activity, activity_color, at_times, values_of
 from osimlite.view.page import Story, page_data, page_text
 from osimlite.view.picture import Arrow, Camera, Style, draw
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
@@ -164,7 +164,7 @@ class Shown:
         if time is not None and not first <= time <= last:
             raise OsimliteError(f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}")
         moment = np.array([first if time is None else time])
-        values = in_mechanism_order(motion, self.scene.mechanism, np.asarray(motion.values, dtype=float))
+        values = values_of(motion, self.scene.mechanism)
         q = at_times(motion, values, moment)[0]
         largest = Pushes.of(self.scene, motion, np.asarray(motion.times, dtype=float)).largest
         low, high = self.scene.box(q)
