@@ -41,11 +41,17 @@ class Surface:
     triangles: Indices
     normals: Array | None = None
 
-    def mirrored(self, signs: Sequence[float]) -> Surface:
-        """The surface with its coordinates multiplied by `signs` (3,), each 1 or -1, and its outside still outside."""
-        signs_ = np.asarray(signs, dtype=float)
-        triangles = self.triangles if signs_.prod() > 0.0 else self.triangles[:, ::-1]
-        return Surface(self.points * signs_, triangles, None if self.normals is None else self.normals * signs_)
+    def stretched(self, factors: Sequence[float]) -> Surface:
+        """The surface with its coordinates multiplied by `factors` (3,), and its outside still outside."""
+        a, b, c = factors
+        turned = a * b * c < 0.0
+        triangles, normals = self.triangles[:, ::-1] if turned else self.triangles, self.normals
+        if normals is not None:
+            # They are stretched the other way, by 1/a, 1/b, 1/c; these products serve what is flat too.
+            normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if turned else 1.0)
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+            normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+        return Surface(self.points * np.array(factors), triangles, normals)
 
     def obj(self) -> str:
         """The text of an OBJ file."""

@@ -10,6 +10,7 @@ from osimlite.files import NAMED_SO, read_file
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.stl import binary_stl, is_binary
+from osimlite.meshes.surface import Surface
 from osimlite.robot.names import legal
 
 MESH_FOLDER = "meshes"
@@ -82,6 +83,10 @@ class MeshFiles:
         misspelt = not source.as_posix().endswith(Path(name).as_posix().removeprefix("./"))
         return MeshCopy(file, source, converted, misspelt)
 
+    def stretched(self, name: str, shape: Surface, size: tuple[float, float, float]) -> str:
+        """Relative name of the file of a unit shape that is stretched along its axes."""
+        return self.add((name, *size), name, ".obj", shape.stretched(size).obj().encode())
+
     def add(self, key: tuple[object, ...], stem: str, kind: str, content: bytes) -> str:
         """Relative name of a mesh file, the same for the same key and unlike any other, whatever the capitals."""
         if key not in self._made:
@@ -103,5 +108,5 @@ def _written(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
         binary = binary_stl(content, source.name, signs)
         return binary, "" if is_binary(content) else "written as a binary STL file"
     surface = read_surface(source)
-    text = (surface.mirrored(signs) if min(signs) < 0.0 else surface).obj().encode()
+    text = (surface.stretched(signs) if min(signs) < 0.0 else surface).obj().encode()
     return text, "written as an OBJ file of triangles" if kind == ".vtp" else ""

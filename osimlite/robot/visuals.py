@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from osimlite.meshes import curved
+from osimlite.meshes.unit_shapes import ball, tube
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, rotation_about, transform
 from osimlite.robot.mesh_files import MeshFiles, MeshProblem
@@ -105,10 +105,10 @@ class _Collector:
                 return Box((x, y, z)), here
             case Sphere() | Ellipsoid():
                 own = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
-                radii = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
-                if radii[0] == radii[1] == radii[2]:
-                    return Ball(radii[0]), here
-                file = self._mesh_file("ellipsoid", radii, curved.ellipsoid(radii))
+                a, b, c = radii = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
+                if a == b == c:
+                    return Ball(a), here
+                file = self.mesh_files.stretched("ellipsoid", ball(), (a, b, c))
                 note("ellipsoid", path, "an ellipsoid", "written as a mesh file", f"{file}, half axes {radii} m")
                 return MeshFile(file), here
             case Cylinder():
@@ -120,7 +120,7 @@ class _Collector:
                 )
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
-                file = self._mesh_file("elliptic_cylinder", (a, b, length), curved.elliptic_cylinder((a, b), length))
+                file = self.mesh_files.stretched("elliptic_cylinder", tube(), (a, b, length))
                 note("elliptic-cylinder", path, "a cylinder that is not round", "written as a mesh file", file)
                 return MeshFile(file), _Y_TO_Z
             case Mesh():
@@ -131,9 +131,6 @@ class _Collector:
     def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
         shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.note, geometry.scale_factors)
         return None if shape is None else (shape, np.eye(4))
-
-    def _mesh_file(self, name: str, key: tuple[float, ...], content: str) -> str:
-        return self.mesh_files.add((name, *key), name, ".obj", content.encode())
 
 
 def frame_of(tree: Tree, geometry: Geometry) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.meshes import curved
+from osimlite.meshes.unit_shapes import ball
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, offset
 from osimlite.robot.mesh_files import MeshFiles
@@ -76,9 +76,7 @@ def _shape(
             told("a half space, and its material", f"a collision box of {size} m whose face is its surface")
             return Box(SLAB), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
-            file = mesh_files.add(
-                ("ellipsoid", *geometry.radii), "ellipsoid", ".obj", curved.ellipsoid(geometry.radii).encode()
-            )
+            file = mesh_files.stretched("ellipsoid", ball(), geometry.radii)
             told("an ellipsoid, and its material", "a collision shape in a mesh file", file)
             return MeshFile(file), here
         case ContactMesh():

@@ -11,6 +11,7 @@ import numpy as np
 
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
 from osimlite.files import NAMED_SO
+from osimlite.meshes import unit_shapes
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.surface import Surface
@@ -29,7 +30,6 @@ from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.polylines import Course
-from osimlite.view import surfaces
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
 
 WIDTH_OF_HALF_SPACE = 2.5
@@ -131,7 +131,7 @@ class _Collector:
             case Marker():
                 body, point = self.mechanism.stations[path]
                 color = self.model.model_visual_preferences.model_display_hints.marker_color
-                self._add(path, "markers", body, surfaces.ball(), _stretched((_MARKER_RADIUS,) * 3, point), color)
+                self._add(path, "markers", body, unit_shapes.ball(), _stretched((_MARKER_RADIUS,) * 3, point), color)
             case AbstractGeometryPath():
                 self._path(component, path)
             case Force():
@@ -148,14 +148,14 @@ class _Collector:
         body, placed = self.mechanism.frames[frame]
         match shape:
             case geometry.Brick():
-                own, size = surfaces.cube(), _stretched(2.0 * np.array(shape.half_lengths))
+                own, size = unit_shapes.cube(), _stretched(2.0 * np.array(shape.half_lengths))
             case geometry.Sphere():
-                own, size = surfaces.ball(), _stretched((shape.radius,) * 3)
+                own, size = unit_shapes.ball(), _stretched((shape.radius,) * 3)
             case geometry.Ellipsoid():
-                own, size = surfaces.ball(), _stretched(shape.radii)
+                own, size = unit_shapes.ball(), _stretched(shape.radii)
             case geometry.Cylinder():
                 length = 2.0 * shape.half_height
-                own, size = surfaces.tube(), _TO_Z @ _stretched((shape.radius, shape.radius, length))
+                own, size = unit_shapes.tube(), _TO_Z @ _stretched((shape.radius, shape.radius, length))
             case geometry.Mesh():
                 own, size = self._mesh(shape.mesh_file), np.eye(4)
             case geometry.LineGeometry():
@@ -174,19 +174,19 @@ class _Collector:
         visible = look.visible and look.surface_properties.representation != 0
         match surface:
             case contact.ContactSphere():
-                own, size = surfaces.ball(), _stretched((surface.radius,) * 3)
+                own, size = unit_shapes.ball(), _stretched((surface.radius,) * 3)
             case contact.ContactEllipsoid():
-                own, size = surfaces.ball(), _stretched(surface.radii)
+                own, size = unit_shapes.ball(), _stretched(surface.radii)
             case contact.ContactCylinder():
-                own, size = surfaces.tube(), _stretched((surface.radius, surface.radius, _ENDLESS))
+                own, size = unit_shapes.tube(), _stretched((surface.radius, surface.radius, _ENDLESS))
             case contact.ContactTorus() if surface.torus_radius > 0.0:
-                own = surfaces.ring(surface.tube_radius / surface.torus_radius)
+                own = unit_shapes.ring(surface.tube_radius / surface.torus_radius)
                 size = _stretched((surface.torus_radius,) * 3)
             case contact.ContactMesh():
                 own, size = self._mesh(surface.filename), np.eye(4)
             case contact.ContactHalfSpace():
                 self.half_spaces.append(len(self.items))
-                own, size, opacity = surfaces.sheet(), np.eye(4), HALF_SPACE_OPACITY * look.opacity
+                own, size, opacity = unit_shapes.sheet(), np.eye(4), HALF_SPACE_OPACITY * look.opacity
             case _:
                 raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")
         self._add(path, "contact", body, own, here @ size, look.color, opacity, visible)
@@ -201,14 +201,14 @@ class _Collector:
         here = placed @ offset(surface.translation, surface.xyz_body_rotation)
         match surface:
             case wrapping.WrapSphere():
-                own, size = surfaces.ball(), _stretched((surface.radius,) * 3)
+                own, size = unit_shapes.ball(), _stretched((surface.radius,) * 3)
             case wrapping.WrapEllipsoid():
-                own, size = surfaces.ball(), _stretched(surface.dimensions)
+                own, size = unit_shapes.ball(), _stretched(surface.dimensions)
             case wrapping.WrapCylinder():
-                own, size = surfaces.tube(), _stretched((surface.radius, surface.radius, surface.length))
+                own, size = unit_shapes.tube(), _stretched((surface.radius, surface.radius, surface.length))
             case wrapping.WrapTorus() if surface.outer_radius > 0.0:
                 # In spite of their names: the radius of the tube, and that of the circle in its middle.
-                own = surfaces.ring(surface.inner_radius / surface.outer_radius)
+                own = unit_shapes.ring(surface.inner_radius / surface.outer_radius)
                 size = _stretched((surface.outer_radius,) * 3)
             case _:
                 raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")

@@ -16,12 +16,12 @@ import numpy as np
 
 from osimlite import __version__
 from osimlite.files import write_atomically
+from osimlite.meshes.unit_shapes import normals_of, tube
 from osimlite.multibody.spatial import Array, quaternion
 from osimlite.view.motion import Motion, at_times, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.scene import Bodies, Color, Scene
-from osimlite.view.surfaces import normals_of, tube
 
 RATE = 60.0
 """Moments a second at most: between them players go straight."""

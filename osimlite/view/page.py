@@ -14,6 +14,7 @@ import numpy as np
 
 from osimlite.lint.diagnostic import Finding
 from osimlite.meshes.surface import Surface
+from osimlite.meshes.unit_shapes import normals_of
 from osimlite.multibody.constraints import Coupler, Lock, Prescribed
 from osimlite.multibody.functions import IDENTITY, Function
 from osimlite.multibody.mechanism import Mechanism
@@ -27,7 +28,6 @@ from osimlite.view.motion import Motion, activity, moving, values_of
 from osimlite.view.pushes import Pushes
 from osimlite.view.routes import kernels_text, routes_data, text_of
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
-from osimlite.view.surfaces import normals_of
 
 SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "curves.js", "viewer.js")
 """The parts of the page's own program, in their order."""

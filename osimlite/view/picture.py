@@ -11,9 +11,9 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import OsimliteError
+from osimlite.meshes import unit_shapes
 from osimlite.meshes.surface import Surface
 from osimlite.multibody.spatial import Array
-from osimlite.view import surfaces
 from osimlite.view.canvas import Canvas
 from osimlite.view.scene import Bodies, Color, Scene
 
@@ -146,25 +146,25 @@ def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], st
         if line.visible and line.layer in scene.shown:
             color = style.colors.get(line.path, line.color)
             for start, end in pairwise(corners):
-                heap.put(surfaces.tube(8), _between(start, end, line.radius), color)
+                heap.put(unit_shapes.tube(8), _between(start, end, line.radius), color)
             for corner in corners:
-                heap.put(surfaces.bead(), _sized(corner, line.radius), color)
+                heap.put(unit_shapes.ball(8, 4), _sized(corner, line.radius), color)
     if "frames" in scene.shown:
         for axes in scene.axes:
             placed = bodies.matrix(axes.body, axes.matrix)
             for axis in range(3):
                 end = placed[:3, 3] + axes.length * placed[:3, axis]
-                heap.put(surfaces.tube(8), _between(placed[:3, 3], end, 0.002), tuple(np.eye(3)[axis].tolist()))
+                heap.put(unit_shapes.tube(8), _between(placed[:3, 3], end, 0.002), tuple(np.eye(3)[axis].tolist()))
     thick = 0.012 * heap.camera.half[1]
     for arrow in arrows:
         length = float(np.linalg.norm(arrow.vector))
         if length < 2.0 * thick:
             continue
         tip, end = arrow.point + arrow.vector, arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length)
-        heap.put(surfaces.tube(), _between(arrow.point, end, thick), FORCE, front=True)
+        heap.put(unit_shapes.tube(), _between(arrow.point, end, thick), FORCE, front=True)
         head = _between(end, tip, 2.6 * thick)
         head[:3, 3] = end
-        heap.put(surfaces.spike(), head, FORCE, front=True)
+        heap.put(unit_shapes.spike(), head, FORCE, front=True)
 
 
 def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
@@ -182,7 +182,7 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
         other = (first + k, second - reach), (first + k, second + reach)
         for ends in (one, other):
             start, end = (x * across + z * along + height * up for x, z in ends)
-            heap.put(surfaces.tube(4), _between(start, end, 0.0012 * half), FLOOR, lit=False)
+            heap.put(unit_shapes.tube(4), _between(start, end, 0.0012 * half), FLOOR, lit=False)
 
 
 def _cut_open(heap: _Heap, placed: Array) -> None:
@@ -195,12 +195,12 @@ def _cut_open(heap: _Heap, placed: Array) -> None:
     far = 4.0 * max(camera.half)
     start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
     heap.put(
-        surfaces.tube(4), _between(start - far * along, start + far * along, 0.004 * camera.half[1]), INK, lit=False
+        unit_shapes.tube(4), _between(start - far * along, start + far * along, 0.004 * camera.half[1]), INK, lit=False
     )
     below = np.eye(4)
     below[:3, :3] = np.column_stack((camera.towards, far * inward, 2.0 * far * along))
     below[:3, 3] = start + 0.5 * far * inward - 1e3 * camera.towards
-    heap.put(surfaces.sheet(), below, EARTH, lit=False)
+    heap.put(unit_shapes.sheet(), below, EARTH, lit=False)
 
 
 class _Heap:
@@ -232,7 +232,7 @@ class _Heap:
             # Normals follow the cofactors, which also serve what is stretched or flat.
             turn = matrix[:3, :3]
             cofactors = np.cross(turn[[1, 2, 0]], turn[[2, 0, 1]])
-            normals = surfaces.normals_of(surface) @ cofactors.T @ self._axes.T
+            normals = unit_shapes.normals_of(surface) @ cofactors.T @ self._axes.T
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
             normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)

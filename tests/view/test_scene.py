@@ -7,13 +7,13 @@ import pytest
 
 from osimlite import Body, Coordinate, Model, SliderJoint
 from osimlite.errors import OsimliteError
+from osimlite.meshes import unit_shapes
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus
 from osimlite.schema.wrapping import WrapTorus
-from osimlite.view import surfaces
 from osimlite.view.collect import build_scene
 
 
@@ -40,12 +40,12 @@ def with_shape(shape, folders=None):
 @pytest.mark.parametrize(
     ("make", "volume"),
     [
-        (surfaces.ball, 4.0 / 3.0 * np.pi),
-        (surfaces.bead, 4.0 / 3.0 * np.pi),
-        (surfaces.tube, np.pi),
-        (surfaces.spike, np.pi / 3.0),
-        (lambda: surfaces.ring(0.3), 2.0 * np.pi**2 * 0.09),
-        (surfaces.cube, 1.0),
+        (unit_shapes.ball, 4.0 / 3.0 * np.pi),
+        (lambda: unit_shapes.ball(8, 4), 4.0 / 3.0 * np.pi),
+        (unit_shapes.tube, np.pi),
+        (unit_shapes.spike, np.pi / 3.0),
+        (lambda: unit_shapes.ring(0.3), 2.0 * np.pi**2 * 0.09),
+        (unit_shapes.cube, 1.0),
     ],
 )
 def test_unit_shapes_are_closed_and_turned_outwards(make, volume):
@@ -53,7 +53,7 @@ def test_unit_shapes_are_closed_and_turned_outwards(make, volume):
     a, b, c = (shape.points[shape.triangles[:, place]] for place in range(3))
     areas = np.cross(b - a, c - a)
     enclosed = np.einsum("ij,ij->", a, areas) / 6.0
-    assert volume * (0.7 if make is surfaces.bead else 0.95) < enclosed <= volume * (1.0 + 1e-12)
+    assert volume * (0.7 if len(shape.points) < 100 else 0.95) < enclosed <= volume * (1.0 + 1e-12)
     assert np.linalg.norm(areas.sum(axis=0)) < 1e-12
     assert (np.einsum("ij,ij->i", areas, shape.normals[shape.triangles].sum(axis=1)) > -1e-12).all()
     assert np.linalg.norm(shape.normals, axis=1) == pytest.approx(1.0)
@@ -82,7 +82,7 @@ def test_meshes_are_read_from_files_of_every_kind(repo: Path):
                 continue
             kinds.add(path.suffix.lower())
             assert surface.triangles.max() < len(surface.points)
-            assert np.linalg.norm(surfaces.normals_of(surface), axis=1).max() < 1.0 + 1e-5
+            assert np.linalg.norm(unit_shapes.normals_of(surface), axis=1).max() < 1.0 + 1e-5
     assert ".vtp" in kinds
 
 

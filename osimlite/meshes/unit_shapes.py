@@ -1,4 +1,4 @@
-"""Surfaces to draw: unit shapes of triangles, and normals."""
+"""Unit shapes as surfaces of triangles, and normals."""
 
 from __future__ import annotations
 
@@ -7,22 +7,17 @@ from functools import cache
 
 import numpy as np
 
-from osimlite.meshes.surface import Indices, Surface
-from osimlite.multibody.spatial import Array
+from osimlite.meshes.surface import Array, Indices, Surface
 
 SLICES, STACKS = 48, 24
 
 
 @cache
-def ball() -> Surface:
+def ball(slices: int = SLICES, stacks: int = STACKS) -> Surface:
     """A ball of radius 1 about the origin."""
-    return _turned([_half_circle(STACKS)])
-
-
-@cache
-def bead() -> Surface:
-    """A ball of radius 1 of few triangles, for what is small."""
-    return _turned([_half_circle(4)], 8)
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, stacks + 1)
+    arc = np.column_stack((np.cos(angles), np.sin(angles)))
+    return _turned([np.hstack((arc, arc))], slices)
 
 
 @cache
@@ -77,12 +72,6 @@ def _strip(start: tuple[float, float], end: tuple[float, float], normal: tuple[f
     return np.array(((*start, *normal), (*end, *normal)), dtype=float)
 
 
-def _half_circle(stacks: int) -> Array:
-    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, stacks + 1)
-    arc = np.column_stack((np.cos(angles), np.sin(angles)))
-    return np.hstack((arc, arc))
-
-
 def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     """The surface that lines in a half plane sweep when they turn about Z.
 
@@ -102,7 +91,10 @@ def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
             vectors.append(np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3))
         row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
         a, b = first + row * slices + k, first + row * slices + (k + 1) % slices
-        triangles += [np.column_stack((a, b, b + slices)), np.column_stack((a, b + slices, a + slices))]
+        # On the axis nothing is between two slices.
+        apart = np.abs(strip[:, 0]) > 1e-12
+        triangles.append(np.column_stack((a, b, b + slices))[apart[row]])
+        triangles.append(np.column_stack((a, b + slices, a + slices))[apart[row + 1]])
         first += len(strip) * slices
     return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals))
 
