@@ -104,6 +104,8 @@ Geometry = Annotated[
     ),
 ]
 
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
+
 
 def results_folder(file: Path, output: Path | None) -> Path:
     """The folder that is asked for, else one in the current folder, named after the model's file."""
@@ -222,6 +224,3 @@ def checked_numbers(numbers: str) -> NumberStyle:
     if numbers not in ("shortest", "opensim"):
         raise SettingError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
     return "opensim" if numbers == "opensim" else "shortest"
-
-
-Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
