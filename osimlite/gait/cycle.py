@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from osimlite.errors import OsimliteError
 from osimlite.gait.stepmap import StepMap
+from osimlite.gait.steps import along_slope
 from osimlite.simulation.runs import Floats
 
 CONVERGED = 1e-9
@@ -25,7 +26,8 @@ class Cycle:
 
     Attributes:
         state: at the heel strike of the first foot, in the engine's order (y,).
-        length: of a step along the slope, m.
+        length: of a step along the slope, from foot to foot, m.
+        way: of the walker in a step, along the slope; feet that roll while they stand take it further than `length`, m.
         period: of a step, s.
         multipliers: Floquet multipliers (of a step, or of a stride if the legs differ) without those of the neutral
             directions, the largest first; that of the direction of the motion itself, zero, is among them.
@@ -38,6 +40,7 @@ class Cycle:
 
     state: Floats
     length: float
+    way: float
     period: float
     multipliers: NDArray[np.complex128]
     neutral: int
@@ -49,7 +52,7 @@ class Cycle:
     @property
     def speed(self) -> float:
         """Along the slope, m/s."""
-        return self.length / self.period
+        return self.way / self.period
 
     @property
     def largest(self) -> float:
@@ -115,16 +118,20 @@ def find_cycle(
         taken += 1
     state_found = step_map.expand(reduced)
     images = step_map(state_found[None])
+    engine, per_stride = step_map.engine, step_map.exchange is None
+    feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
+    before, after = along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet].mean(axis=1).tolist()
     values = np.linalg.eigvals(step_matrix(step_map, state_found)).astype(np.complex128)
     return Cycle(
         state_found,
         float(images.lengths[0]),
+        (after - before) / (1 + per_stride),
         float(images.times[0]),
         values[np.argsort(-np.abs(values))],
         step_map.neutral.shape[1],
         size,
         int(images.scuffs[0]),
-        step_map.exchange is None,
+        per_stride,
         taken,
     )
 
