@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
+from itertools import chain, count
 
 _COLOUR = r"\x1b\[[0-9;]*m"
 # Bidirectional controls, the separators of lines, and halves of characters: what stands for a byte that is no UTF-8.
@@ -96,8 +97,14 @@ def span(low: float, high: float, form: str) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """``"1 step"``, ``"2 steps"``."""
-    return f"{number} {noun}" + ("" if number == 1 else "s")
+    """``"1 step"``, ``"2 steps"``, ``"2 bodies"``."""
+    many = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    return f"{number} {noun if number == 1 else many}"
+
+
+def unused(name: str, taken: Container[str | None], first: int = 1) -> str:
+    """The name itself, or with the first number behind it that makes it another than those that are taken."""
+    return next(free for free in chain((name,), (f"{name}_{k}" for k in count(first))) if free not in taken)
 
 
 def listed(words: Iterable[str], *, most: int = 8) -> str:

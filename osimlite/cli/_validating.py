@@ -16,7 +16,7 @@ from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
 from osimlite.lint.suffixes import project_files
-from osimlite.text import listed
+from osimlite.text import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -68,18 +68,18 @@ def run(
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
         count, left = (sum(counts[place] for counts in shown) for place in (0, 1))
-        say(f"Would mend {_places(count)}{_more(left)}.", err=True)
+        say(f"Would mend {counted(count, 'place')}{_more(left)}.", err=True)
         return int(count > 0)
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
-        say(f"Mended {_places(count)}{_more(left)}.", err=True)
+        say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=cached, progress=progress)
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write
 
         count = write(write_baseline, report)
-        say(f"{write_baseline}: {count} {'finding' if count == 1 else 'findings'}")
+        say(f"{write_baseline}: {counted(count, 'finding')}")
         return 0
     if baseline is not None:
         from osimlite.lint.baseline import without_baseline
@@ -117,10 +117,6 @@ def _check(source: Source, given: Config) -> Report:
 def _fail_on_of(files: list[str]) -> Severity:
     """The threshold that the settings of the first file ask for."""
     return settings_of(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
-
-
-def _places(count: int) -> str:
-    return f"{count} {'place' if count == 1 else 'places'}"
 
 
 def _mended(
@@ -178,7 +174,7 @@ def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
 
 
 def _more(left: int) -> str:
-    return f"; --unsafe-fixes would mend {_places(left)} more" if left else ""
+    return f"; --unsafe-fixes would mend {counted(left, 'place')} more" if left else ""
 
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int]:

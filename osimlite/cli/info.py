@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from osimlite.text import counted
+
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
     from osimlite.schema.custom_joint import CustomJoint
@@ -32,7 +34,6 @@ def info(
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
     from osimlite.lint.suffixes import is_table
-    from osimlite.lint.words import times
     from osimlite.schema.base import Object
     from osimlite.schema.coordinates import Coordinate
     from osimlite.schema.joints import Joint
@@ -67,7 +68,7 @@ def info(
         ("coordinates", str(sum(isinstance(component, Coordinate) for component in components))),
         ("muscles", str(len(muscles))),
         ("forces besides", str(len(model.force_set.objects) - len(muscles))),
-        ("wrap surfaces", f"{surfaces}, for {times(len(wraps), 'wrap')}"),
+        ("wrap surfaces", f"{surfaces}, for {counted(len(wraps), 'wrap')}"),
         ("markers", str(len(model.marker_set.objects))),
         ("controllers", str(len(model.controller_set.objects))),
         ("probes", str(len(model.probe_set.objects))),
@@ -177,7 +178,6 @@ def _coordinates(model: Model) -> Iterator[str]:
 
 def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
     """A line for each muscle, by class."""
-    from osimlite.lint.words import times
     from osimlite.schema.paths import GeometryPath
 
     width = max(len(muscle.name) for muscle in muscles)
@@ -190,7 +190,8 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
             laid = type(path).__name__
             if isinstance(path, GeometryPath):
                 wraps = len(path.path_wrap_set.objects)
-                laid = times(len(path.path_point_set.objects), "point") + (f", {times(wraps, 'wrap')}" if wraps else "")
+                laid = counted(len(path.path_point_set.objects), "point")
+                laid += f", {counted(wraps, 'wrap')}" if wraps else ""
             lengths = f"{muscle.optimal_fiber_length:>7.4g} m {muscle.tendon_slack_length:>7.4g} m"
             yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
 

@@ -9,6 +9,7 @@ import typer
 
 from osimlite.cli import _options as options
 from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.text import counted
 
 if TYPE_CHECKING:
     from osimlite.document.reader import Document
@@ -54,7 +55,7 @@ def upgrade(
         raise OsimliteError(f"'{target}' is there already; name the file to write with -o", file=str(file))
     write(document.top, target, numbers=style)
     _report(document)
-    say(f"{target}: version {document.version} to {CURRENT_VERSION}, {_count(len(document.changes), 'change')}")
+    say(f"{target}: version {document.version} to {CURRENT_VERSION}, {counted(len(document.changes), 'change')}")
 
 
 def _report(document: Document) -> None:
@@ -85,9 +86,5 @@ def _report(document: Document) -> None:
             lost.setdefault(change.lost, []).append(change)
     for what, changes in lost.items():
         first = document.source.of_tag(changes[0].number).line
-        more = f" and {_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
+        more = f" and {counted(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
         say(f"lost: {what} (line {first}, {changes[0].where}{more})")
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}" + ("" if number == 1 else "s")

@@ -6,7 +6,7 @@ from array import array
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from osimlite.lint.words import times
+from osimlite.text import counted
 
 _TOLD = 50
 """Faults of a kind that are told, one for each column."""
@@ -31,8 +31,8 @@ class Fault(NamedTuple):
 
     def more(self, noun: str = "row") -> str:
         """What to say of further rows, and of further columns."""
-        rows = [f"; so it is in {times(self.times - 1, f'more {noun}')}"] if self.times > 1 else []
-        columns = [f"; there is such in {times(self.others, 'more column')}"] if self.others else []
+        rows = [f"; so it is in {counted(self.times - 1, f'more {noun}')}"] if self.times > 1 else []
+        columns = [f"; there is such in {counted(self.others, 'more column')}"] if self.others else []
         return "".join(rows + columns)
 
 

@@ -38,13 +38,6 @@ def shown(value: object) -> str:
     return str(value) if value not in (None, "") else "nothing"
 
 
-def times(count: int, noun: str) -> str:
-    """``1 body``, ``2 bodies``."""
-    if count == 1:
-        return f"1 {noun}"
-    return f"{count} {noun[:-1] + 'ies' if noun.endswith('y') else noun + 's'}"
-
-
 def nearest_name(text: str, right: list[str]) -> str | None:
     """The nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
     whole = nearest(text, right, cutoff=70)

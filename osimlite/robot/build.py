@@ -16,6 +16,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.robot.lines import as_line
 from osimlite.robot.robot import WORLD, Link, Robot, RobotJoint
 from osimlite.robot.shapes import Visual
+from osimlite.text import unused
 
 _ALONG = 1e-14
 """How far off an axis, relative to its own length, a vector may be and still count as lying along it."""
@@ -178,9 +179,7 @@ class _Builder:
             )
 
     def _unique(self, name: str) -> str:
-        unique, count = name, 1
-        while unique in self.taken:
-            unique, count = f"{name}_{count}", count + 1
+        unique = unused(name, self.taken)
         self.taken.add(unique)
         return unique
 

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 
 from osimlite.robot.robot import WORLD, Robot
+from osimlite.text import unused
 
 LONGEST = 200
 """Characters in a name; some readers cut lines that are too long."""
@@ -30,10 +31,7 @@ class UniqueNames:
 
     def __call__(self, name: str) -> str:
         """The name made legal, with a number behind it if it was given out before."""
-        word, count = legal(name), 1
-        base = word
-        while word in self._taken:
-            word, count = f"{base}_{count}", count + 1
+        word = unused(legal(name), self._taken)
         self._taken.add(word)
         return word
 
@@ -45,11 +43,8 @@ def coordinate_names(robot: Robot) -> Robot:
     taken = set(own.values())
     for joint in robot.joints:
         if joint.name not in own:
-            name, count = joint.name, 1
-            while name in taken:
-                name, count = f"{joint.name}_{count}", count + 1
-            own[joint.name] = name
-            taken.add(name)
+            own[joint.name] = unused(joint.name, taken)
+            taken.add(own[joint.name])
     return replace(robot, joints=tuple(replace(joint, name=own[joint.name]) for joint in robot.joints))
 
 

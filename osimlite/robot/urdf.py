@@ -26,6 +26,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 
 from osimlite.document.escape import quoted
+from osimlite.document.lexical import shortest
 from osimlite.multibody.spatial import Array
 from osimlite.robot.mimics import Mimic, mimics
 from osimlite.robot.names import UniqueNames
@@ -81,10 +82,8 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
 
 def number(value: float) -> str:
     """The shortest text that reads back as the same float."""
-    if value == 0.0:
-        return "0"
-    text = repr(float(value))
-    return text[:-2] if text.endswith(".0") else text
+    # Not -0 either.
+    return shortest(float(value) + 0.0)
 
 
 def numbers(values: Sequence[float] | Array) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, families, plain, step
+from osimlite.text import unused
 
 _PROSE = {"credits", "publications", "data_file", "datafile", "file_name", "filename", "geometry_file", "mesh_file"}
 """Elements whose text is never the name of a component."""
@@ -29,9 +30,7 @@ def names(draft: Draft) -> None:
             new = "".join(name.split())
             siblings = () if parent is None else (other for other in parent if other is not component)
             taken = {sibling.get("name") for sibling in siblings}
-            free, count = new, 0
-            while free in taken:
-                free, count = f"{new}_{count}", count + 1
+            free = unused(new, taken, 0)
             component.set("name", free)
             renamed.setdefault(" ".join(name.split()), free)
             draft.changed(component)

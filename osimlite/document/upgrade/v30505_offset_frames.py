@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, body_path, plain, reals, step
+from osimlite.text import unused
 
 _ZERO = "0 0 0"
 _LINKERS = ("BushingForce", "FunctionBasedBushingForce", "ExpressionBasedBushingForce", "WeldConstraint")
@@ -59,9 +60,7 @@ def _frame(draft: Draft, owner: Element, body: str, socket: Element, place: list
     source = next((part for part in place if part is not None), socket)
     frames = draft.list_in(owner, "frames", source=source)
     taken = {frame.get("name") for frame in frames}
-    name, count = f"{body}_offset", 0
-    while name in taken:
-        name, count = f"{body}_offset_{count}", count + 1
+    name = unused(f"{body}_offset", taken, 0)
     frame = draft.add(frames, "PhysicalOffsetFrame", source=source, name=name)
     draft.add(frame, "socket_parent", body_path(body), source=socket)
     for tag, part in (("translation", location), ("orientation", orientation)):

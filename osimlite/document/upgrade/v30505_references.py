@@ -7,6 +7,7 @@ from typing import cast
 from lxml import etree
 
 from osimlite.document.upgrade.draft import Draft, Element, body_path, members, plain, step
+from osimlite.text import unused
 
 _CONSTRAINTS = {
     "PointConstraint": ("body_1", "body_2"),
@@ -121,9 +122,7 @@ def _coordinate_paths(draft: Draft) -> dict[str, str]:
     taken: set[str] = set()
     for joint in () if joint_set is None else members(joint_set):
         name = joint.get("name") or joint.tag.lower()
-        free, count = name, 0
-        while free in taken:
-            free, count = f"{name}_{count}", count + 1
+        free = unused(name, taken, 0)
         taken.add(free)
         for coordinate in joint.iter("Coordinate"):
             paths.setdefault(coordinate.get("name", ""), f"/jointset/{free}/{coordinate.get('name')}")

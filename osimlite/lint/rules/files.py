@@ -9,11 +9,11 @@ from osimlite.document.source import Source
 from osimlite.files import NAMED_SO
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, times
+from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Mesh
-from osimlite.text import listed
+from osimlite.text import counted, listed
 
 
 @rule("OSIM701", "missing-mesh", severity=WARNING)
@@ -102,7 +102,7 @@ def included_file(subject: Subject, found: Found) -> None:
         uses = subject.uses if note.why and subject.model is not None else []
         wanted = sum(subject.resolution(use).target is note.owner for use in uses)
         if wanted:
-            fate += f", while {times(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
+            fate += f", while {counted(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
         found(
             f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,

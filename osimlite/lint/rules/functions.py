@@ -9,7 +9,7 @@ from typing import Final, cast
 from osimlite.lint.axes import axes_of
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity, times
+from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
 from osimlite.schema.functions import (
     Function,
@@ -22,6 +22,7 @@ from osimlite.schema.functions import (
     PiecewiseLinearFunction,
     SimmSpline,
 )
+from osimlite.text import counted
 
 Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 
@@ -125,7 +126,7 @@ def too_few_points(subject: Subject, found: Found) -> None:
             least = 2 * function.half_order
         if len(function.x) < least:
             fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "it has no value"
-            given = times(len(function.x), "point")
+            given = counted(len(function.x), "point")
             found(f"{subject.called_with(function)} has {given} and needs {least}: {fate}", function, tag="x")
 
 
@@ -162,8 +163,8 @@ def coefficient_count(subject: Subject, found: Found) -> None:
         wanted = comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
         if given != wanted:
             found(
-                f"{subject.called_with(polynomial)} has {times(given, 'coefficient')}; "
-                f"{times(dimension, 'variable')} to order {order} need {wanted}: OpenSim fails when it needs a value",
+                f"{subject.called_with(polynomial)} has {counted(given, 'coefficient')}; "
+                f"{counted(dimension, 'variable')} to order {order} need {wanted}: OpenSim fails when it needs a value",
                 polynomial,
                 tag="coefficients",
                 severity=ERROR,
@@ -172,8 +173,8 @@ def coefficient_count(subject: Subject, found: Found) -> None:
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
             found(
-                f"the LinearFunction of {called(holder)} has {times(given, 'coefficient')} for "
-                f"{times(names, 'coordinate')}: {wanted} belong there",
+                f"the LinearFunction of {called(holder)} has {counted(given, 'coefficient')} for "
+                f"{counted(names, 'coordinate')}: {wanted} belong there",
                 function,
                 tag="coefficients",
             )
@@ -216,7 +217,7 @@ def missing_function(subject: Subject, found: Found) -> None:
         for name in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, name)
             if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
-                given = times(len(functions.objects), "function")
+                given = counted(len(functions.objects), "function")
                 found(
                     f"{name} of {called(force)} has {given}, not three or none: OpenSim refuses to load the file",
                     functions,

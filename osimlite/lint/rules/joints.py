@@ -6,11 +6,11 @@ from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, times
+from osimlite.lint.words import called
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
-from osimlite.text import listed
+from osimlite.text import counted, listed
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)
@@ -88,7 +88,7 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
             )
         elif given != wanted and (declared or given):
             found(
-                f"{called(joint)} has {times(given, 'coordinate')}, {a_joint(joint)} has {wanted}: "
+                f"{called(joint)} has {counted(given, 'coordinate')}, {a_joint(joint)} has {wanted}: "
                 "OpenSim refuses the model",
                 joint,
                 number=subject.element_of(joint, "coordinates"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject, once
-from osimlite.lint.words import called, times
+from osimlite.lint.words import called
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import PhysicalOffsetFrame
@@ -13,7 +13,7 @@ from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, is_a
-from osimlite.text import listed
+from osimlite.text import counted, listed
 
 _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 
@@ -135,7 +135,7 @@ def missing_name(subject: Subject, found: Found) -> None:
         last = _last(tree.path_of(component) or "")
         message = f"this {type(component).tag} has no name; OpenSim calls it '{last}'"
         if wanted:
-            count = times(sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)), "reference")
+            count = counted(sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)), "reference")
             message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
         found(
             message,

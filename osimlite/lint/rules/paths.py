@@ -8,10 +8,11 @@ from itertools import pairwise
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity, times
+from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 from osimlite.schema.wrapping import WrapObject
+from osimlite.text import counted
 
 
 @rule("OSIM611", "short-path", severity=ERROR)
@@ -38,7 +39,7 @@ def short_path(subject: Subject, found: Found) -> None:
         if len(points) > 1 or owner is None:
             continue
         if path._index is not None or subject.source is None:
-            found(f"the path of {called(owner)} has {times(len(points), 'point')} and needs two", path)
+            found(f"the path of {called(owner)} has {counted(len(points), 'point')} and needs two", path)
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
             found(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
     for path in subject.named("Scholz2015GeometryPath"):
@@ -46,7 +47,7 @@ def short_path(subject: Subject, found: Found) -> None:
         count = sum(item.tag == _CABLE_POINT for item in elements)
         owner = subject.tree.parent_of(path) or path
         if count < 2:
-            found(f"the path of {called(owner)} has {times(count, 'point')} and needs two", path)
+            found(f"the path of {called(owner)} has {counted(count, 'point')} and needs two", path)
             continue
         for item, end in ((elements[0], "begins"), (elements[-1], "ends")):
             if item.tag != _CABLE_POINT:

@@ -18,7 +18,7 @@ from osimlite.lint.consequences import REFUSED
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.rules.domains import outside
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity, times
+from osimlite.lint.words import called, quantity
 from osimlite.schema.functions import (
     Constant,
     ExpressionBasedFunction,
@@ -34,6 +34,7 @@ from osimlite.schema.functions import (
     StepFunction,
 )
 from osimlite.schema.tree import is_a
+from osimlite.text import counted
 
 
 @rule("OSIM209", "contradicting-values", severity=ERROR)
@@ -174,14 +175,15 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[_Contradiction]:
         yield "coordinate_paths", f"coordinate_paths names '{name}' twice"
     arms, count = path.moment_arm_functions, len(coordinates)
     if arms and len(arms) != count:
-        yield "moment_arm_functions", f"moment_arm_functions has {len(arms)} functions for {times(count, 'coordinate')}"
+        given = f"{len(arms)} functions for {counted(count, 'coordinate')}"
+        yield "moment_arm_functions", f"moment_arm_functions has {given}"
     functions = [("length_function", path.length_function, count)]
     functions += [("moment_arm_functions", arm, count) for arm in arms]
     functions.append(("lengthening_speed_function", path.lengthening_speed_function, 2 * count))
     for tag, function, wanted in functions:
         found = _arguments(function)
         if found is not None and found != wanted:
-            yield tag, f"a function of its {tag} takes {times(found, 'argument')} instead of {wanted}"
+            yield tag, f"a function of its {tag} takes {counted(found, 'argument')} instead of {wanted}"
 
 
 def _arguments(function: Any) -> int | None:

@@ -9,8 +9,9 @@ from osimlite.lint.engine import WARNING, Found, rule
 from osimlite.lint.posture import marker_places
 from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
 from osimlite.lint.setup import Setup, members
-from osimlite.lint.words import called, times
+from osimlite.lint.words import called
 from osimlite.tables import METRES
+from osimlite.text import counted
 
 _LEAST, _MOST = 0.5, 2.0
 """Between these a factor that scales a body can be believed."""
@@ -109,7 +110,7 @@ def swapped_sides(setup: Setup, found: Found) -> None:
             if rows and wrong >= 0.8 * rows:
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
                 found(
-                    f"in {wrong} of {times(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
+                    f"in {wrong} of {counted(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
                     f"'{left}' are the other way round than other markers of both sides: are they swapped?",
                     task or user, tag=None if task else "marker_file", attribute="name" if task else None,
                 )  # fmt: skip

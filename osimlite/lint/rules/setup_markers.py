@@ -11,7 +11,8 @@ from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.scan import number_in
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
-from osimlite.lint.words import nearest_name, times
+from osimlite.lint.words import nearest_name
+from osimlite.text import counted
 
 
 def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
@@ -69,7 +70,7 @@ def marker_not_measured(setup: Setup, found: Found) -> None:
         others = sum(task.apply for task in members(user.ik_task_set, "IKCoordinateTask"))
         if 3 * len(both) + others < free:
             found(
-                f"{times(len(both), 'marker')} and {times(others, 'coordinate task')} cannot tell the {free} free "
+                f"{counted(len(both), 'marker')} and {counted(others, 'coordinate task')} cannot tell the {free} free "
                 "coordinates of the model",
                 user.ik_task_set,
             )  # fmt: skip

@@ -9,7 +9,7 @@ from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.table import Table
-from osimlite.lint.words import times
+from osimlite.text import counted
 
 
 @rule("OSIM805", "no-rows", severity=ERROR, about="table")
@@ -64,7 +64,7 @@ def ragged_row(table: Table, found: Found) -> None:
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
             fix = _without_last_tabs(table, rows.cells) if table.is_markers and fault.number > rows.cells else None
-            has = times(fault.number, "cell")
+            has = counted(fault.number, "cell")
             found(f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}", at=at, fix=fix)
         elif fault.kind == "comment":
             found(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
@@ -72,7 +72,7 @@ def ragged_row(table: Table, found: Found) -> None:
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
                 found(
-                    f"a blank line ends the table for OpenSim: {times(lost, 'row')} behind it are lost", at=at,
+                    f"a blank line ends the table for OpenSim: {counted(lost, 'row')} behind it are lost", at=at,
                     fix=_without_blank_lines(table, fault.line),
                 )  # fmt: skip
             else:
@@ -133,7 +133,7 @@ def not_a_number(table: Table, found: Found) -> None:
             fate = "OpenSim takes it for NaN"
         else:
             lost = max(0, end - fault.line)
-            fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {times(lost, 'row')}"
+            fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {counted(lost, 'row')}"
         what = f"'{fault.text}' is no number" if fault.text else "there is no number"
         found(
             f"{what} (column '{label}'): {fate}{fault.more()}",
@@ -215,7 +215,7 @@ def time_gap(table: Table, found: Found) -> None:
     if len(gaps) <= max(1, len(steps) // 50) and even + len(gaps) >= 0.95 * len(steps):
         for row in gaps[:20]:
             missing = steps[row - 1] / table.step - 1
-            lost = f": {times(round(missing), 'row')} seem to be missing" if 0.5 <= missing < 1e9 else ""
+            lost = f": {counted(round(missing), 'row')} seem to be missing" if 0.5 <= missing < 1e9 else ""
             found(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
                 at=table.time_at(rows.line_of(row)),

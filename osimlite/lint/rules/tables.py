@@ -9,9 +9,8 @@ from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.table import Table
-from osimlite.lint.words import times
 from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
-from osimlite.text import nearest
+from osimlite.text import counted, nearest
 
 _WHOLE = re.compile(r"\+?[0-9]+")
 _TO_THE_END = 1_000_000
@@ -341,6 +340,6 @@ def column_label(table: Table, found: Found) -> None:
     for name, (_, *again) in places.items():
         if again:
             fate = "refuses the file" if table.is_markers else "does not find this one by its name"
-            more = f"; there are {times(len(again) - 1, 'more column')} of this name" if again[1:] else ""
+            more = f"; there are {counted(len(again) - 1, 'more column')} of this name" if again[1:] else ""
             severity = None if table.is_markers else WARNING
             found(f"a column is called '{name}' already: OpenSim {fate}{more}", at=again[0], severity=severity)

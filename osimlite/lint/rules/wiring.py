@@ -8,13 +8,13 @@ from typing import NamedTuple
 from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called, times
+from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.outputs import outputs_of
 from osimlite.schema.tree import Use, normalised
-from osimlite.text import nearest
+from osimlite.text import counted, nearest
 
 
 @rule("OSIM331", "control-function-count", severity=ERROR)
@@ -49,8 +49,8 @@ def control_function_count(subject: Subject, found: Found) -> None:
             )
         if controller.controls_file is None and functions != actuators:
             found(
-                f"{called(controller)} has {times(functions, 'control function')} for {times(actuators, 'actuator')}: "
-                "OpenSim refuses the model",
+                f"{called(controller)} has {counted(functions, 'control function')} for "
+                f"{counted(actuators, 'actuator')}: OpenSim refuses the model",
                 controller.ControlFunctions if functions else controller,
             )
 

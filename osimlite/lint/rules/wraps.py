@@ -7,10 +7,11 @@ import math
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.placement import Pose, Vector, fixed, on_base
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, times
+from osimlite.lint.words import called
 from osimlite.schema.base import Component
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
+from osimlite.text import counted
 
 
 def _wraps(path: GeometryPath) -> list[PathWrap]:
@@ -84,7 +85,7 @@ def wrap_range(subject: Subject, found: Found) -> None:
             if end > count:
                 fate = "OpenSim fails when it computes its length"
                 found(
-                    f"{tells} ends beyond the {times(count, 'point')} of the path: {fate}",
+                    f"{tells} ends beyond the {counted(count, 'point')} of the path: {fate}",
                     wrap,
                     tag="range",
                     severity=ERROR,
