@@ -137,3 +137,24 @@ def test_mixed_encodings_are_left_alone():
     source = Source(data)
     with pytest.raises(OsimliteError, match="mixes encodings"):
         mended(source, validate(source))
+
+
+@pytest.mark.parametrize(("named", "meant"), [("Pelviz", "Pelvis"), ("Pelvis Pelviz", None)])
+def test_nothing_is_proposed_that_a_list_has_already(named, meant):
+    group = f'<groups><ObjectGroup name="half"><members>{named}</members></ObjectGroup></groups></BodySet>'
+    text = WALKER.read_text()
+    before, _, after = text.partition("</BodySet>")
+    source = Source((before.replace("<groups />", "") + group + after).encode())
+    (finding,) = validate(source, select="OSIM301").findings
+    assert finding.suggestion == meant
+
+
+def test_a_name_that_a_property_had_in_early_releases_is_known():
+    element = "<enable_controller>false</enable_controller>"
+    text = f"""<OpenSimDocument Version="20302"><AnalyzeTool name="a"><ControllerSet><objects>
+        <ControlSetController name="c">{element}</ControlSetController>
+        </objects></ControllerSet></AnalyzeTool></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode(), "a.xml"), select="OSIM101").findings
+    assert (finding.severity, finding.suggestion) == ("error", "enabled")
+    (finding,) = validate(Source(text.replace("false", "true").encode(), "a.xml"), select="OSIM101").findings
+    assert finding.severity == "warning"

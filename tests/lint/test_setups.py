@@ -63,6 +63,24 @@ def test_what_was_found_in_a_setup_is_found_again_when_its_model_changes(project
     assert dict(check_files(["ik.xml"], Config()).codes) == {"OSIM831": 1, "OSIM841": 1}
 
 
+@pytest.mark.parametrize(("names", "meant"), [(["hip_moter"], "hip_motor"), (["hip_motor", "hip_moter"], None)])
+def test_no_control_is_to_be_called_what_another_is(project, names, meant):
+    node = "<x_nodes><ControlLinearNode><t>0</t><value>1</value></ControlLinearNode></x_nodes>"
+    controls = "".join(f'<ControlLinear name="{name}">{node}</ControlLinear>' for name in names)
+    motor = '<CoordinateActuator name="hip_motor"><coordinate>hip_flexion</coordinate></CoordinateActuator>'
+    tool = """<model_file>leg.osim</model_file><force_set_files>motors.xml</force_set_files><ControllerSet><objects>
+        <ControlSetController name="c"><controls_file>controls.xml</controls_file></ControlSetController>
+        </objects></ControllerSet>"""
+    for file, text in {
+        "controls.xml": f'<ControlSet name="c"><objects>{controls}</objects></ControlSet>',
+        "motors.xml": f'<ForceSet name="f"><objects>{motor}</objects></ForceSet>',
+        "run.xml": f'<ForwardTool name="run">{tool}</ForwardTool>',
+    }.items():
+        (project / file).write_text(f'<OpenSimDocument Version="40600">{text}</OpenSimDocument>')
+    (finding,) = check_files(["run.xml", "controls.xml"], Config(select=("OSIM831",))).findings
+    assert finding.suggestion == meant
+
+
 def test_what_another_setup_writes_need_not_be_there(project):
     later = (project / "ik.xml").read_text().replace("leg.osim", "placed.osim").replace('name="ik"', 'name="again"')
     (project / "later.xml").write_text(later)

@@ -253,7 +253,10 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     if lowered:
         return Broken(use, text, "case", None, lowered[0])
     hint = "illegal" if resolution.failure == "illegal" else ""
-    return Broken(use, text, "missing", None, nearest_name(text, right), hint)
+    # Nothing is meant twice in one list.
+    named = getattr(use.holder, use.spec.name)
+    free = right if isinstance(named, str) else sorted(set(right).difference(named or ()))
+    return Broken(use, text, "missing", None, nearest_name(text, free), hint)
 
 
 def _right_words(subject: Subject, use: Use) -> list[str]:

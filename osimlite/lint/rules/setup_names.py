@@ -88,7 +88,10 @@ def unknown_name(setup: Setup, found: Found) -> None:
         is_lost = kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
         fate, severity = _FATES["left out" if is_lost else kind.fate]
         more = "; it is written in small letters" if text.lower() in kind.words else ""
-        where: Any = {"attribute": "name"} if use.spec.tag == "@name" else {"tag": use.spec.tag, "word": text}
+        where: Any = {"tag": use.spec.tag, "word": text}
+        if use.spec.tag == "@name":
+            where = {"attribute": "name"}
+            names = names.difference(other.name for other in setup.by_class[type(item)])
         found(
             f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}", item, **where,
             severity=severity, suggestion=text.lower() if more else nearest_name(text, sorted(names)),
@@ -128,11 +131,13 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Found)
     follows = hasattr(tool, "desired_kinematics_file")
     fate, severity = _FATES["left out" if follows else "refused"]
     actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
-    for control in setup.named("Control"):
+    controls = list(setup.named("Control"))
+    free = sorted(actuators.difference(control.name for control in controls))
+    for control in controls:
         if control.name not in actuators:
             found(
                 f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
-                severity=severity, suggestion=nearest_name(control.name, sorted(actuators)),
+                severity=severity, suggestion=nearest_name(control.name, free),
             )  # fmt: skip
         elif not follows and getattr(control, "x_nodes", None) == []:
             found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")

@@ -47,7 +47,7 @@ def unknown_tag(subject: Subject, found: Found) -> None:
         if old is not None:
             _report_old(subject, found, note, owner, old)
             continue
-        suggestion = nearest(note.word, specs, cutoff=70)
+        suggestion = nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
         message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
         if suggestion is not None:
             kept = _default_of(specs[suggestion])
@@ -188,6 +188,8 @@ def element_in_value(subject: Subject, found: Found) -> None:
 
 
 _OFF = re.compile(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
+_FORMER = {"enable_controller": "enabled"}
+"""Names that properties had in early releases; OpenSim brings them up to date in no file."""
 _CDATA = re.compile(r">([^<>]*)<!\[CDATA\[.*?\]\]>([^<]*)(?=<)", re.DOTALL)
 
 
