@@ -181,3 +181,16 @@ def test_an_unknown_integrator_is_refused(walker):
             simulation.run(0.1, integrator="bfd")
         with pytest.raises(SettingError, match="no integrator 'bfd'"):
             run_many(simulation.engine, [simulation.initial_state({}, {})], 0.1, integrator="bfd")
+
+
+@pytest.mark.parametrize(("method", "accuracy"), [("adams", 1e-3), ("bdf", 1e-2)])
+def test_derivatives_that_became_too_large_end_no_iteration(method, accuracy):
+    model = hung(muscle("thelen_default"))
+    # The fiber pulls with e^40 of its force, and with less after each step: by as much derivatives become too large.
+    model.find("/forceset/mu").default_fiber_length = 0.16
+    with Simulation(model, "compiled") as simulation:
+        found, exact = (
+            simulation.run(0.1, accuracy=least, integrator=by).auxiliary["/forceset/mu/fiber_length"][-1]
+            for least, by in ((accuracy, method), (1e-7, "rosenbrock"))
+        )
+    assert found == pytest.approx(exact, abs=accuracy)

@@ -30,9 +30,9 @@ from osimlite.simulation.kernels.method import (
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.states import is_finite
 
-ORDER, STEP, EQUAL, CONDENSED, AGE, RATE, REFUSED, MATRICES = range(MEMORY, MEMORY + 8)
+ORDER, STEP, EQUAL, CONDENSED, AGE, REFUSED, MATRICES = range(MEMORY, MEMORY + 7)
 """Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none; for how many steps
-their derivatives have served; how fast iterations converge; how many steps were refused in turn; place of three
+their derivatives have served; how many steps were refused in turn; place of three
 matrices (8, 8) that change the step, and of a column."""
 WIDTH = 8
 HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
@@ -59,10 +59,9 @@ ERROR_CONSTANT = (
 """Constants of both methods: by difference its weight in the prediction, and in psi; by order h / c, the newest
 difference by d, and the error by the newest difference."""
 
-ITERATIONS, CONVERGED = 4, 0.05
-"""Newton's steps at most; what the error of an iteration may be, of that of a step."""
-SLOW = 0.1
-"""How fast iterations are counted on to converge, at most."""
+ITERATIONS, CONVERGED, SOLVED = 4, 0.05, 1e-3
+"""Newton's steps at most; what the error of an iteration may be, of that of a step; how far off equations may be that
+need no second one."""
 RENEWED = 20
 """After so many steps the derivatives are computed anew."""
 SAFETY, SHRINK, GROW, WORTH = 0.8, 0.2, 8.0, 1.2
@@ -103,7 +102,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
             w[TIME] = t1
             is_new = linearise(s, x, w, y1, at(y1, size), room) == OK
-            h[AGE], h[CONDENSED], h[RATE] = 1.0 if is_new else 0.0, 0.0, 1.0
+            h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
         if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(s, c, room)):
             h[CONDENSED] = c
             iterations = newton(s, x, w, t1, c, y0, y1, d, psi, errors, room, h)
@@ -183,7 +182,7 @@ def newton(
 
     None if they do not converge.
     """
-    size, f1, before = s[STATE_SIZE], at(y1, s[STATE_SIZE]), 0.0
+    size, f1, rest, before = s[STATE_SIZE], at(y1, s[STATE_SIZE]), 0.0, 0.0
     for k in range(size):
         d[k] = 0.0
     for iteration in range(ITERATIONS):
@@ -193,18 +192,22 @@ def newton(
             return 0
         for k in range(size):
             step[k] = c * f1[k] - psi[k] - d[k]
+        residual = error_norm(s, y0, step, h, 1)
         correct(s, c, room, step)
         length = error_norm(s, y0, step, h, 1)
-        if iteration > 0:
-            h[RATE] = max(0.3 * h[RATE], length / before, SLOW)
-            if length > 2.0 * before:
-                return 0
         for k in range(size):
             y1[k] += step[k]
             d[k] += step[k]
-        if min(1.0, h[RATE]) * length <= CONVERGED * h[ACCEPTED]:
+        if residual <= SOLVED * h[ACCEPTED]:
             return iteration + 1
-        before = length
+        # Where derivatives have become far too large, all steps are short: only what they leave tells.
+        if iteration > 0:
+            if not (residual < rest and length < before):
+                return 0
+            rate = max(residual / rest, length / before)
+            if rate / (1.0 - rate) * length <= CONVERGED * h[ACCEPTED]:
+                return iteration + 1
+        rest, before = residual, length
     return 0
 
 
