@@ -191,7 +191,7 @@ def _show_places(model: Path | None) -> None:
     where = settings.file or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
     say(f"settings: {where}")
     say("mesh folders, in the order of the search:")
-    for place in MeshFolders(folder, [Path(path) for path in settings.mesh_paths]).searched:
+    for place in MeshFolders(folder, settings.mesh_paths).searched:
         say(f"  {place}: {_meshes(place)}")
     if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
         say(

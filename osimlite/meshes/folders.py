@@ -24,7 +24,7 @@ class MeshFolders:
     """
 
     beside: Path | None = None
-    named: Sequence[Path] = ()
+    named: Sequence[str | Path] = ()
 
     @property
     def searched(self) -> tuple[Path, ...]:
@@ -34,7 +34,7 @@ class MeshFolders:
 
     @property
     def _trusted_elsewhere(self) -> tuple[Path, ...]:
-        return (*self.named, *named_mesh_folders())
+        return (*map(Path, self.named), *named_mesh_folders())
 
     def find(self, name: str) -> Path | None:
         """The first file of this name; failing that, one spelled with other capitals or slashes; None without any.

@@ -117,7 +117,7 @@ def to_urdf(
             raise OsimliteError(f"a limit of {what} is a positive number, not {limit:g}; leave it out for no limit")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
-    places = MeshFolders(None if folder is None else Path(folder), [Path(place) for place in geometry])
+    places = MeshFolders(None if folder is None else Path(folder), geometry)
     mesh_files = MeshFiles(places)
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files=mesh_files) if visuals else Visuals()
     touching = collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}

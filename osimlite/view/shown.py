@@ -59,7 +59,7 @@ class Shown:
         cls,
         model: Model,
         mechanism: Mechanism | None = None,
-        folders: Sequence[Path] = (),
+        folders: Sequence[str | Path] = (),
         *,
         file: Path | None = None,
         motion: Motion | Path | None = None,

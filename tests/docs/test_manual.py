@@ -2,7 +2,8 @@
 
 Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are read. A comment
 ``<!-- prepared: commands -->`` makes what a page takes for granted, ``<!-- not run: reason -->`` before a block says
-why it cannot be run here.
+why it cannot be run here. After ``<!-- tried: what -->`` come tables: the commands and expressions in all but their
+first columns are run after the blocks.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -18,6 +20,8 @@ from typing import NamedTuple
 
 import pytest
 from lxml import etree
+
+from osimlite.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 # What makes the pictures of the gallery is run when the site is built.
@@ -29,6 +33,7 @@ _BLOCK = re.compile(
     r"(?:<!-- not run: (?P<why>[^>]+) -->\s*)?^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)",
     re.M | re.S,
 )
+_TRIED = re.compile(r"<!-- tried: [^>]+ -->\n((?:^\|.*\n|\n(?=\|))+)", re.M)
 _PREPARED = re.compile(r"<!-- prepared: (.*?) -->", re.S)
 
 
@@ -78,6 +83,24 @@ def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monk
             run(block.code, place, shell)
         else:
             read(block, place)
+    for words in dict.fromkeys(tried(text)):
+        try_(words, names)
+
+
+def tried(text: str) -> list[str]:
+    """What stands as code in all but the first columns of the tables that say so."""
+    rows = [row.split("|")[2:] for table in _TRIED.findall(text) for row in table.splitlines() if row]
+    return [words for cells in rows for words in re.findall(r"`([^`]+)`", "|".join(cells))]
+
+
+def try_(words: str, names: dict[str, object]) -> None:
+    """Run a command, in this process, or evaluate a call; what else stands as code is a name."""
+    if words.startswith("osimlite "):
+        with pytest.raises(SystemExit) as ended:
+            main(shlex.split(words)[1:])
+        assert ended.value.code in (0, None), words
+    elif "(" in words:
+        eval(compile(words, words, "eval"), names)
 
 
 def run(commands: str, place: str, shell: dict[str, str]) -> None:

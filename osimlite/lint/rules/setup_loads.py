@@ -16,7 +16,8 @@ from osimlite.text import listed
 _TIMES = 16
 """How many times of a motion are looked at."""
 _NEAR = 0.4
-"""How far from the origin of its body, m, a measured force may act. Of 24 public gaits none is farther than 0.29."""
+"""How far from the origin of its body, m, a measured force may act. In the projects of
+docs/public-projects.md that measure gaits none is farther than 0.275."""
 
 
 @rule("OSIM843", "load-columns", severity=ERROR, mends="both", about="document")

@@ -140,7 +140,7 @@ def to_mjcf(
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
     place = None if folder is None else Path(folder)
-    mesh_files = MeshFiles(MeshFolders(place, [Path(each) for each in geometry]))
+    mesh_files = MeshFiles(MeshFolders(place, geometry))
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
     robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
     draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact, fit, spline, driver), place, mesh_files)
