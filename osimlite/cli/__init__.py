@@ -16,27 +16,9 @@ if TYPE_CHECKING:
     from osimlite.errors import OsimliteError
 
 COMMANDS = (
-    "build",
-    "validate",
-    "rule",
-    "format",
-    "upgrade",
-    "diff",
-    "info",
-    "translate",
-    "view",
-    "simulate",
-    "sweep",
-    "optimize",
-    "gait",
-    "find-gait",
-    "muscles",
-    "kinematics",
-    "inverse-dynamics",
-    "lsp",
-    "doctor",
-    "demo",
-)
+    "build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "view", "simulate", "sweep",
+    "optimize", "gait", "find-gait", "muscles", "kinematics", "inverse-dynamics", "lsp", "doctor", "demo",
+)  # fmt: skip
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
 
 

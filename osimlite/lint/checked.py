@@ -26,10 +26,12 @@ class Where(TypedDict, total=False):
 
 
 class Checked:
-    """Something under check. `about` says which rules speak of it (:attr:`Rule.about`)."""
+    """Something under check, its file and its bytes. `about` says which rules speak of it (:attr:`Rule.about`)."""
 
     about: ClassVar[str] = "model"
     source: Source | None = None
+    file: str | None = None
+    data: bytes = b""
     version: int | None = None
     upgraded = False
     sure_until: int | None = None
@@ -38,19 +40,9 @@ class Checked:
         self.config = config or Config()
 
     @property
-    def file(self) -> str | None:
-        """The file that is checked."""
-        return self.source.file if self.source is not None else None
-
-    @property
     def text(self) -> str:
         """Its text, for those who show lines of it."""
-        return self.source.text if self.source is not None else ""
-
-    @property
-    def data(self) -> bytes:
-        """Its bytes."""
-        return self.source.data if self.source is not None else b""
+        return self.source.text if self.source is not None else self.data.decode("utf-8", "replace")
 
     def is_for(self, rule: Rule) -> bool:
         """Whether a rule has anything to look at."""

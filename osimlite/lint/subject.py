@@ -64,6 +64,7 @@ class Subject(Checked):
             self.model = self.top = found
         else:
             self.source = found.source
+            self.file, self.data = found.source.file, found.source.data
             self.faults = found.faults
             self.sure_until = found.sure_until
             self.top = found.document.top if found.document else None

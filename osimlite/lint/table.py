@@ -31,27 +31,12 @@ class Table(Checked):
     """
 
     about: ClassVar[str] = "table"
+    file: str
 
     def __init__(self, data: bytes, file: str, config: Config | None = None) -> None:
         super().__init__(config)
-        self._data = data
-        self._file = file
+        self.data, self.file = data, file
         self.is_markers = file.lower().endswith(".trc")
-
-    @property
-    def data(self) -> bytes:
-        """Its bytes."""
-        return self._data
-
-    @property
-    def file(self) -> str:
-        """The file that is checked."""
-        return self._file
-
-    @property
-    def text(self) -> str:
-        """Its text, for those who show lines of it."""
-        return self.data.decode("utf-8", "replace")
 
     @cached_property
     def header(self) -> StorageHeader | MarkerHeader:

@@ -37,25 +37,10 @@ CALLED: dict[Any, str] = {
 """Functions that have another name; the others of `math` have theirs in `Math`."""
 MODULO = "const modulo = (a, b) => { const r = a % b; return r !== 0 && (r < 0) !== (b < 0) ? r + b : r; };"
 """The remainder, which in Python has the sign of the divisor."""
-RESERVED = frozenset(
-    (
-        "case",
-        "catch",
-        "const",
-        "default",
-        "delete",
-        "do",
-        "function",
-        "let",
-        "new",
-        "switch",
-        "this",
-        "throw",
-        "typeof",
-        "var",
-        "void",
-    )
-)
+RESERVED = frozenset((
+    "case", "catch", "const", "default", "delete", "do", "function", "let", "new", "switch", "this", "throw", "typeof",
+    "var", "void",
+))  # fmt: skip
 """Names that a kernel may have and JavaScript not."""
 
 

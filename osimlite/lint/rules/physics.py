@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import INFO, WARNING, Found, rule
@@ -11,6 +12,7 @@ from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyContactParameters, HuntCrossleyForce
 from osimlite.schema.joints import Joint
+from osimlite.schema.states import motions_of
 from osimlite.schema.tree import Use
 
 GRAVITY = Threshold("largest-gravity", 30.0, "m/s^2", "no planet that people walk on has more")
@@ -119,12 +121,8 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
       </CoordinateLimitForce>
     ```
     """
-    for force in subject.each(CoordinateLimitForce):
-        coordinate, motion = _limited(subject, force)
-        if coordinate is None or motion is None or "range" not in coordinate.model_fields_set:
-            continue
-        scale, unit = (180 / math.pi, "deg") if motion == "rotational" else (1.0, "m")
-        low, high = sorted(bound * scale for bound in coordinate.range)
+    for force, coordinate, scale, low, high in _limited(subject):
+        unit = "m" if scale == 1.0 else "deg"
         slack = abs(force.transition) + subject.config.value_of(BEYOND) * (high - low) + 1e-6
         for tag, limit, outside in (
             ("upper_limit", force.upper_limit, force.upper_limit > high + slack),
@@ -156,12 +154,8 @@ def limit_inside_range(subject: Subject, found: Found) -> None:
       </CoordinateLimitForce>
     ```
     """
-    for force in subject.each(CoordinateLimitForce):
-        coordinate, motion = _limited(subject, force)
-        if coordinate is None or motion is None or "range" not in coordinate.model_fields_set:
-            continue
-        scale, unit = (180 / math.pi, "deg") if motion == "rotational" else (1.0, "m")
-        low, high = sorted(bound * scale for bound in coordinate.range)
+    for force, coordinate, scale, low, high in _limited(subject):
+        unit = "m" if scale == 1.0 else "deg"
         slack = max(abs(force.transition), subject.config.value_of(INSIDE) * (high - low)) + 1e-6
         start = coordinate.default_value * scale
         for tag, limit, inside, beyond in (
@@ -171,13 +165,13 @@ def limit_inside_range(subject: Subject, found: Found) -> None:
             acts = beyond > abs(force.transition)
             # A range of many turns stands for none, or is in degrees; so does a limit that is not given.
             widest = math.degrees(subject.config.value_of(UNLIMITED))
-            given = tag in force.model_fields_set and (motion != "rotational" or high - low < widest)
+            given = tag in force.model_fields_set and (unit == "m" or high - low < widest)
             if inside and given and force.lower_limit <= force.upper_limit:
                 meant = math.degrees(limit)
                 # Both limits are as small as angles in radians are, and one is a bound of the range then.
                 small = max(abs(force.lower_limit), abs(force.upper_limit)) <= 2 * math.pi
                 near = min(abs(meant - low), abs(meant - high)) <= 0.1 * (high - low)
-                radians = motion == "rotational" and small and near
+                radians = unit == "deg" and small and near
                 found(
                     f"{tag} of {called(force)} is {quantity(limit, unit)}, inside the range of '{coordinate.name}' "
                     f"({quantity(low)} to {quantity(high, unit)})"
@@ -197,14 +191,19 @@ def _drives(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
     return 2 * material.static_friction + viscous < material.dynamic_friction
 
 
-def _limited(subject: Subject, force: CoordinateLimitForce) -> tuple[Coordinate | None, str | None]:
-    """The coordinate a limit force acts on, and the motion it stands for (None if the joint's functions decide)."""
+def _limited(subject: Subject) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
+    """Limit forces with their coordinates, in how many of the forces' units 1 rad or 1 m is, and the range in these.
+
+    A coordinate without a range is left out, and one of which the functions of its joint decide what it means.
+    """
     spec = CoordinateLimitForce.field_specs()["coordinate"]
-    coordinate = subject.tree.resolve(Use(force, force, spec, force.coordinate)).target
-    if not isinstance(coordinate, Coordinate):
-        return None, None
-    joint = subject.tree.parent_of(coordinate)
-    if not isinstance(joint, Joint) or joint.motion_types is None:
-        return coordinate, None
-    place = joint.coordinates.index(coordinate)
-    return coordinate, joint.motion_types[place] if place < len(joint.motion_types) else None
+    for force in subject.each(CoordinateLimitForce):
+        coordinate = subject.tree.resolve(Use(force, force, spec, force.coordinate)).target
+        if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
+            continue
+        joint = subject.tree.parent_of(coordinate)
+        motion = motions_of(joint).get(coordinate.name) if isinstance(joint, Joint) and joint.motion_types else None
+        if motion is not None:
+            scale = 180 / math.pi if motion == "rotational" else 1.0
+            low, high = sorted(bound * scale for bound in coordinate.range)
+            yield force, coordinate, scale, low, high
