@@ -6,7 +6,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,8 +14,6 @@ from osimlite.text import counted
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
-    from osimlite.schema.custom_joint import CustomJoint
-    from osimlite.schema.joints import Joint
     from osimlite.schema.model import Model
 
 
@@ -163,13 +161,15 @@ def _listed(title: str, items: Sequence[str], everything: bool) -> None:
 def _coordinates(model: Model) -> Iterator[str]:
     """A line for each joint and one for each coordinate below it, with units."""
     from osimlite.schema.joints import Joint
+    from osimlite.schema.states import motions_of
 
     joints = [joint for joint in model.components(Joint) if joint.coordinates]
     width = max(len(coordinate.name) for joint in joints for coordinate in joint.coordinates)
     for joint in joints:
         yield f"  {joint.name} ({type(joint).__name__})"
-        for place, coordinate in enumerate(joint.coordinates):
-            unit = _unit(joint, place)
+        motions = motions_of(joint)
+        for coordinate in joint.coordinates:
+            unit = {"rotational": "rad", "translational": "m"}.get(motions.get(coordinate.name, ""), "")
             low, high = coordinate.range
             flags = [word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)]
             numbers = f"{coordinate.default_value:>9.4g} {unit:3}  {low:.4g} to {high:.4g} {unit}".rstrip()
@@ -216,22 +216,3 @@ def _simulation(model: Model, folder: Path) -> str:
     if forces.skipped:
         return f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
     return "possible, with all that moves and pushes"
-
-
-def _unit(joint: Joint, place: int) -> str:
-    """The unit of a coordinate, "" if the functions of the joint decide what it means."""
-    from osimlite.lint.axes import axes_of
-    from osimlite.schema.tree import is_a
-
-    if joint.motion_types is not None:
-        kind = joint.motion_types[place] if place < len(joint.motion_types) else ""
-        return {"rotational": "rad", "translational": "m"}.get(kind, "")
-    if not is_a(joint, "CustomJoint"):
-        return ""
-    name = joint.coordinates[place].name
-    uses = [
-        number
-        for number, axis in enumerate(axes_of(cast("CustomJoint", joint)))
-        if name in [word if isinstance(word, str) else word.name for word in axis.coordinates]
-    ]
-    return "rad" if uses and uses[0] < 3 else "m" if uses else ""

@@ -22,7 +22,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
     document = read_document(Source.of_file(path), of=cls)
     bad = next((note for note in document.notes if note.kind == "unknown-tag"), None)
     if bad is not None:
-        line, column, _ = document.source.of_tag(bad.number)
-        raise DocumentError(f"<{bad.word}> means nothing in this document", file=str(path), line=line, column=column)
+        place = document.source.of_tag(bad.number)
+        raise document.source.fault(DocumentError, f"<{bad.word}> means nothing in this document", place)
     assert isinstance(document.top, cls)
     return document.top

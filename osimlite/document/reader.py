@@ -199,10 +199,7 @@ def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
     try:
         return upgrade(root, version)
     except Refused as refused:
-        line, column, _ = source.of_tag(refused.number)
-        fault = VersionError(refused.message, file=source.file, line=line, column=column)
-        fault.version = version
-        raise fault from None
+        raise _unreadable(source, version, refused.message, refused.number) from None
 
 
 def _renumber(source: Source, top: Object, notes: list[Note], upgraded: Upgraded) -> list[Note]:
@@ -224,14 +221,18 @@ def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
     if version >= OLDEST_KNOWN or not left:
         return
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in left})[:8])
-    line, column, _ = source.of_tag(left[0].number)
-    fault = VersionError(
+    message = (
         f"document version {version} is older than {OLDEST_KNOWN}, and no rule says what becomes of {tags}: that would "
-        "be lost; take it out, or open and save the model with OpenSim 2",
-        file=source.file, line=line, column=column,
-    )  # fmt: skip
+        "be lost; take it out, or open and save the model with OpenSim 2"
+    )
+    raise _unreadable(source, version, message, left[0].number)
+
+
+def _unreadable(source: Source, version: int, message: str, number: int = 0) -> VersionError:
+    """The error that an element of a document of a version cannot be read."""
+    fault = source.fault(VersionError, message, source.of_tag(number))
     fault.version = version
-    raise fault
+    return fault
 
 
 def parse(source: Source, *, recover: bool = False) -> etree._Element:
@@ -308,24 +309,19 @@ def version_of(source: Source, root: etree._Element) -> int:
         if _class_of(root) is not None or root.tag in RENAMED:
             return OLDEST
     # Places cost a pass over the text, so they are computed for errors only.
-    line, column, _ = source.of_tag(0)
+    place = source.of_tag(0)
     if root.tag != "OpenSimDocument":
-        raise DocumentError(
-            f"the root element is <{as_written(root.tag)}>, not <OpenSimDocument>: this is no OpenSim document",
-            file=source.file, line=line, column=column,
-        )  # fmt: skip
+        tag = as_written(root.tag)
+        message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
+        raise source.fault(DocumentError, message, place)
     if number is None:
         found = "has no Version" if text is None else f'has Version="{text[:40]}", which is not a whole number'
-        raise VersionError(
-            f'<OpenSimDocument> {found}; write Version="{CURRENT_VERSION}"', file=source.file, line=line, column=column
-        )
-    fault = VersionError(
+        raise source.fault(VersionError, f'<OpenSimDocument> {found}; write Version="{CURRENT_VERSION}"', place)
+    message = (
         f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST}); "
-        f'write Version="{CURRENT_VERSION}" if the model is in the current format',
-        file=source.file, line=line, column=column,
-    )  # fmt: skip
-    fault.version = number
-    raise fault
+        f'write Version="{CURRENT_VERSION}" if the model is in the current format'
+    )
+    raise _unreadable(source, number, message)
 
 
 def _first(root: etree._Element) -> etree._Element | None:
@@ -349,8 +345,7 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
             what = f"a <{tag}>, which is no class of OpenSim 4.6{did_you_mean(tag, tags())}"
         else:
             what = f"a <{as_written(first.tag)}>, not a <{of.tag}>"
-        line, column, _ = source.of_tag(0 if first is None else 1)
-        raise DocumentError(f"the document holds {what}", file=source.file, line=line, column=column)
+        raise source.fault(DocumentError, f"the document holds {what}", source.of_tag(0 if first is None else 1))
     reader.count = 1
     top = reader.top(first, cls)
     for second in first.itersiblings(etree.Element):

@@ -67,17 +67,12 @@ def read_repaired(
     """
     mark = _MARK.search(source.text)
     if mark is not None:
-        line, column, _ = source.position(mark.start())
-        raise NotWellFormedError(
-            f"an unfinished merge: '{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out",
-            file=source.file, line=line, column=column,
-        )  # fmt: skip
+        said = f"'{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out"
+        raise source.fault(NotWellFormedError, f"an unfinished merge: {said}", source.position(mark.start()))
     unended = _unended(source.text)
     if unended is not None:
-        line, column, _ = source.position(unended)
-        raise NotWellFormedError(
-            "not well-formed XML: what begins here with '<!' has no end", file=source.file, line=line, column=column
-        )
+        message = "not well-formed XML: what begins here with '<!' has no end"
+        raise source.fault(NotWellFormedError, message, source.position(unended))
     expect_plain_doctype(source)
     text, repairs = repaired(source.text)
     if not repairs or not source.spans:

@@ -9,11 +9,14 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from osimlite.document.names import ATTRIBUTE
 from osimlite.document.spans import PlainSpans, Span, spans_of
+from osimlite.errors import OsimliteError
 from osimlite.files import read_file
+
+Fault = TypeVar("Fault", bound=OsimliteError)
 
 _BLOCK = 4096
 """Characters between the places whose line is known at once."""
@@ -183,6 +186,10 @@ class Source:
         block = min(offset // _BLOCK, len(before) - 1)
         line = before[block] + self.text.count("\n", block * _BLOCK, offset)
         return Position(line + 1, offset - self.text.rfind("\n", 0, offset), length)
+
+    def fault(self, kind: type[Fault], message: str, place: Position) -> Fault:
+        """An error about a place in the text."""
+        return kind(message, file=self.file, line=place.line, column=place.column)
 
     def of_tag(self, number: int) -> Position:
         """Where the start tag of element `number` is: the ``<`` and the name.

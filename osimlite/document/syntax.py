@@ -41,11 +41,8 @@ def expect_plain_doctype(source: Source) -> None:
     """
     start = next((piece.start for piece in markup(source.text) if piece.kind == "doctype"), None)
     if start is not None and _PLAIN_DOCTYPE.match(source.text, start) is None:
-        line, column, _ = source.position(start)
-        raise NotWellFormedError(
-            "OpenSim takes the first '>' in a DOCTYPE for its end and cannot load the file; remove the DOCTYPE",
-            file=source.file, line=line, column=column,
-        )  # fmt: skip
+        message = "OpenSim takes the first '>' in a DOCTYPE for its end and cannot load the file; remove the DOCTYPE"
+        raise source.fault(NotWellFormedError, message, source.position(start))
 
 
 def plain_words(message: str) -> str:
