@@ -21,6 +21,7 @@ from typing import NamedTuple
 import pytest
 from lxml import etree
 
+import osimlite
 from osimlite.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -130,3 +131,11 @@ def read(block: Block, place: str) -> None:
 def test_a_block_that_is_not_run_is_found() -> None:
     found = blocks("a\n\n<!-- not run: it takes an hour -->\n```sh\nsleep 3600\n```\n\n```python\nx = 1\n```\n")
     assert found == [Block("sh", "sleep 3600\n", 5, "it takes an hour"), Block("python", "x = 1\n", 9, None)]
+
+
+def test_the_reference_tells_of_all_that_the_package_exports() -> None:
+    pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
+    told = (ROOT / "docs" / "reference" / "library.md").read_text()
+    for exported in (getattr(osimlite, name) for name in osimlite._FUNCTIONS):
+        name = f"{exported.__module__}.{exported.__name__}"
+        assert f"::: {name}\n" in told or f"::: {exported.__module__}\n" in told, name
