@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -93,10 +94,11 @@ def read(file: str) -> dict[str, Any]:
 
 
 def read_apart(file: str) -> dict[str, Any]:
-    """The same from a process of its own, which may crash; then what it said last."""
-    command = [sys.executable, __file__, "--read", os.path.abspath(file)]
-    folder = os.path.dirname(os.path.abspath(file))
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=SECONDS, cwd=folder)
+    """The same from a process of its own, which may crash, and from a copy of the folder, into which OpenSim writes."""
+    with TemporaryDirectory() as folder:
+        copy = shutil.copytree(Path(file).parent, Path(folder) / "copy") / Path(file).name
+        command = [sys.executable, __file__, "--read", str(copy)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=SECONDS, cwd=copy.parent)
     if done.returncode:
         return {"print": f"refused: {' '.join(done.stderr.strip().splitlines()[-2:])}"}
     return json.loads(done.stdout)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -45,4 +46,5 @@ def without_baseline(path: str | Path, report: Report) -> Report:
 
 def _key(finding: Finding) -> tuple[str, str, str, str]:
     file = Path(finding.file).as_posix() if finding.file is not None else ""
-    return finding.code, file, finding.component, finding.message
+    # Where the project lies on this machine is not what another is to know it by.
+    return finding.code, file, finding.component, finding.message.replace(os.path.join(os.getcwd(), ""), "")

@@ -137,6 +137,21 @@ def test_a_baseline_hides_what_it_knows_and_no_more(tmp_path):
     assert json.loads(path.read_text())["format"] == 1
 
 
+def test_a_baseline_holds_wherever_the_project_lies(tmp_path, monkeypatch):
+    mesh = "<Mesh><mesh_file>a.vtp</mesh_file></Mesh>"
+    model = TEXT.replace("<foo/>", f"<Ground><attached_geometry>{mesh}</attached_geometry></Ground>")
+    for place in ("here", "there"):
+        (tmp_path / place).mkdir()
+        monkeypatch.chdir(tmp_path / place)
+        geometry = str(tmp_path / place / "Geometry")
+        Path("m.osim").write_text(model)
+        report = validate("m.osim", config=Config(("OSIM701",), mesh_paths=(geometry,)))
+        assert geometry in report.findings[0].message
+        if place == "here":
+            write_baseline(tmp_path / "baseline.json", report)
+    assert not without_baseline(tmp_path / "baseline.json", report).findings
+
+
 def test_a_file_that_is_no_baseline_is_refused(tmp_path):
     with pytest.raises(OsimliteError, match=r"absent.json: cannot read the file: no such file"):
         without_baseline(tmp_path / "absent.json", validate(Source(TEXT.encode())))
