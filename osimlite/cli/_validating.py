@@ -105,13 +105,11 @@ def _source(path: str) -> Source:
 
 def _check(source: Source, given: Config) -> Report:
     """Check one file by the settings of its folder and of the command line."""
-    from osimlite.document.reader import collector_paused
     from osimlite.lint.engine import run, subject_in
 
     assert source.file is not None
-    with collector_paused():
-        # No rule that is about measures mends anything.
-        return run(subject_in(source, settings_of(source.file).config_for(source.file, given)), measure=False)
+    # No rule that is about measures mends anything.
+    return run(subject_in(source, settings_of(source.file).config_for(source.file, given)), measure=False)
 
 
 def _fail_on_of(files: list[str]) -> Severity:

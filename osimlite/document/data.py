@@ -24,7 +24,7 @@ from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
 from osimlite.schema.layout import Remark
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for, tags
+from osimlite.schema.registry import class_for, tags, tags_of
 from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import did_you_mean
 
@@ -199,7 +199,9 @@ class _Reader:
         tag = data.get("class")
         if tag is None:
             if accepts.abstract:
-                raise ModelError(f"{where}: say the class of this {accepts.tag}, such as 'class: {_example(accepts)}'")
+                raise ModelError(
+                    f"{where}: say the class of this {accepts.tag}, such as 'class: {tags_of(accepts)[0]}'"
+                )
             return accepts
         if tag == "Unknown":
             return Unknown
@@ -252,10 +254,6 @@ def _number(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if value != value else "Inf" if value > 0 else "-Inf"
     return value
-
-
-def _example(accepts: type[Object]) -> str:
-    return next(tag for tag in tags() if issubclass(class_for(tag) or Object, accepts))
 
 
 def _kind_of(data: Any) -> str:

@@ -10,7 +10,7 @@ from lxml import etree
 from osimlite.document.names import as_written
 from osimlite.document.reader import Document, document_of, parse, read_document, version_of
 from osimlite.document.source import Source
-from osimlite.errors import DocumentError, NotWellFormedError, SpecialFileError, VersionError
+from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION, Model
 
@@ -27,15 +27,6 @@ class Survey:
     document: Document | None = None
     faults: list[DocumentError] = field(default_factory=list)
     sure_until: int | None = None
-
-
-def survey_file(file: str, *, of: type[Object] = Model) -> Survey:
-    """Read as much of a file as can be read; MissingFileError if there is none."""
-    try:
-        source = Source.of_file(file)
-    except SpecialFileError as fault:
-        return Survey(Source(b"", file), None, [fault])
-    return survey(source, of=of)
 
 
 def survey(source: Source, *, of: type[Object] = Model) -> Survey:

@@ -45,7 +45,8 @@ def validate(
     """
     from osimlite.document.plugins import used
     from osimlite.document.source import Source
-    from osimlite.lint.engine import check_model, check_source
+    from osimlite.lint.engine import check_source, run
+    from osimlite.lint.subject import Subject
     from osimlite.schema.model import Model
 
     if config is None:
@@ -55,7 +56,7 @@ def validate(
         config = Config(checked_words(select), checked_words(ignore), mesh_paths=meshes, classes=files)
     with used(config.classes):
         if isinstance(model, Model):
-            return check_model(model, config)
+            return run(Subject(model, config))
         if not isinstance(model, Source) and os.path.isdir(model):
             from osimlite.lint.many import check_files
 

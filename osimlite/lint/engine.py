@@ -6,7 +6,6 @@ A rule is a function of the subject and of `found`, which it calls once per find
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -16,9 +15,8 @@ from typing import Any, Literal, Unpack
 
 from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
-from osimlite.document.survey import Survey, survey, survey_file
+from osimlite.document.survey import Survey, survey
 from osimlite.errors import SpecialFileError
-from osimlite.files import read_file
 from osimlite.lint import rules
 from osimlite.lint.checked import Checked, Where
 from osimlite.lint.config import Config, Threshold
@@ -193,29 +191,28 @@ def all_rules() -> tuple[Rule, ...]:
 
 def check_source(source: Source, config: Config | None = None) -> Report:
     """Check a text: a table if its file is called so, else a document."""
-    with collector_paused():
-        subject = subject_in(source, config)
-        report = run(subject)
+    subject = subject_in(source, config)
+    report = run(subject)
     if report.findings and source.file is not None:
         report.texts[source.file] = subject.text
     return report
 
 
+@collector_paused()
 def subject_in(source: Source, config: Config | None = None) -> Checked:
     """A text to check; what it is, the name of its file tells."""
     use_classes(config)
     if source.file is not None and is_table(source.file):
         return Table(source.data, source.file, config)
-    return _subject_of(survey(source, of=_class_in(source.file)), config)
+    return _subject_of(survey(source, of=Object if is_document(source.file) else Model), config)
 
 
 def subject_of(file: str, config: Config | None = None) -> Checked:
     """A file to check; MissingFileError if there is none. What it is, its name tells."""
-    use_classes(config)
-    if is_table(file):
-        with suppress(SpecialFileError):
-            return Table(read_file(file), file, config)
-    return _subject_of(survey_file(file, of=_class_in(file)), config)
+    try:
+        return subject_in(Source.of_file(file), config)
+    except SpecialFileError as fault:
+        return _subject_of(Survey(Source(b"", file), None, [fault]), config)
 
 
 def use_classes(config: Config | None) -> None:
@@ -228,11 +225,6 @@ def use_classes(config: Config | None) -> None:
     use(config.classes)
 
 
-def _class_in(file: str | None) -> type[Object]:
-    """What a document is expected to hold."""
-    return Object if is_document(file) else Model
-
-
 def _subject_of(found: Survey, config: Config | None) -> Subject:
     if not is_document(found.source.file) or (found.document and isinstance(found.document.top, Model)):
         return Subject(found, config)
@@ -241,12 +233,7 @@ def _subject_of(found: Survey, config: Config | None) -> Subject:
     return Setup(found, config)
 
 
-def check_model(model: Model, config: Config | None = None) -> Report:
-    """Check a model made in Python."""
-    with collector_paused():
-        return run(Subject(model, config))
-
-
+@collector_paused()
 def run(subject: Checked, *, measure: bool = True) -> Report:
     """Run every rule that is wanted, and return all findings sorted by place.
 

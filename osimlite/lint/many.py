@@ -140,18 +140,16 @@ def _processes(jobs: list[Job]) -> int:
 
 def check_one(job: Job) -> Report:
     """Check one file, and keep what was found."""
-    from osimlite.document.reader import collector_paused
     from osimlite.lint.engine import run, subject_of
 
     began = time_ns()
-    with collector_paused():
-        subject = subject_of(job.file, job.config)
-        report = run(subject)
-        outside = subject.outside() if job.kept_in is not None else None
-        if job.kept_in is not None and outside is not None:
-            # A file that changes while it is checked must not be taken for one that was checked after.
-            key, text = key_of(job.file, job.config), text_of(subject.data)
-            Cache(job.kept_in).put(job.file, key, text, report, outside, began)
+    subject = subject_of(job.file, job.config)
+    report = run(subject)
+    outside = subject.outside() if job.kept_in is not None else None
+    if job.kept_in is not None and outside is not None:
+        # A file that changes while it is checked must not be taken for one that was checked after.
+        key, text = key_of(job.file, job.config), text_of(subject.data)
+        Cache(job.kept_in).put(job.file, key, text, report, outside, began)
     return report
 
 

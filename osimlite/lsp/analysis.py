@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.document.reader import collector_paused
 from osimlite.document.source import Position, Source
 from osimlite.document.spans import Span
 from osimlite.lint.checked import Checked
@@ -87,15 +86,13 @@ class Analysis:
         Raises:
             OsimliteError: the settings of the project make no sense.
         """
-        with collector_paused():
-            return Checked(self.config) if self.is_foreign else subject_in(self.source, self.config)
+        return Checked(self.config) if self.is_foreign else subject_in(self.source, self.config)
 
     @cached_property
     def report(self) -> Report:
         """What the rules find."""
-        with collector_paused():
-            # Measuring paths takes too long for every change of a text; `osimlite validate` does it.
-            return Report([]) if self.is_foreign else run(self.subject, measure=False)
+        # Measuring paths takes too long for every change of a text; `osimlite validate` does it.
+        return Report([]) if self.is_foreign else run(self.subject, measure=False)
 
     @property
     def is_checked(self) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
 
 from lsprotocol import types
 
@@ -13,10 +12,9 @@ from osimlite.lsp.analysis import Analysis
 from osimlite.lsp.cursor import Cursor, Element, single_objects
 from osimlite.lsp.hover import is_list
 from osimlite.lsp.names import names, reference_of
-from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Reference, Value
-from osimlite.schema.registry import class_for, tags
+from osimlite.schema.registry import class_for, tags_of
 from osimlite.schema.specs import FieldSpec, field_specs
 
 _TOPS = (
@@ -81,14 +79,14 @@ def _tags(analysis: Analysis, cursor: Cursor, around: Element | None, bracket: s
             for tag in _TOPS if is_document(analysis.file) else ("Model",):
                 yield _object(analysis, cursor, tag, bracket, "")
         elif around.spec is not None and is_list(around.spec) and around.spec.accepts is not None:
-            for tag in _concrete(around.spec.accepts):
+            for tag in tags_of(around.spec.accepts):
                 yield _object(analysis, cursor, tag, bracket, "")
         return
     given = _given_in(analysis, around)
     for spec in field_specs(around.cls).values():
         if spec in single_objects(around.cls):
             assert spec.accepts is not None
-            for tag in _concrete(spec.accepts):
+            for tag in tags_of(spec.accepts):
                 yield _object(analysis, cursor, tag, bracket, spec.tag)
         elif spec.tag not in given:
             yield _property(analysis, cursor, spec, bracket)
@@ -138,17 +136,6 @@ def _item(
         label, kind=kind, detail=detail or None, text_edit=types.TextEdit(place, text),
         filter_text=f"<{label}" if text.startswith("<") else label,
     )  # fmt: skip
-
-
-@cache
-def _concrete(cls: type[Object]) -> tuple[str, ...]:
-    """The tags of a class and of those derived from it, that may stand in a file."""
-    found = []
-    for tag in tags():
-        known = class_for(tag)
-        if known is not None and issubclass(known, cls):
-            found.append(tag)
-    return tuple(found)
 
 
 def _escaped(text: str) -> str:

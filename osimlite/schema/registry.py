@@ -228,3 +228,9 @@ def tags() -> tuple[str, ...]:
     renamed = {name: tag for tag, name in _TAGS.items()}
     known = (renamed.get(name, name) for name in (*MODULES, *_further))
     return tuple(sorted(tag for tag in known if class_for(tag) is not None))
+
+
+@by_tags
+def tags_of(cls: type[Object]) -> tuple[str, ...]:
+    """The tags, sorted, of a class and of those derived from it."""
+    return tuple(tag for tag in tags() if issubclass(class_for(tag) or type(None), cls))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, Found, rule
@@ -13,7 +12,7 @@ from osimlite.lint.words import a, called
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for, tags
+from osimlite.schema.registry import tags, tags_of
 from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import nearest
 
@@ -40,7 +39,7 @@ def unknown_class(subject: Subject, found: Found) -> None:
     """
     for note, owner in subject.notes_of("unknown-class"):
         fate = _fate(subject, note)
-        accepted = _acceptable(note.spec)
+        accepted = tags() if note.spec is None or note.spec.accepts is None else tags_of(note.spec.accepts)
         suggestion = nearest(note.word, accepted) or nearest(note.word, tags(), cutoff=80)
         message = f"OpenSim has no class '{note.word}' and {fate}"
         if suggestion is None:
@@ -179,12 +178,6 @@ def _fate(subject: Subject, note: Note) -> str:
     if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
         return "refuses to load the file"
     return "leaves the object out, and fails where it needs one"
-
-
-def _acceptable(spec: FieldSpec | None) -> Sequence[str]:
-    if spec is None or spec.accepts is None:
-        return tags()
-    return [tag for tag in tags() if (cls := class_for(tag)) is not None and issubclass(cls, spec.accepts)]
 
 
 def set_for(cls: type[Object] | None) -> str | None:
