@@ -148,7 +148,7 @@ def _run(words: list[str]) -> None:
         with warnings.catch_warnings():
             shown = warnings.showwarning
             warnings.showwarning = lambda message, category, *place: (
-                complain(message) if issubclass(category, DoubtfulWarning) else shown(message, category, *place)
+                complain(str(message)) if issubclass(category, DoubtfulWarning) else shown(message, category, *place)
             )
             warnings.simplefilter("once", DoubtfulWarning)
             # Options refuse such a number, or were given its unit.

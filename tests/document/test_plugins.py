@@ -14,7 +14,6 @@ from osimlite.document.plugins import classes_in
 from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
 from osimlite.lint import Config, validate
-from osimlite.lint.engine import check_source
 from osimlite.lint.many import check_files
 from osimlite.lint.settings import settings_for
 from osimlite.schema.base import Unknown
@@ -230,7 +229,7 @@ def test_a_class_may_derive_from_any(folder):
         file, whole = "m.xml", f'<OpenSimDocument Version="40600"> {item} </OpenSimDocument>'
         if cls.is_component:
             file, whole = "m.osim", text.replace("\t\t<components>", f"\t\t<components> {item}")
-        codes = check_source(Source(whole.encode(), file), config).codes
+        codes = validate(Source(whole.encode(), file), config=config).codes
         assert "OSIM101" in codes and (not cls.is_component or codes.keys() & {"OSIM301", "OSIM103"}), name
 
 
