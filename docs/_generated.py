@@ -5,18 +5,16 @@ A hook of MkDocs: commands from their `--help`, rules from their docstrings, com
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from collections import defaultdict
 from collections.abc import Iterator
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from typer.testing import CliRunner
 
-from osimlite.cli import COMMANDS
+from osimlite.cli import COMMANDS, app
 from osimlite.lint.engine import all_rules
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
@@ -60,12 +58,9 @@ def commands() -> str:
 
 
 def _help(command: str) -> str:
-    environment = {**os.environ, "COLUMNS": str(WIDTH), "TERM": "dumb", "NO_COLOR": "1"}
-    done = subprocess.run(
-        [sys.executable, "-m", "osimlite", command, "--help"],
-        capture_output=True, text=True, check=True, env=environment,
-    )  # fmt: skip
-    return "\n".join(line.rstrip() for line in done.stdout.strip().splitlines())
+    environment = {"COLUMNS": str(WIDTH), "TERM": "dumb", "NO_COLOR": "1"}
+    done = CliRunner(env=environment).invoke(app(), [command, "--help"], prog_name="osimlite")
+    return "\n".join(line.rstrip() for line in done.output.strip().splitlines())
 
 
 def components() -> str:
