@@ -66,8 +66,9 @@ def executed(path: Path) -> Any:
             for file in found:
                 shutil.copy(file, folder)
             client = nbclient.NotebookClient(
-                notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": folder}}
-            )
+                notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": folder}},
+                extra_arguments=["--log-level=ERROR"],
+            )  # fmt: skip
             client.execute(env={**environment, "NO_COLOR": "1"})
     return notebook
 
