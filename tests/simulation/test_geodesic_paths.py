@@ -120,6 +120,26 @@ def test_speeds_and_moment_arms_are_derivatives(name):
         )
 
 
+ALL = {"Cylinder": [0.03, 9.0], "Sphere": [0.04], "Ellipsoid": [0.03, 0.05, 0.04]}
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [("Cylinder", "Cylinder"), ("Cylinder", "Ellipsoid"), ("Ellipsoid", "Ellipsoid"), ("Sphere", "Sphere")],
+    ids=" and ".join,
+)
+def test_lengths_around_two_surfaces_do_not_jump(kinds):
+    """On either side of both, and between them: where another way gets shorter its length is that of the one before."""
+    one, two = (surface(kind, ALL[kind]) for kind in kinds)
+    paths = around(one, {**two, "translation": (0.09, 0.01, 0.02), "xyz_body_rotation": (0.4, -0.3, 0.2)})
+    rng, steps = np.random.default_rng(6), np.linspace(0.0, 1.0, 61)[:, None]
+    for _ in range(30):
+        begin, end = rng.uniform((-0.2, -0.06, -0.06, 0.15, -0.06, -0.06), (-0.08, 0.06, 0.06, 0.3, 0.06, 0.06), (2, 6))
+        lengths = [length(paths, ends[:3], ends[3:]) for ends in begin + steps * (end - begin)]
+        way = (end - begin) / (len(steps) - 1)
+        assert np.max(np.abs(np.diff(lengths))) < np.linalg.norm(way[:3]) + np.linalg.norm(way[3:])
+
+
 def test_nothing_outside_of_a_path_is_touched(monkeypatch):
     monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
     setup = SETUPS["cylinder_sphere_ellipsoid"]

@@ -1,10 +1,11 @@
 """Paths that are the shortest around their surfaces, or at least stationary: what `wrapping="geodesic"` asks for.
 
 Between two neighbouring points each PathWrap whose range holds both bends the path where that touches, whatever it does
-between other points. So its surface stands in the path once for each point that a bent piece may begin at. A piece is
-bent around one surface at a time, until this changes little; then all geodesics are corrected at once, as those of a
-cable, until lines go over into them without a bend. Where surfaces may be passed on either side, all ways around two of
-them are tried. What is found depends on the pose alone.
+between other points. So its surface stands in the path once for each point that a bent piece may begin at. Of the
+surfaces that a piece goes through, that which turns it most is put into it first; then all geodesics of the piece are
+corrected at once, until it is as short as a string; then it may meet, or leave, another surface. Where surfaces may be
+passed on either side, both are tried, and the shortest of all ways is taken: so lengths do not jump as another one
+becomes the shortest. What is found depends on the pose alone.
 
 A surface inside which a point of the piece lies bends it nowhere, as in OpenSim. A piece for which no geodesics are
 found goes straight on; none such is known but where a point lies on a surface.
@@ -14,11 +15,10 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.forces.vectors import Vector, dot, minus, norm, put, times, vector
+from osimlite.forces.vectors import Vector, cross, minus, norm, put, times, vector
 from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
 from osimlite.simulation.kernels.cable_surfaces import (
     ARC,
-    ELLIPSOID,
     KIND,
     POINT,
     SQUARE,
@@ -40,12 +40,11 @@ from osimlite.simulation.kernels.geodesic_search import (
 from osimlite.simulation.kernels.geodesic_starts import (
     ANY_SIDE,
     AS_MEANT,
-    OTHER_WAY,
     PULLED,
     SIDE,
     SURFACE,
     depth,
-    open_side,
+    has_two_ways,
     start,
 )
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
@@ -75,21 +74,24 @@ WRAP_INTS = 4
 PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
 """Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its piece begins at, the
 last one that it may end at, and the first one of its PathWrap's range."""
-CHAIN, SEARCH, POSES = 0, 1, 2
-"""Integers after the wraps: where in the record the slots are, room for a search, and the poses of the surfaces."""
-HOW, OUT, POSE_NUMBERS = 12, 13, 16
+CHAIN, BEST, SEARCH, POSES = 0, 1, 2, 3
+"""Integers after the wraps: where in the record the slots are, those of the shortest way so far, room for a search, and
+the poses of the surfaces."""
+HOW, ABOUT, POSE_NUMBERS = 12, 13, 16
 NOT = 0.0
 """Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand, see `start`, and
-towards which side."""
+about what axis that turns."""
 
 TOUCH = 1e-10
 """The angle (rad) by which a piece turns at least around a surface that it is put on."""
+WHOLE = 10.0
+"""More than any such angle."""
 INSIDE = 1e-14
 """A point counts as inside a surface if it is so far below it, in units of its function."""
-MOST_WAYS = 4
-"""So many ways around surfaces that may be passed either way are tried."""
-LOOSE, TURNS = 3, 12
-"""So many times each of several surfaces is put into a piece anew; so often surfaces may come and go."""
+WAYS, NEARLY = 8, 0.97
+"""So many ways around surfaces that may be passed either way are tried; those that are this much longer are left."""
+TURNS = 16
+"""So often surfaces may come and go, at most."""
 
 
 def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
@@ -100,9 +102,10 @@ def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
         wraps: number of wraps.
         room: length of the record without slots.
     """
-    search = room + SLOT * (most + 2)
+    best = room + SLOT * (most + 2)
+    search = best + SLOT * (most + 2)
     poses = search + search_room(most)
-    return [room, search, poses], poses + POSE_NUMBERS * wraps
+    return [room, best, search, poses], poses + POSE_NUMBERS * wraps
 
 
 def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -122,7 +125,7 @@ def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
                 order[other + 2 * count] = order[other]
             found[COUNT] += 2.0 * count
         for number in range(count):
-            slot = at(found, slots[CHAIN] + SLOT * (number + 1))
+            slot = at(found, slots[BEST] + SLOT * (number + 1))
             node = points + 2 * int(slot[OWNER])
             one, two = at(work, NODE_WORK * node), at(work, NODE_WORK * (node + 1))
             put(one, PLACE, vector(slot, GROUND_START + POINT))
@@ -151,44 +154,30 @@ def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
 def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     """Bend the piece between two points around its surfaces; returns around how many, which then are in the slots.
 
-    The shortest way around surfaces that may be passed either way is known once all are.
+    Of the ways around surfaces that may be passed either way the shortest is taken.
     """
-    size, near, ways = i[POINTS] + 2 * i[WRAPS], 0, 1
+    size, near = i[POINTS] + 2 * i[WRAPS], 0
     wraps, work = at(i, NODES_AT + NODE_INTS * size), at(found, ORDER + size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
-    chain, poses = at(found, slots[CHAIN]), at(found, slots[POSES])
+    chain, best, poses = at(found, slots[CHAIN]), at(found, slots[BEST]), at(found, slots[POSES])
     for number in range(i[WRAPS]):
         if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
             near += 1
-    for number in range(i[WRAPS]):
-        own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
-        numbers = at(p, own[PLACES])
-        put(pose, OUT, (0.0, 0.0, 0.0))
-        may_turn = near > 1 or numbers[SURFACE + KIND] == ELLIPSOID
-        if own[FIRST] == one and pose[HOW] != NOT and numbers[SIDE] == 0.0 and may_turn and ways < MOST_WAYS:
-            out = open_side(at(numbers, SURFACE), seen(pose, work, one), seen(pose, work, two))
-            put(pose, OUT, out)
-            ways *= 2 if dot(out, out) > 0.0 else 1
-    count, best, least = 0, 0, inf
-    for way in range(ways - 1 if near > 0 else -1, -1, -1):
-        choose(i, wraps, poses, one, way)
-        count = settle(i, p, found, one, two, near, way == 0)
-        length = chain_length(chain, count) if count > 0 else inf
-        if length <= least:
-            best, least = way, length
-    if best > 0:
-        choose(i, wraps, poses, one, best)
-        count = settle(i, p, found, one, two, near, False)
-    return count
-
-
-def choose(i: Ints, wraps: Ints, poses: Floats, one: int, way: int) -> None:
-    """Set on which side a piece passes each surface that may be passed either way, by the bits of a number."""
-    for number in range(i[WRAPS]):
-        pose = at(poses, POSE_NUMBERS * number)
-        if wraps[WRAP_INTS * number + FIRST] == one and norm(vector(pose, OUT)) > 0.0:
-            pose[HOW] = OTHER_WAY if way % 2 == 1 else AS_MEANT
-            way //= 2
+    put(chain, 0, vector(work, NODE_WORK * one + PLACE))
+    most, least, way, pulled = 0, inf, 0, False
+    while way < WAYS and near > 0:
+        put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
+        count, step = settle(i, p, found, one, two, near, way, pulled, least)
+        length = chain_length(chain, count) if count >= 0 else inf
+        if length < least:
+            most, least = count, length
+            for k in range(SLOT * (count + 1)):
+                best[k] = chain[k]
+        way += step
+        # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is.
+        if way == WAYS and least == inf and not pulled:
+            way, pulled = 0, True
+    return most
 
 
 def chain_length(chain: Floats, count: int) -> float:
@@ -200,42 +189,49 @@ def chain_length(chain: Floats, count: int) -> float:
     return length
 
 
-def settle(i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, is_last: bool) -> int:
-    """Put into the slots what the piece between two points bends around; returns how many there are.
+def settle(
+    i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, way: int, pulled: bool, least: float
+) -> tuple[int, int]:
+    """Put into the slots what the piece between two points bends around.
 
-    None if no geodesics are found, and this is not the last way that is tried.
+    Returns:
+        How many surfaces these are, -1 if there is no such way that is shorter; by how much the number of the way
+        differs from that of the next one which has another side of a surface that was met.
     """
-    size = i[POINTS] + 2 * i[WRAPS]
+    size, count, step = i[POINTS] + 2 * i[WRAPS], 0, WAYS
     work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
     chain, room, poses = at(found, slots[CHAIN]), at(found, slots[SEARCH]), at(found, slots[POSES])
-    put(chain, 0, vector(work, NODE_WORK * one + PLACE))
-    put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
-    count, loose = 0, LOOSE if near > 1 else 0
-    for turn in range(TURNS):
-        changed = False
-        for number in range(i[WRAPS]):
-            own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
-            if own[FIRST] == one and pose[HOW] != NOT:
-                place = place_of(chain, count, number)
-                if place > 0 and (turn < loose or not chain[SLOT * place + GEODESIC + ARC] > 0.0):
-                    take_out(chain, count, place)
-                    count, changed = count - 1, True
-                # What was left is met again, if at all, once the rest is smooth; in the end nothing is.
-                may_meet = turn < loose or (place == 0 and turn < TURNS - 2)
-                if may_meet and put_in(at(p, own[PLACES]), pose, chain, count, number, room):
-                    count, changed = count + 1, True
-        if not changed and turn != loose:
+    for number in range(i[WRAPS]):
+        put(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
+    for _ in range(TURNS):
+        before = count
+        for k in range(count, 0, -1):
+            if not chain[SLOT * k + GEODESIC + ARC] > 0.0:
+                take_out(chain, count, k)
+                count -= 1
+        # What was left is met again, if at all, once the rest is smooth.
+        if count == before:
+            number, place, axis = meet_most(i, p, wraps, poses, one, chain, count, room)
+            if place == 0:
+                return count, step
+            numbers, pose = at(p, wraps[WRAP_INTS * number + PLACES]), at(poses, POSE_NUMBERS * number)
+            is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
+            if is_open and norm(vector(pose, ABOUT)) == 0.0:
+                a, b = seen(pose, work, one), seen(pose, work, two)
+                if near > 1 or has_two_ways(at(numbers, SURFACE), a, b):
+                    step //= 2
+                    put(pose, ABOUT, times(1.0 if way // step % 2 == 0 else -1.0, axis))
+            insert(numbers, pose, chain, count, place, number)
+            if not lay(numbers, pose, chain, count + 1, place, pulled, room):
+                take_out(chain, count + 1, place)
+                continue
+            count += 1
+        elif count == 0:
+            return 0, step
+        if NEARLY * chain_length(chain, count) > least or not smooth(chain, count, room):
             break
-        if turn >= loose and not smooth(chain, count, room):
-            # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is.
-            for k in range(1, count + 1 if is_last else 1):
-                poses[POSE_NUMBERS * int(chain[SLOT * k + OWNER]) + HOW] = PULLED
-            put(chain, SLOT, vector(chain, SLOT * (count + 1)))
-            count = 0
-            if not is_last:
-                break
-    return count
+    return -1, step
 
 
 def find_near(i: Ints, p: Floats, found: Floats, slots: Ints, one: int, two: int) -> None:
@@ -278,19 +274,34 @@ def take_out(chain: Floats, count: int, place: int) -> None:
         chain[k] = chain[k + SLOT]
 
 
-def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room: Floats) -> bool:
-    """Put a surface into that piece of the chain which it turns most, if there is one."""
-    place, most = 0, TOUCH
-    point = way = (0.0, 0.0, 0.0)
-    side_out = times(-1.0 if pose[HOW] == OTHER_WAY else 1.0, vector(pose, OUT))
-    arc = 0.0
-    for k in range(count + 1):
-        first, second = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
-        turn, meets, along, length = start(p, first, second, pose[HOW], side_out, room)
-        if turn > most:
-            place, most, point, way, arc = k + 1, turn, meets, along, length
-    if place == 0:
-        return False
+def meet_most(
+    i: Ints, p: Floats, wraps: Ints, poses: Floats, one: int, chain: Floats, count: int, room: Floats
+) -> tuple[int, int, Vector]:
+    """The wrap that turns a line of the chain most, the slot after that line, 0 if there is none, and about what.
+
+    Those with a side come first, since sides are told of the points of the path.
+    """
+    found, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
+    for number in range(i[WRAPS]):
+        own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
+        if own[FIRST] == one and pose[HOW] != NOT and place_of(chain, count, number) == 0:
+            numbers, about = at(p, own[PLACES]), vector(pose, ABOUT)
+            surface, before = at(numbers, SURFACE), WHOLE if numbers[SIDE] != 0.0 else 0.0
+            inside = INSIDE * surface[SQUARE]
+            for k in range(count + 1):
+                a, b = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
+                if value(surface, a) <= inside and value(surface, b) <= inside:
+                    turn, point, way, _ = start(numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), room)
+                    # Which line meets it is told by the shorter way.
+                    if turn > TOUCH and norm(about) > 0.0:
+                        turn, point, way, _ = start(numbers, a, b, pose[HOW], about, room)
+                    if turn > TOUCH and turn + before > most:
+                        found, place, most, axis = number, k + 1, turn + before, cross(point, way)
+    return found, place, axis
+
+
+def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int) -> None:
+    """Put a surface into a slot of the chain, before what is there."""
     for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
         chain[k] = chain[k - SLOT]
     slot = at(chain, SLOT * place)
@@ -299,8 +310,16 @@ def put_in(p: Floats, pose: Floats, chain: Floats, count: int, number: int, room
         slot[IN_GROUND + k] = pose[k]
     for k in range(SURFACE_NUMBERS):
         slot[OBSTACLE_WORK + k] = p[SURFACE + k]
-    if not shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room):
-        take_out(chain, count + 1, place)
+
+
+def lay(p: Floats, pose: Floats, chain: Floats, count: int, k: int, pulled: bool, room: Floats) -> bool:
+    """Lay the chain around the surface in a slot, as those beside it are; whether it touches that."""
+    first, second = in_surface(pose, end_before(chain, k)), in_surface(pose, start_after(chain, k, count))
+    about, slot = vector(pose, ABOUT), at(chain, SLOT * k)
+    turn, point, way, arc = start(p, first, second, PULLED if pulled else pose[HOW], about, room)
+    if not (turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room)):
         return False
+    if norm(about) > 0.0:
+        put(pose, ABOUT, cross(point, way))
     to_ground(slot)
     return True

@@ -5,6 +5,10 @@ has two equations: the line there has no part along the normal of the surface, a
 those of a cable they are about whole lines, and not about their directions, so that they stay nearly linear where a
 line is short.
 
+What the ends do across their geodesics changes the length as the equations across tell. So their determinant is
+positive where the length is least, and negative at a saddle; there springs hold the ends until it is positive, and the
+piece slides off towards where it is shorter.
+
 Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle wrapping method using
 natural geodesic variations, Multibody System Dynamics 36, 2016.
 """
@@ -48,7 +52,9 @@ begins, and the one after those in use the place where it ends."""
 SMOOTH, STALLED, NEAR = 1e-12, 1e-8, 1e-3
 """Angles (rad) at which a search ends, and below which it ends if they get no less; lines that are shorter than this
 (m) count as so long."""
-ROUNDS, MOST_TURN, LEAST_PART, SHORT = 30, 0.2, 0.1, 0.01
+STIFF, STIFFER = 1.0, 3.0
+"""How stiff springs are at least (N/m) if the string is pulled by 1 N, and how many times stiffer the next ones."""
+ROUNDS, MOST_TURN, LEAST_PART, SHORT = 60, 0.2, 0.1, 0.01
 """Of a search: its rounds; by how much (rad) an end of a geodesic may turn in a round; what must be left of a geodesic
 after it, unless that is so short (rad)."""
 
@@ -84,14 +90,18 @@ def smooth(chain: Floats, count: int, room: Floats) -> bool:
     values = at(room, GEODESIC_ROOM)
     corrections = at(values, 2 * size)
     a = at(corrections, size)
-    before = inf
+    before, stiff = inf, 0.0
     for _ in range(ROUNDS):
-        rough = equations(chain, count, values, a)
+        rough = equations(chain, count, values, a, stiff)
         if rough <= SMOOTH or before <= rough < STALLED:
             return True
         before = rough
         rank = factorise(size, size, a, 0.0)
+        if determinant_sign(size, a) < 0.0:
+            stiff = max(STIFFER * stiff, STIFF)
+            continue
         minimum_norm(size, size, a, rank, values, at(values, size), corrections)
+        stiff = stiff / STIFFER if stiff > STIFF else 0.0
         step = 1.0
         for k in range(count):
             step = min(step, part_of(at(chain, SLOT * (k + 1)), at(corrections, UNKNOWNS * k)))
@@ -119,7 +129,17 @@ def part_of(slot: Floats, corrections: Floats) -> float:
     return part
 
 
-def equations(chain: Floats, count: int, values: Floats, a: Floats) -> float:
+def determinant_sign(size: int, a: Floats) -> float:
+    """The sign of the determinant of square equations that were turned into a factor."""
+    diagonal, order, sign = at(a, size * size), at(a, size * size + size), 1.0
+    for r in range(size):
+        sign = -sign if diagonal[r] < 0.0 else sign
+        for k in range(r):
+            sign = -sign if order[k] > order[r] else sign
+    return sign
+
+
+def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float) -> float:
     """Fill in the equations: left sides a (4 n, 4 n), right sides; returns by how much an angle misses, at most."""
     size, most = UNKNOWNS * count, 0.0
     for k in range(size * size):
@@ -136,7 +156,13 @@ def equations(chain: Floats, count: int, values: Floats, a: Floats) -> float:
                 row = UNKNOWNS * (k - 1) + 2 * side + across
                 values[row] = -dot(line, axis)
                 most = max(most, abs(values[row]) / distance)
-                vary(slot, end, times(sign, axis), cross(axis, line), at(a, size * row + UNKNOWNS * (k - 1)))
+                vary(
+                    slot,
+                    end,
+                    times(sign * (1.0 + stiff * distance), axis),
+                    cross(axis, line),
+                    at(a, size * row + UNKNOWNS * (k - 1)),
+                )
                 if 0 < other <= count:
                     far, of = GROUND_END if side == 0 else GROUND_START, at(a, size * row + UNKNOWNS * (other - 1))
                     vary(at(chain, SLOT * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of)

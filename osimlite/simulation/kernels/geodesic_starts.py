@@ -58,9 +58,9 @@ Start = tuple[float, Vector, Vector, float]
 """The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
 surface; its direction there; its length on the surface, m."""
 
-AS_MEANT, ANY_SIDE, OTHER_WAY, PULLED = 1.0, 2.0, 3.0, 4.0
-"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; on the other
-of two open sides; around an ellipsoid where a string comes to lie."""
+AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
+"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; around an
+ellipsoid where a string comes to lie."""
 
 LEAST = 1e-100
 """What is not divided by."""
@@ -74,7 +74,7 @@ BENT, BEADS, PULLS = 0.7, 16, 8
 pieces, so often."""
 
 
-def start(p: Floats, first: Vector, second: Vector, how: float, side_out: Vector, room: Floats) -> Start:
+def start(p: Floats, first: Vector, second: Vector, how: float, about: Vector, room: Floats) -> Start:
     """Where a straight piece between two points begins to bend around what the numbers tell of.
 
     Args:
@@ -82,32 +82,28 @@ def start(p: Floats, first: Vector, second: Vector, how: float, side_out: Vector
         first: where the piece begins.
         second: where it ends.
         how: it may be bent.
-        side_out: towards the side on which it passes a surface without a side, zeros if that is open.
+        about: about this axis, as by the right hand, it turns around a surface without a side; zeros if that is open.
         room: for a string of beads.
     """
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == TORUS:
         return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
     if surface[KIND] == CYLINDER:
-        if side != 0.0:
-            is_held = how != ANY_SIDE and axis < 2
-            side_out = replaced((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
-        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, side_out)
-    return around_ellipsoid(surface, first, second, axis, side, how, side_out, room)
+        is_held = how != ANY_SIDE and axis < 2
+        side_out = replaced((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
+        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2))
+    return around_ellipsoid(surface, first, second, axis, side, how, about, room)
 
 
-def open_side(p: Floats, first: Vector, second: Vector) -> Vector:
-    """From the middle of a surface towards a line that goes through it; zeros if it does not."""
+def has_two_ways(p: Floats, first: Vector, second: Vector) -> bool:
+    """Whether either way around a surface may be the shorter one for a line that goes through it."""
+    if p[KIND] != ELLIPSOID:
+        return False
     way, weights = minus(second, first), vector(p, WEIGHTS)
     part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
-    middle = along(first, part, way)
-    out = elementwise(weights, middle)
-    if p[KIND] == TORUS or not 0.0 < part < 1.0 or not dot(out, middle) < p[SQUARE]:
-        return 0.0, 0.0, 0.0
-    if p[KIND] == ELLIPSOID:
-        x, y, z = weights
-        return way_out((sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), middle, way, False)
-    return out if dot(out, out) > LEAST else cross(way, (0.0, 0.0, 1.0))
+    x, y, z = weights
+    out = way_out((sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), along(first, part, way), way, WORTHWHILE)
+    return dot(out, out) > 0.0
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
@@ -122,7 +118,9 @@ def depth(p: Floats, first: Vector, second: Vector) -> float:
     return dot(elementwise(weights, middle), middle) / (p[SQUARE] if p[KIND] != CYLINDER else 1.0)
 
 
-def around_cylinder(radius: float, half_length: float, first: Vector, second: Vector, side_out: Vector) -> Start:
+def around_cylinder(
+    radius: float, half_length: float, first: Vector, second: Vector, side_out: Vector, about: float
+) -> Start:
     """The start on a cylinder about z: a straight line once the cylinder is rolled out.
 
     As in OpenSim there is none if the path would meet and leave the cylinder beyond its ends.
@@ -133,7 +131,10 @@ def around_cylinder(radius: float, half_length: float, first: Vector, second: Ve
     closest, crosses = closest_to_axis(first, second, radius)
     is_open = ux == 0.0 and uy == 0.0
     active = dot(side_out, first) >= 0.0, dot(side_out, second) >= 0.0
-    if (NONE if is_open and not crosses else action(*active, dot(side_out, closest) >= 0.0, crosses)) == NONE:
+    if (
+        about == 0.0
+        and (NONE if is_open and not crosses else action(*active, dot(side_out, closest) >= 0.0, crosses)) == NONE
+    ):
         return 0.0, first, second, 0.0
     # Angles from the middle of the active side; or from the first end.
     if is_open:
@@ -144,6 +145,8 @@ def around_cylinder(radius: float, half_length: float, first: Vector, second: Ve
     before, after = atan2(line1, radius), atan2(line2, radius)
     sweep = (two - one) % (2.0 * pi)
     way = 1.0 if (sweep <= pi if is_open else turns_left(one, before, two, after, sweep)) else -1.0
+    if about != 0.0:
+        way = 1.0 if about > 0.0 else -1.0
     turn = (sweep if way > 0.0 else 2.0 * pi - sweep) - before - after
     size = sqrt(ux * ux + uy * uy)
     c, s = cos(one + way * before) / size, sin(one + way * before) / size
@@ -184,7 +187,7 @@ def around_ellipsoid(
     axis: int,
     side: float,
     how: float,
-    side_out: Vector,
+    about: Vector,
     room: Floats,
 ) -> Start:
     """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
@@ -203,14 +206,12 @@ def around_ellipsoid(
         return 0.0, first, way, 0.0
     out = middle
     if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
-        out = way_out(radii, elementwise(radii, middle), elementwise(radii, way), how == OTHER_WAY)
-    if dot(out, out) == 0.0:
-        return 0.0, first, way, 0.0
-    if dot(side_out, out) < 0.0:
-        other = (0.0, 0.0, 0.0)
+        out = way_out(radii, elementwise(radii, middle), elementwise(radii, way), 0.0)
+    if norm(about) > 0.0:
         if p[KIND] == ELLIPSOID:
-            other = way_out(radii, elementwise(radii, middle), elementwise(radii, way), True)
-        out = other if dot(side_out, other) > 0.0 else times(-1.0, out)
+            out = way_out(radii, (0.0, 0.0, 0.0), elementwise(radii, way), 0.0)
+        if dot(about, cross(out, elementwise(radii, way))) < 0.0:
+            out = times(-1.0, out)
     if side != 0.0 and not on_side(out, axis, side):
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
@@ -224,15 +225,15 @@ def around_ellipsoid(
     return found
 
 
-def way_out(radii: Vector, middle: Vector, way: Vector, other: bool) -> Vector:
+def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector:
     """The direction across a line in which it is least below the widest of an ellipsoid, a unit vector.
 
     Args:
         radii: of the ellipsoid.
         middle: a point of the line.
         way: along the line.
-        other: return the next direction in which it is less so than in those beside; zeros if there is none, or if the
-            line is so much deeper there that no path is shorter.
+        deeper: if positive, return the next direction in which it is less so than in those beside; zeros if there is
+            none, or if the line is so many times deeper there.
     """
     x, y, z = way
     axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
@@ -252,8 +253,8 @@ def way_out(radii: Vector, middle: Vector, way: Vector, other: bool) -> Vector:
             elif here < second[0]:
                 second = found
         before, here = here, after
-    depth, angle = second if other else best
-    if other and depth > WORTHWHILE * best[0]:
+    depth, angle = second if deeper > 0.0 else best
+    if depth == inf or depth > max(deeper, 1.0) * best[0]:
         return 0.0, 0.0, 0.0
     return along(times(cos(angle), a), sin(angle), b)
 
@@ -339,7 +340,7 @@ def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: 
     rx, ry, _ = inwards = unit((-x, -y, 0.0))
     centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
     one, two = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
-    turn, point, way, length = around_cylinder(tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0))
+    turn, point, way, length = around_cylinder(tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0), 0.0)
     return turn, along(back(point, inwards, tangent), 1.0, centre), back(way, inwards, tangent), length
 
 
