@@ -28,15 +28,19 @@ _MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
 
 
 class Value(NamedTuple):
-    """A value of a coordinate, rad or m."""
+    """A value of a coordinate in its unit: rad, m or none."""
 
     coordinate: str
     value: float
-    is_angle: bool
+    unit: str
 
     def __str__(self) -> str:
-        size = f"{degrees(self.value):.4g} deg" if self.is_angle else f"{self.value:.4g} m"
-        return f"'{self.coordinate}' = {size}"
+        return f"'{self.coordinate}' = {self.sized(self.value, 4)}"
+
+    def sized(self, value: float, digits: int) -> str:
+        """Another value of the coordinate as people read it; angles in degrees."""
+        shown, unit = (degrees(value), "deg") if self.unit == "rad" else (value, self.unit)
+        return f"{shown:.{digits}g} {unit}".rstrip()
 
 
 class Pose(NamedTuple):

@@ -30,7 +30,7 @@ def moving_points(paths: Paths) -> Iterator[MovingPoint]:
                 yield MovingPoint(
                     name,
                     point.name,
-                    Value(info.name, end, info.motion_type == "rotational"),
+                    Value(info.name, end, info.unit),
                     abs(end - inside),
                     float(np.linalg.norm(place - _at(point, inside)[0])),
                     float(np.linalg.norm(rate)),

@@ -55,7 +55,7 @@ class Sweep:
 
     def value(self, value: float) -> Value:
         """A value of the coordinate, with its name."""
-        return Value(self.info.name, float(value), self.info.motion_type == "rotational")
+        return Value(self.info.name, float(value), self.info.unit)
 
     def pose(self, value: float) -> Pose:
         """What people call the pose at a value of the coordinate."""

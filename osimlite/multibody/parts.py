@@ -51,6 +51,11 @@ class CoordinateInfo:
     prescribed: Function | None = None
     yielding: bool = False
 
+    @property
+    def unit(self) -> str:
+        """Of its values: rad or m, or nothing if what it moves is neither an angle nor a distance of that size."""
+        return {"rotational": "rad", "translational": "m"}.get(self.motion_type, "")
+
 
 @dataclass(frozen=True, eq=False)
 class MobileBody:

@@ -229,7 +229,7 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
     if word in ("", SCALE) and (found := places(model, route)):
         unit = found[0].unit
         if unit.startswith("rad | m") and (own := named(found[0].component, mechanism.coordinates)):
-            unit = _unit_of(own[0])
+            unit = own[0].unit or "rad | m"
         return Property(found, bool(word)), "" if word else unit
     if name == "slope":
         return Slope(), "rad"
@@ -250,7 +250,7 @@ def _unknown(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[
 
 
 def _coordinates(name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model) -> tuple[Target, str]:
-    unit, locked = _unit_of(infos[0]), [info for info in infos if info.locked]
+    unit, locked = infos[0].unit or "rad | m", [info for info in infos if info.locked]
     if locked and is_speed:
         raise SettingError(
             f"the coordinate '{locked[0].name}' is locked, so that it has no speed; unlock it in the model"
@@ -260,10 +260,6 @@ def _coordinates(name: str, infos: Sequence[CoordinateInfo], is_speed: bool, mod
     if len(locked) < len(infos):
         raise SettingError(f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one")
     return Property(places(model, ",".join(info.path for info in infos) + "/default_value")), unit
-
-
-def _unit_of(info: CoordinateInfo) -> str:
-    return {"rotational": "rad", "translational": "m"}.get(info.motion_type, "rad | m")
 
 
 def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:

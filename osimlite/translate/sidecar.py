@@ -60,7 +60,7 @@ def _coordinates(robot: Robot) -> list[dict[str, Any]]:
         {
             "path": info.path,
             "name": info.name,
-            "unit": {"rotational": "rad", "translational": "m"}.get(info.motion_type),
+            "unit": info.unit or None,
             "joint": robot.joint_of[place].name if place in robot.joint_of else None,
             "drives": drives.get(place, []),
             "default_value": info.default_value,

@@ -221,7 +221,7 @@ def _coordinates(
             {
                 "name": info.name,
                 "path": info.path,
-                "unit": {"rotational": "rad", "translational": "m"}.get(info.motion_type, ""),
+                "unit": info.unit,
                 "range": [min(low, *ends), max(high, *ends)],
                 "still": still,
             }

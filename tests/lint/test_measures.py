@@ -12,6 +12,7 @@ from osimlite.document.source import Source
 from osimlite.lint import Config, measures, validate
 from osimlite.lint.many import check_files
 from osimlite.lint.reporters import render
+from osimlite.multibody.parts import CoordinateInfo
 
 JUMPING = "fail-02-two-coordinates.osim"
 
@@ -96,3 +97,11 @@ def test_the_language_server_does_not_measure(jumping):
 
     report = Analysis(Text(jumping.read_text()), str(jumping)).report
     assert not report.findings and not report.unmeasured
+
+
+@pytest.mark.parametrize(
+    ("motion", "said"), [("rotational", "28.65 deg"), ("translational", "0.5 m"), ("coupled", "0.5")]
+)
+def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
+    info = CoordinateInfo("q", "/jointset/j/q", "/jointset/j", motion)
+    assert str(measures.Value(info.name, 0.5, info.unit)) == f"'q' = {said}"

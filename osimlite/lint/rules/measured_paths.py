@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import degrees
-
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
@@ -171,19 +169,18 @@ def moving_point_range(subject: Subject, found: Found) -> None:
             other = worst.setdefault((point.owner, point.point), point)
             worst[point.owner, point.point] = max(other, point, key=lambda it: (it.moved >= made_up, it.moved, it.rate))
     for point in worst.values():
-        owner, end, is_angle = subject.tree.at(point.owner), point.end, point.end.is_angle
+        owner, end = subject.tree.at(point.owner), point.end
         names = f"'{point.point}' of {called(owner)}"
         if point.moved >= made_up:
-            beyond = f"{degrees(point.beyond):.3g} deg" if is_angle else f"{point.beyond:.3g} m"
             found(
-                f"the functions of the place of {names} end {beyond} before the range of '{end.coordinate}': OpenSim "
-                f"lets it move on by {1000.0 * point.moved:.3g} mm, to its place at {end}",
+                f"the functions of the place of {names} end {end.sized(point.beyond, 3)} before the range of "
+                f"'{end.coordinate}': OpenSim lets it move on by {1000.0 * point.moved:.3g} mm, to its place at {end}",
                 owner,
             )
         else:
             found(
                 f"beyond the range of '{end.coordinate}', which nothing keeps it in, {names} rests and OpenSim goes on "
-                f"as if it moved, by {1000.0 * point.rate:.3g} mm per {'rad' if is_angle else 'm'} at {end}",
+                f"as if it moved, by {1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}",
                 owner,
                 severity=INFO,
             )
