@@ -2,8 +2,8 @@
 
 Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are read. A comment
 ``<!-- prepared: commands -->`` makes what a page takes for granted, ``<!-- not run: reason -->`` before a block says
-why it cannot be run here. After ``<!-- tried: what -->`` come tables: the commands and expressions in all but their
-first columns are run after the blocks.
+why it cannot be run here. After ``<!-- tried: what -->`` comes a table: the commands and the Python in all but its
+first column are run.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ READ_ONLY = ("", "text", "lua", "elisp", "console", "diff", "matlab")
 """Languages of blocks that show what others print, or that nothing here reads."""
 
 _BLOCK = re.compile(
-    r"(?:<!-- not run: (?P<why>[^>]+) -->\s*)?^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)",
+    r"(?:<!-- not run: (?P<why>[^>]+) -->\s*)?^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)"
+    r"|<!-- tried: [^>]+ -->\n(?P<table>(?:^\|[^\n]*\n)+)",
     re.M | re.S,
 )
-_TRIED = re.compile(r"<!-- tried: [^>]+ -->\n((?:^\|.*\n|\n(?=\|))+)", re.M)
 _PREPARED = re.compile(r"<!-- prepared: (.*?) -->", re.S)
 
 
 class Block(NamedTuple):
-    """One block of code; `why` says why it is not run, if it is not."""
+    """One block of code, or a table with code in it; `why` says why it is not run, if it is not."""
 
     language: str
     code: str
@@ -48,10 +48,12 @@ class Block(NamedTuple):
 
 
 def blocks(text: str) -> list[Block]:
-    return [
-        Block(match["language"], match["code"], text.count("\n", 0, match.start("code")) + 1, match["why"])
-        for match in _BLOCK.finditer(text)
-    ]
+    found = []
+    for match in _BLOCK.finditer(text):
+        part = "code" if match["fence"] else "table"
+        line = text.count("\n", 0, match.start(part)) + 1
+        found.append(Block(match["language"] if match["fence"] else part, match[part], line, match["why"]))
+    return found
 
 
 @pytest.fixture
@@ -78,30 +80,33 @@ def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monk
         place = f"{page}:{block.line}"
         if block.why is not None:
             continue
-        if block.language == "python":
+        if block.language == "table":
+            for words in tried(block.code):
+                try_(words, names)
+        elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(ROOT / page), "exec"), names)
         elif block.language == "sh":
             run(block.code, place, shell)
         else:
             read(block, place)
-    for words in dict.fromkeys(tried(text)):
-        try_(words, names)
 
 
-def tried(text: str) -> list[str]:
-    """What stands as code in all but the first columns of the tables that say so."""
-    rows = [row.split("|")[2:] for table in _TRIED.findall(text) for row in table.splitlines() if row]
-    return [words for cells in rows for words in re.findall(r"`([^`]+)`", "|".join(cells))]
+def tried(table: str) -> list[str]:
+    """What stands as code in all columns but the first, everything once."""
+    rows = (row.partition("|")[2].partition("|")[2] for row in table.splitlines())
+    return list(dict.fromkeys(words for cells in rows for words in re.findall(r"`([^`]+)`", cells)))
 
 
 def try_(words: str, names: dict[str, object]) -> None:
-    """Run a command, in this process, or evaluate a call; what else stands as code is a name."""
+    """Run a command, in this process, or Python that begins with a name known by then; what else is code is a word."""
+    first = re.match(r"\w*", words)
+    assert first is not None
     if words.startswith("osimlite "):
         with pytest.raises(SystemExit) as ended:
             main(shlex.split(words)[1:])
         assert ended.value.code in (0, None), words
-    elif "(" in words:
-        eval(compile(words, words, "eval"), names)
+    elif first[0] in names or " = " in words:
+        exec(compile(words, words, "exec"), names)
 
 
 def run(commands: str, place: str, shell: dict[str, str]) -> None:
@@ -126,6 +131,17 @@ def read(block: Block, place: str) -> None:
         etree.fromstring(f"<all>{block.code}</all>")
     else:
         assert block.language in READ_ONLY, f"{place}: a block of {block.language} that nobody runs"
+
+
+def test_the_code_of_a_table_is_found_and_fails() -> None:
+    text = "<!-- tried: the second column -->\n| a | b |\n|---|---|\n| `no()` | `x = 1`, `x.y` or `--z`; `x = 1` |\n"
+    (block,) = blocks(text)
+    assert (block.language, block.line) == ("table", 2) and tried(block.code) == ["x = 1", "x.y", "--z"]
+    names: dict[str, object] = {}
+    try_("x = 1", names)
+    try_("--z", names)
+    with pytest.raises(AttributeError):
+        try_("x.y", names)
 
 
 def test_a_block_that_is_not_run_is_found() -> None:
