@@ -7,9 +7,11 @@ import io
 import ntpath
 import os
 import sys
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from osimlite import validate
@@ -21,6 +23,7 @@ from osimlite.files import from_folder, write_atomically
 from osimlite.lint.config import Config
 from osimlite.lint.many import check_files
 from osimlite.simulation import Trajectory
+from osimlite.sweep.pools import _LocalPool
 
 
 class Results:
@@ -69,6 +72,19 @@ def test_files_are_checked_by_processes_that_begin_from_nothing(
     monkeypatch.setattr("sys.platform", "darwin")
     spawned = check_files(files, Config(), cached=False, processes=2)
     assert spawned.findings == alone.findings and alone.findings
+
+
+def test_a_script_that_processes_run_anew_is_told_where_a_sweep_begins() -> None:
+    class Ending(ThreadPoolExecutor):
+        def submit(self, *work: object, **words: object) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_exception(BrokenExecutor())
+            return future
+
+    pool = _LocalPool(Ending(1), cast(Any, None), 1)
+    pool.submit(0, np.zeros(1))
+    with pytest.raises(OsimliteError, match="begins a sweep under if __name__ == '__main__':"):
+        pool.result()
 
 
 def test_a_library_call_starts_no_processes_that_would_run_the_callers_script_anew(

@@ -115,7 +115,11 @@ class _LocalPool:
         try:
             return tag, future.result()
         except BrokenExecutor:
-            raise OsimliteError("a process of the sweep was ended from outside; go on with --resume") from None
+            # New processes run the module anew that the program began with.
+            raise OsimliteError(
+                "a process of the sweep has ended; a script begins a sweep under if __name__ == '__main__':, and what "
+                "was ended from outside goes on with --resume"
+            ) from None
 
     def close(self) -> None:
         """Stop what has not begun, and wait for the rest."""
