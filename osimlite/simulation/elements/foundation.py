@@ -222,7 +222,7 @@ class _Meshes:
         load: Load = ZERO, ZERO, 0.0
         if np.linalg.norm(about - other) < first.radius + second.radius:
             links = self.one.link, self.two.link
-            v = minus(*(velocity(s, w, link, *point) for link in links))
+            v = minus(*(velocity(s, w, link, point) for link in links))
             load = self.springs.load(one, two, point, v, minus(*(angular_velocity(s, w, link) for link in links)))
         load_mesh(s, w, item, point, *load)
 
@@ -232,5 +232,5 @@ class _Meshes:
         if link < 0:
             return Pose(frame[:3, :3], frame[:3, 3])
         start = s[WORK_LINK] + LINK_WORK * link
-        x, y, z = frame[:3, 3].tolist()
-        return Pose(w[start : start + 9].reshape(3, 3) @ frame[:3, :3], np.array(station(s, w, link, x, y, z)))
+        origin = np.array(station(s, w, link, triple(frame[:3, 3])))
+        return Pose(w[start : start + 9].reshape(3, 3) @ frame[:3, :3], origin)

@@ -58,7 +58,7 @@ from osimlite.simulation.kernels.layout import NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.least_squares import factor_room, factorise, minimum_norm
 from osimlite.simulation.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
+from osimlite.simulation.kernels.points import apply_force, place_frame, station, velocity
 
 COUNT, SOLVER, ELEMENTS = OWN + 1, OWN + 2, OWN + 3
 """Integers of a cable: how many elements it has, where in its record room for the search is, and the elements."""
@@ -120,12 +120,9 @@ def place_element(s: Ints, w: Floats, element: Ints, p: Floats, found: Floats) -
     """Where an element is in ground; where an obstacle is touched at first."""
     own, kept, link = at(p, element[AT]), at(found, element[KEPT]), element[LINK]
     if element[IS_OBSTACLE] == 0:
-        put(kept, 0, station(s, w, link, own[PLACE], own[PLACE + 1], own[PLACE + 2]))
+        put(kept, 0, station(s, w, link, vector(own, PLACE)))
         return
-    pose = at(kept, IN_GROUND)
-    for axis in range(3):
-        pose[axis], pose[3 + axis], pose[6 + axis] = direction(s, w, link, own[axis], own[3 + axis], own[6 + axis])
-    put(pose, 9, station(s, w, link, own[9], own[10], own[11]))
+    place_frame(s, w, link, own, vector(own, 9), at(kept, IN_GROUND))
     for k in range(TOUCH_NUMBERS):
         kept[k] = own[BEGIN + k]
 
@@ -386,26 +383,20 @@ def speed(s: Ints, w: Floats, count: int, elements: Ints, found: Floats) -> floa
     """Lengthening speed, that of the straight parts; their ends on obstacles move with these."""
     total = 0.0
     here = vector(found, elements[KEPT])
-    moves = velocity_of(s, w, elements[LINK], here)
+    moves = velocity(s, w, elements[LINK], here)
     for k in range(1, count):
         element = at(elements, ELEMENT_INTS * k)
         kept = at(found, element[KEPT])
         if element[IS_OBSTACLE] == 0 or kept[STATE] == TOUCHES:
             place = 0 if element[IS_OBSTACLE] == 0 else GROUND_START + POINT
             ahead = vector(kept, place)
-            ahead_moves = velocity_of(s, w, element[LINK], ahead)
+            ahead_moves = velocity(s, w, element[LINK], ahead)
             total += dot(unit(minus(ahead, here)), minus(ahead_moves, moves))
             here, moves = ahead, ahead_moves
             if element[IS_OBSTACLE] != 0:
                 here = vector(kept, GROUND_END + POINT)
-                moves = velocity_of(s, w, element[LINK], here)
+                moves = velocity(s, w, element[LINK], here)
     return total
-
-
-def velocity_of(s: Ints, w: Floats, link: int, point: Vector) -> Vector:
-    """Velocity of the point of a link that is at a point of ground."""
-    x, y, z = point
-    return velocity(s, w, link, x, y, z)
 
 
 def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -419,20 +410,13 @@ def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         element = at(elements, ELEMENT_INTS * k)
         own, kept, link = at(p, element[AT]), at(found, element[KEPT]), element[LINK]
         if element[IS_OBSTACLE] == 0:
-            place = station(s, w, link, own[PULLED], own[PULLED + 1], own[PULLED + 2])
+            place = station(s, w, link, vector(own, PULLED))
             if k > 0:
-                push(s, w, link, place, times(-tension, vector(kept, BEFORE)))
+                apply_force(s, w, link, place, times(-tension, vector(kept, BEFORE)))
             if k < last:
-                push(s, w, link, place, times(tension, vector(kept, AFTER)))
+                apply_force(s, w, link, place, times(tension, vector(kept, AFTER)))
         elif kept[STATE] == TOUCHES:
             start, end = at(kept, GROUND_START), at(kept, GROUND_END)
-            push(s, w, link, vector(start, POINT), times(-tension, vector(start, ALONG)))
-            push(s, w, link, vector(end, POINT), times(tension, vector(end, ALONG)))
+            apply_force(s, w, link, vector(start, POINT), times(-tension, vector(start, ALONG)))
+            apply_force(s, w, link, vector(end, POINT), times(tension, vector(end, ALONG)))
     return OK
-
-
-def push(s: Ints, w: Floats, link: int, point: Vector, force: Vector) -> None:
-    """Apply a force to a link at a point of ground."""
-    x, y, z = point
-    fx, fy, fz = force
-    apply_force(s, w, link, x, y, z, fx, fy, fz)

@@ -7,8 +7,7 @@ What a unit of a vector's rate takes of the speeds is what a force along it woul
 
 from __future__ import annotations
 
-from math import sqrt
-
+from osimlite.forces.vectors import ZERO, Vector, cross, dot, minus, norm, over, plus, times, vector
 from osimlite.simulation.kernels.functions import MONOMIALS, several_at, value_at
 from osimlite.simulation.kernels.layout import (
     ABOVE,
@@ -26,7 +25,6 @@ from osimlite.simulation.kernels.layout import (
     NUMBERS,
     OK,
     ORIGIN,
-    SCRATCH,
     TIME,
     WORK_COLUMN,
     WORK_DRIFTS,
@@ -132,119 +130,84 @@ def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint:
     """Some equations between bodies; its integers and numbers are theirs."""
     i, h = at(s, constraint), at(s, s[CONSTRAINED])
     first, size = i[FIRST_EQUATION], s[FREEDOMS]
-    one, two = at(w, SCRATCH), at(w, SCRATCH + 9)
     for row in range(first, i[END_EQUATION]):
         own, p = (
             at(i, CONSTRAINT_OWN + EQUATION_INTS * (row - first)),
             at(x, i[NUMBERS] + EQUATION_NUMBERS * (row - first)),
         )
-        a, b, q, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), at(p, 6), p[12]
+        one, two, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), p[12]
         to = at(w, h[WORK_ROWS] + size * row)
-        follow(s, x, w, a, p, one)
-        follow(s, x, w, b, q, two)
-        ax, ay, az, bx, by, bz = one[0], one[1], one[2], two[0], two[1], two[2]
+        a, a_rate, a_bias = follow(s, x, w, one, p)
+        b, b_rate, b_bias = follow(s, x, w, two, at(p, 6))
         error = drift = 0.0
         if own[0] == PRODUCT:
-            error = ax * bx + ay * by + az * bz - wanted
-            drift = ax * two[6] + ay * two[7] + az * two[8] + bx * one[6] + by * one[7] + bz * one[8]
-            drift += 2.0 * (one[3] * two[3] + one[4] * two[4] + one[5] * two[5])
-            lean(s, w, a, p, bx, by, bz, to)
-            lean(s, w, b, q, ax, ay, az, to)
+            error = dot(a, b) - wanted
+            drift = dot(a, b_bias) + dot(b, a_bias) + 2.0 * dot(a_rate, b_rate)
+            lean(s, w, one, p, b, to)
+            lean(s, w, two, at(p, 6), a, to)
         elif own[0] == DISTANCE:
-            length = sqrt(bx * bx + by * by + bz * bz)
+            length = norm(b)
             error = length - wanted
             # No direction is better than another to leave a point in.
-            ex, ey, ez, stretch = 1.0, 0.0, 0.0, 0.0
+            e, stretch = (1.0, 0.0, 0.0), 0.0
             if length > 0.0:
-                ex, ey, ez = bx / length, by / length, bz / length
-                along = ex * two[3] + ey * two[4] + ez * two[5]
-                stretch = (two[3] * two[3] + two[4] * two[4] + two[5] * two[5] - along * along) / length
-            drift = ex * two[6] + ey * two[7] + ez * two[8] + stretch
-            lean(s, w, b, q, ex, ey, ez, to)
+                e = over(b, length)
+                stretch = (dot(b_rate, b_rate) - dot(e, b_rate) ** 2) / length
+            drift = dot(e, b_bias) + stretch
+            lean(s, w, two, at(p, 6), e, to)
         else:
-            drift = slip(s, w, b, q, one, two, to)
+            surface, roller, point = two[1], two[2], station(s, w, two[1], vector(p, 6))
+            add_force(s, w, surface, point, times(-1.0, a), to)
+            add_force(s, w, roller, point, a, to)
+            turning, turning_bias = angular_velocity(s, w, roller), angular_acceleration_bias(s, w, roller)
+            drift = dot(a_rate, minus(b_rate, cross(turning, b)))
+            drift += dot(a, minus(minus(b_bias, cross(turning_bias, b)), cross(turning, b_rate)))
         w[h[WORK_ERRORS] + row], w[h[WORK_DRIFTS] + row] = error, -drift
     return OK
 
 
-def follow(s: Ints, x: Floats, w: Floats, vector: Ints, p: Floats, found: Floats) -> None:
+def follow(s: Ints, x: Floats, w: Floats, kind: Ints, p: Floats) -> tuple[Vector, Vector, Vector]:
     """A vector, its rate, and its second derivative while no speed changes."""
-    one, two = vector[1], vector[2]
-    if vector[0] == AXIS:
-        ex, ey, ez = direction(s, w, one, p[0], p[1], p[2])
-        wx, wy, wz = angular_velocity(s, w, one)
-        tx, ty, tz = angular_acceleration_bias(s, w, one)
-        rx, ry, rz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
-        found[0], found[1], found[2], found[3], found[4], found[5] = ex, ey, ez, rx, ry, rz
-        found[6] = ty * ez - tz * ey + wy * rz - wz * ry
-        found[7] = tz * ex - tx * ez + wz * rx - wx * rz
-        found[8] = tx * ey - ty * ex + wx * ry - wy * rx
-        return
-    ax, ay, az = station(s, w, one, p[0], p[1], p[2])
-    bx, by, bz = station(s, w, two, p[3], p[4], p[5])
-    found[0], found[1], found[2] = bx - ax, by - ay, bz - az
-    if vector[0] == MEETING:
-        ax, ay, az = bx, by, bz
-    ux, uy, uz = velocity(s, w, one, ax, ay, az)
-    vx, vy, vz = velocity(s, w, two, bx, by, bz)
-    found[3], found[4], found[5] = vx - ux, vy - uy, vz - uz
-    ux, uy, uz = acceleration(s, x, w, one, ax, ay, az)
-    vx, vy, vz = acceleration(s, x, w, two, bx, by, bz)
-    found[6], found[7], found[8] = vx - ux, vy - uy, vz - uz
+    one, two = kind[1], kind[2]
+    if kind[0] == AXIS:
+        axis, turning = direction(s, w, one, vector(p, 0)), angular_velocity(s, w, one)
+        rate = cross(turning, axis)
+        return axis, rate, plus(cross(angular_acceleration_bias(s, w, one), axis), cross(turning, rate))
+    start, end = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 3))
+    arm = minus(end, start)
+    if kind[0] == MEETING:
+        start = end
+    rate = minus(velocity(s, w, two, end), velocity(s, w, one, start))
+    return arm, rate, minus(acceleration(s, x, w, two, end), acceleration(s, x, w, one, start))
 
 
-def lean(s: Ints, w: Floats, vector: Ints, p: Floats, dx: float, dy: float, dz: float, row: Floats) -> None:
+def lean(s: Ints, w: Floats, kind: Ints, p: Floats, on: Vector, row: Floats) -> None:
     """Add to a row what the speeds do to a vector along a direction."""
-    one, two = vector[1], vector[2]
-    if vector[0] == AXIS:
-        ex, ey, ez = direction(s, w, one, p[0], p[1], p[2])
-        add_wrench(s, w, one, ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx, 0.0, 0.0, 0.0, row)
+    one, two = kind[1], kind[2]
+    if kind[0] == AXIS:
+        add_wrench(s, w, one, cross(direction(s, w, one, vector(p, 0)), on), ZERO, row)
         return
-    ax, ay, az = station(s, w, one, p[0], p[1], p[2])
-    bx, by, bz = station(s, w, two, p[3], p[4], p[5])
-    if vector[0] == MEETING:
-        ax, ay, az = bx, by, bz
-    add_force(s, w, one, ax, ay, az, -dx, -dy, -dz, row)
-    add_force(s, w, two, bx, by, bz, dx, dy, dz, row)
+    start, end = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 3))
+    if kind[0] == MEETING:
+        start = end
+    add_force(s, w, one, start, times(-1.0, on), row)
+    add_force(s, w, two, end, on, row)
 
 
-def slip(s: Ints, w: Floats, arm: Ints, p: Floats, one: Floats, two: Floats, row: Floats) -> float:
-    """Row of a slip along the first vector; returns its rate while no speed changes."""
-    surface, roller = arm[1], arm[2]
-    ex, ey, ez, bx, by, bz, vx, vy, vz = one[0], one[1], one[2], two[0], two[1], two[2], two[3], two[4], two[5]
-    px, py, pz = station(s, w, surface, p[0], p[1], p[2])
-    add_force(s, w, surface, px, py, pz, -ex, -ey, -ez, row)
-    add_force(s, w, roller, px, py, pz, ex, ey, ez, row)
-    wx, wy, wz = angular_velocity(s, w, roller)
-    tx, ty, tz = angular_acceleration_bias(s, w, roller)
-    drift: float = (
-        one[3] * (vx - wy * bz + wz * by) + one[4] * (vy - wz * bx + wx * bz) + one[5] * (vz - wx * by + wy * bx)
-    )
-    drift += ex * (two[6] - ty * bz + tz * by - wy * vz + wz * vy)
-    drift += ey * (two[7] - tz * bx + tx * bz - wz * vx + wx * vz)
-    drift += ez * (two[8] - tx * by + ty * bx - wx * vy + wy * vx)
-    return drift
-
-
-def add_force(
-    s: Ints, w: Floats, link: int, px: float, py: float, pz: float, fx: float, fy: float, fz: float, row: Floats
-) -> None:
+def add_force(s: Ints, w: Floats, link: int, point: Vector, force: Vector, row: Floats) -> None:
     """Add what a force at a point of ground on a link does to the coordinates."""
     if link >= 0:
-        o = at(w, s[WORK_LINK] + LINK_WORK * link + ORIGIN)
-        px, py, pz = px - o[0], py - o[1], pz - o[2]
-        add_wrench(s, w, link, py * fz - pz * fy, pz * fx - px * fz, px * fy - py * fx, fx, fy, fz, row)
+        arm = minus(point, vector(w, s[WORK_LINK] + LINK_WORK * link + ORIGIN))
+        add_wrench(s, w, link, cross(arm, force), force, row)
 
 
-def add_wrench(
-    s: Ints, w: Floats, link: int, tx: float, ty: float, tz: float, fx: float, fy: float, fz: float, row: Floats
-) -> None:
+def add_wrench(s: Ints, w: Floats, link: int, torque: Vector, force: Vector, row: Floats) -> None:
     """Add what a wrench about the origin of the spatial vectors does to the coordinates."""
     if link < 0:
         return
     # Every link has a degree of freedom of its own.
     freedom = s[s[LINK_AT] + LINK_INTS * link + END_FREEDOM] - 1
     while freedom >= 0:
-        c = at(w, s[WORK_COLUMN] + 6 * freedom)
-        row[freedom] += tx * c[0] + ty * c[1] + tz * c[2] + fx * c[3] + fy * c[4] + fz * c[5]
+        column = s[WORK_COLUMN] + 6 * freedom
+        row[freedom] += dot(torque, vector(w, column)) + dot(force, vector(w, column + 3))
         freedom = s[s[FREEDOM_AT] + FREEDOM_INTS * freedom + ABOVE]

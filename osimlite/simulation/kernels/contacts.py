@@ -7,7 +7,7 @@ The numbers of a pair are the centre and the normal of surface 1 in its link, it
 from __future__ import annotations
 
 from osimlite.forces.hunt_crossley import contact_force, half_space_sphere, sphere_sphere
-from osimlite.forces.vectors import Vector, minus, put
+from osimlite.forces.vectors import Vector, minus, put, times, vector
 from osimlite.simulation.kernels.layout import NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
@@ -20,8 +20,8 @@ def touch_half_space(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     """A sphere on a half space."""
     i = at(s, item)
     one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
-    o, n = station(s, w, one, p[0], p[1], p[2]), direction(s, w, one, p[3], p[4], p[5])
-    d, point = half_space_sphere(o, n, station(s, w, two, p[7], p[8], p[9]), p[10], p[12])
+    o, n = station(s, w, one, vector(p, 0)), direction(s, w, one, vector(p, 3))
+    d, point = half_space_sphere(o, n, station(s, w, two, vector(p, 7)), p[10], p[12])
     if d > 0.0:
         press(s, x, w, item, d, p[10], n, point)
     return OK
@@ -31,7 +31,7 @@ def touch_spheres(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
     """Two spheres."""
     i = at(s, item)
     p = at(x, i[NUMBERS])
-    one, two = station(s, w, i[OWN], p[0], p[1], p[2]), station(s, w, i[OWN + 1], p[7], p[8], p[9])
+    one, two = station(s, w, i[OWN], vector(p, 0)), station(s, w, i[OWN + 1], vector(p, 7))
     d, radius, n, point = sphere_sphere(one, p[6], two, p[10], p[12])
     if d > 0.0:
         press(s, x, w, item, d, radius, n, point)
@@ -42,11 +42,10 @@ def press(s: Ints, x: Floats, w: Floats, item: int, d: float, radius: float, n: 
     """The force of a contact of a depth at a point, on both surfaces and in the record."""
     i = at(s, item)
     one, two, p, found = i[OWN], i[OWN + 1], at(x, i[NUMBERS]), at(w, i[RECORD])
-    px, py, pz = point
-    v = minus(velocity(s, w, one, px, py, pz), velocity(s, w, two, px, py, pz))
-    fx, fy, fz = force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
+    v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
+    force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
     put(found, 0, force)
     put(found, 3, point)
     found[6], found[7] = d, radius
-    apply_force(s, w, two, px, py, pz, fx, fy, fz)
-    apply_force(s, w, one, px, py, pz, -fx, -fy, -fz)
+    apply_force(s, w, two, point, force)
+    apply_force(s, w, one, point, times(-1.0, force))

@@ -68,7 +68,7 @@ from osimlite.simulation.kernels.paths import (
 )
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import direction, station
+from osimlite.simulation.kernels.points import place_frame
 
 WRAP_INTS = 4
 PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
@@ -144,10 +144,7 @@ def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
     for number in range(i[WRAPS]):
         node, pose = at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)), at(poses, POSE_NUMBERS * number)
         n = at(p, node[AT])
-        link, t = node[LINK], at(n, TURN)
-        for axis in range(3):
-            pose[axis], pose[3 + axis], pose[6 + axis] = direction(s, w, link, t[axis], t[3 + axis], t[6 + axis])
-        put(pose, 9, station(s, w, link, n[STATION], n[STATION + 1], n[STATION + 2]))
+        place_frame(s, w, node[LINK], at(n, TURN), vector(n, STATION), pose)
         pose[HOW] = NOT
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.forces.elastic_foundation import spring_in_half_space, spring_in_sphere, spring_load
-from osimlite.forces.vectors import ZERO, Vector, dot, minus, plus, put
+from osimlite.forces.vectors import ZERO, Vector, dot, minus, norm, plus, put, times, vector
 from osimlite.simulation.kernels.layout import CONTACT_AT, DEPTH_OF, FIRST_CONTACT, NUMBERS, OK, OWN, RECORD
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
@@ -27,21 +27,20 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     p, found = at(x, i[NUMBERS]), at(w, i[RECORD])
     for k in range(MESH_WORK):
         found[k] = 0.0
-    o, about = station(s, w, one, p[0], p[1], p[2]), station(s, w, two, p[7], p[8], p[9])
-    n, way = direction(s, w, one, p[3], p[4], p[5]), minus(about, o)
+    o, about = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 7))
+    n, way = direction(s, w, one, vector(p, 3)), minus(about, o)
     if is_plane:
         if dot(way, n) >= p[10]:
             return OK
     elif dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OK
-    ax, ay, az = about
-    v = minus(velocity(s, w, one, ax, ay, az), velocity(s, w, two, ax, ay, az))
+    v = minus(velocity(s, w, one, about), velocity(s, w, two, about))
     turning = minus(angular_velocity(s, w, one), angular_velocity(s, w, two))
     force = torque = ZERO
     energy = 0.0
     for k in range(count):
         spring = at(p, SPRINGS + 4 * k)
-        middle = station(s, w, two, spring[1], spring[2], spring[3])
+        middle = station(s, w, two, vector(spring, 1))
         d, end = spring_in_half_space(o, n, middle) if is_plane else spring_in_sphere(o, p[6], middle)
         if d > 0.0:
             push, turn, stored = spring_load(
@@ -63,10 +62,9 @@ def load_mesh(s: Ints, w: Floats, item: int, about: Vector, force: Vector, torqu
     put(contact, 0, force)
     put(contact, 3, about)
     found[9] = energy
-    (ax, ay, az), (fx, fy, fz), (tx, ty, tz) = about, force, torque
-    apply_force(s, w, two, ax, ay, az, fx, fy, fz)
-    apply_torque(s, w, two, tx, ty, tz)
-    apply_force(s, w, one, ax, ay, az, -fx, -fy, -fz)
-    apply_torque(s, w, one, -tx, -ty, -tz)
-    if fx != 0.0 or fy != 0.0 or fz != 0.0:
+    apply_force(s, w, two, about, force)
+    apply_torque(s, w, two, torque)
+    apply_force(s, w, one, about, times(-1.0, force))
+    apply_torque(s, w, one, times(-1.0, torque))
+    if norm(force) != 0.0:
         contact[DEPTH_OF] = 1.0

@@ -39,7 +39,7 @@ from osimlite.simulation.kernels.paths import (
     spot,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
-from osimlite.simulation.kernels.points import direction, station
+from osimlite.simulation.kernels.points import place_frame
 from osimlite.simulation.kernels.wrapping import (
     ENDS,
     FIRST_END,
@@ -107,10 +107,7 @@ def place_surfaces(s: Ints, x: Floats, w: Floats, item: int) -> None:
         if back > 0:
             node, pose = at(i, NODES_AT + NODE_INTS * number), at(w, s[item - back + RECORD] + POSE)
             n = at(p, node[AT])
-            link, t = node[LINK], at(n, TURN)
-            for axis in range(3):
-                pose[axis], pose[3 + axis], pose[6 + axis] = direction(s, w, link, t[axis], t[3 + axis], t[6 + axis])
-            pose[9], pose[10], pose[11] = station(s, w, link, n[STATION], n[STATION + 1], n[STATION + 2])
+            place_frame(s, w, node[LINK], at(n, TURN), vector(n, STATION), pose)
 
 
 def take_out(s: Ints, w: Floats, item: int, number: int) -> None:

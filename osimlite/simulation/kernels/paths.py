@@ -79,7 +79,7 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
     for number in range(i[POINTS]):
         node, here = at(i, NODES_AT + NODE_INTS * number), at(work, NODE_WORK * number)
         n = at(p, node[AT])
-        px, py, pz = n[STATION], n[STATION + 1], n[STATION + 2]
+        point = vector(n, STATION)
         if node[KIND] != FIXED:
             value = y[node[OF]] if node[OF] >= 0 else n[VALUE]
             if node[KIND] == CONDITIONAL:
@@ -98,10 +98,9 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
                     _, dx, _ = value_at(at(p, node[TABLES]), value)
                     _, dy, _ = value_at(at(p, node[TABLES + 1]), value)
                     _, dz, _ = value_at(at(p, node[TABLES + 2]), value)
-                px, py, pz = plus((px, py, pz), turned(t, (qx, qy, qz)))
-                gx, gy, gz = turned(t, (dx, dy, dz))
-                put(here, GRADIENT, direction(s, w, node[LINK], gx, gy, gz))
-        put(here, PLACE, station(s, w, node[LINK], px, py, pz))
+                point = plus(point, turned(t, (qx, qy, qz)))
+                put(here, GRADIENT, direction(s, w, node[LINK], turned(t, (dx, dy, dz))))
+        put(here, PLACE, station(s, w, node[LINK], point))
         order[count] = number
         count += 1
     found[COUNT] = count
@@ -142,7 +141,7 @@ def spot(node: Ints, here: Floats) -> Vector:
 
 def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
     """Velocity of a node; tangent points move with the body of their surface."""
-    v = velocity(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2])
+    v = velocity(s, w, node[LINK], vector(here, PLACE))
     if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
         return along(v, y[s[FREEDOMS] + node[OF]], vector(here, GRADIENT))
     return v
@@ -163,8 +162,8 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
         back, pull = pull, (0.0, 0.0, 0.0)
         if k < last and nodes[NODE_INTS * int(order[k + 1]) + BODY] != node[BODY]:
             pull = times(tension, vector(here, ALONG))
-        fx, fy, fz = force = minus(pull, back)
-        apply_force(s, w, node[LINK], here[PLACE], here[PLACE + 1], here[PLACE + 2], fx, fy, fz)
+        force = minus(pull, back)
+        apply_force(s, w, node[LINK], vector(here, PLACE), force)
         if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
             f[s[FREEDOMS] + node[OF]] += dot(force, vector(here, GRADIENT))
     return OK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import put, vector
 from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, LAWS, NUMBERS, OK, OWN, POSITION_STAGE, STATE_SIZE
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
@@ -30,7 +31,7 @@ def contact_places(
         for pair in range(pairs):
             i, to = at(s, s[s[CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
             a, one, two = at(x, i[NUMBERS]), i[OWN], i[OWN + 1]
-            to[0], to[1], to[2] = station(s, w, one, a[0], a[1], a[2])
-            to[3], to[4], to[5] = direction(s, w, one, a[3], a[4], a[5])
-            to[6], to[7], to[8] = station(s, w, two, a[7], a[8], a[9])
+            put(to, 0, station(s, w, one, vector(a, 0)))
+            put(to, 3, direction(s, w, one, vector(a, 3)))
+            put(to, 6, station(s, w, two, vector(a, 7)))
     return OK

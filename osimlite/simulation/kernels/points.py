@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import ZERO, Vector, cross, minus, plus, put, turned, vector
 from osimlite.simulation.kernels.layout import (
     ACCELERATION,
     GRAVITY_AT,
@@ -15,11 +16,12 @@ from osimlite.simulation.kernels.layout import (
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
 
-def station(s: Ints, w: Floats, link: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def station(s: Ints, w: Floats, link: int, point: Vector) -> Vector:
     """Position in ground of a point of a link."""
     if link < 0:
-        return x, y, z
+        return point
     r = at(w, s[WORK_LINK] + LINK_WORK * link)
+    x, y, z = point
     return (
         r[POSITION] + r[0] * x + r[1] * y + r[2] * z,
         r[POSITION + 1] + r[3] * x + r[4] * y + r[5] * z,
@@ -27,40 +29,40 @@ def station(s: Ints, w: Floats, link: int, x: float, y: float, z: float) -> tupl
     )
 
 
-def direction(s: Ints, w: Floats, link: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def direction(s: Ints, w: Floats, link: int, along: Vector) -> Vector:
     """A direction of a link, in ground."""
-    if link < 0:
-        return x, y, z
-    r = at(w, s[WORK_LINK] + LINK_WORK * link)
-    return r[0] * x + r[1] * y + r[2] * z, r[3] * x + r[4] * y + r[5] * z, r[6] * x + r[7] * y + r[8] * z
+    return along if link < 0 else turned(at(w, s[WORK_LINK] + LINK_WORK * link), along)
 
 
-def velocity(s: Ints, w: Floats, link: int, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Velocity of the point of a link that is at (x, y, z) in ground."""
+def place_frame(s: Ints, w: Floats, link: int, rows: Floats, point: Vector, pose: Floats) -> None:
+    """Where a frame of a link is in ground, whose rotation there is given by rows: its own by rows, then its origin."""
+    for k in range(3):
+        pose[k], pose[3 + k], pose[6 + k] = direction(s, w, link, (rows[k], rows[3 + k], rows[6 + k]))
+    put(pose, 9, station(s, w, link, point))
+
+
+def velocity(s: Ints, w: Floats, link: int, point: Vector) -> Vector:
+    """Velocity of the point of a link that is at a point of ground."""
     if link < 0:
-        return 0.0, 0.0, 0.0
+        return ZERO
     here = at(w, s[WORK_LINK] + LINK_WORK * link)
-    v, px, py, pz = at(here, VELOCITY), x - here[ORIGIN], y - here[ORIGIN + 1], z - here[ORIGIN + 2]
+    v = at(here, VELOCITY)
+    px, py, pz = minus(point, vector(here, ORIGIN))
     return v[3] + v[1] * pz - v[2] * py, v[4] + v[2] * px - v[0] * pz, v[5] + v[0] * py - v[1] * px
 
 
-def angular_velocity(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
+def angular_velocity(s: Ints, w: Floats, link: int) -> Vector:
     """Angular velocity of a link."""
-    if link < 0:
-        return 0.0, 0.0, 0.0
-    v = at(w, s[WORK_LINK] + LINK_WORK * link + VELOCITY)
-    return v[0], v[1], v[2]
+    return ZERO if link < 0 else vector(w, s[WORK_LINK] + LINK_WORK * link + VELOCITY)
 
 
-def acceleration(
-    s: Ints, x: Floats, w: Floats, link: int, px: float, py: float, pz: float
-) -> tuple[float, float, float]:
-    """Acceleration of the point of a link that is at (px, py, pz) in ground, while the speeds do not change."""
+def acceleration(s: Ints, x: Floats, w: Floats, link: int, point: Vector) -> Vector:
+    """Acceleration of the point of a link that is at a point of ground, while the speeds do not change."""
     if link < 0:
-        return 0.0, 0.0, 0.0
+        return ZERO
     here = at(w, s[WORK_LINK] + LINK_WORK * link)
     v, a, g = at(here, VELOCITY), at(here, ACCELERATION), at(x, GRAVITY_AT)
-    px, py, pz = px - here[ORIGIN], py - here[ORIGIN + 1], pz - here[ORIGIN + 2]
+    px, py, pz = minus(point, vector(here, ORIGIN))
     wx, wy, wz = v[0], v[1], v[2]
     vx, vy, vz = v[3] + wy * pz - wz * py, v[4] + wz * px - wx * pz, v[5] + wx * py - wy * px
     # Links are pushed upwards against gravity.
@@ -71,33 +73,23 @@ def acceleration(
     )
 
 
-def angular_acceleration_bias(s: Ints, w: Floats, link: int) -> tuple[float, float, float]:
+def angular_acceleration_bias(s: Ints, w: Floats, link: int) -> Vector:
     """Angular acceleration of a link while the speeds do not change."""
-    if link < 0:
-        return 0.0, 0.0, 0.0
-    a = at(w, s[WORK_LINK] + LINK_WORK * link + ACCELERATION)
-    return a[0], a[1], a[2]
+    return ZERO if link < 0 else vector(w, s[WORK_LINK] + LINK_WORK * link + ACCELERATION)
 
 
-def apply_force(s: Ints, w: Floats, link: int, x: float, y: float, z: float, fx: float, fy: float, fz: float) -> None:
+def apply_force(s: Ints, w: Floats, link: int, point: Vector, force: Vector) -> None:
     """Apply a force at a point of ground to a link."""
     if link < 0:
         return
     here = at(w, s[WORK_LINK] + LINK_WORK * link)
-    load, px, py, pz = at(here, WRENCH), x - here[ORIGIN], y - here[ORIGIN + 1], z - here[ORIGIN + 2]
-    load[0] += py * fz - pz * fy
-    load[1] += pz * fx - px * fz
-    load[2] += px * fy - py * fx
-    load[3] += fx
-    load[4] += fy
-    load[5] += fz
+    load = at(here, WRENCH)
+    put(load, 0, plus(vector(load, 0), cross(minus(point, vector(here, ORIGIN)), force)))
+    put(load, 3, plus(vector(load, 3), force))
 
 
-def apply_torque(s: Ints, w: Floats, link: int, tx: float, ty: float, tz: float) -> None:
+def apply_torque(s: Ints, w: Floats, link: int, torque: Vector) -> None:
     """Apply a torque to a link."""
-    if link < 0:
-        return
-    load = at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
-    load[0] += tx
-    load[1] += ty
-    load[2] += tz
+    if link >= 0:
+        load = at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
+        put(load, 0, plus(vector(load, 0), torque))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.forces.ellipsoid_contact import Axes, ellipsoid_ellipsoid, half_space_ellipsoid
-from osimlite.forces.vectors import dot, minus, vector
+from osimlite.forces.vectors import dot, minus, put, vector
 from osimlite.simulation.kernels.contacts import press
 from osimlite.simulation.kernels.layout import (
     CONTACT_AT,
@@ -25,8 +25,8 @@ def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
     """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
     i = at(s, item)
     one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
-    o, n = station(s, w, one, p[0], p[1], p[2]), direction(s, w, one, p[3], p[4], p[5])
-    center = station(s, w, two, p[7], p[8], p[9])
+    o, n = station(s, w, one, vector(p, 0)), direction(s, w, one, vector(p, 3))
+    center = station(s, w, two, vector(p, 7))
     d, radius, point = half_space_ellipsoid(o, n, center, axes(s, w, two, at(p, 18)), vector(p, 27), p[12])
     if d > 0.0:
         press(s, x, w, item, d, radius, n, point)
@@ -37,7 +37,7 @@ def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
     i = at(s, item)
     one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
-    a, b = station(s, w, one, p[0], p[1], p[2]), station(s, w, two, p[7], p[8], p[9])
+    a, b = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 7))
     way = minus(b, a)
     if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OK
@@ -50,8 +50,8 @@ def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
 
 def axes(s: Ints, w: Floats, link: int, p: Floats) -> Axes:
     """The axes of an ellipsoid in ground."""
-    one, two = direction(s, w, link, p[0], p[1], p[2]), direction(s, w, link, p[3], p[4], p[5])
-    return one, two, direction(s, w, link, p[6], p[7], p[8])
+    one, two = direction(s, w, link, vector(p, 0)), direction(s, w, link, vector(p, 3))
+    return one, two, direction(s, w, link, vector(p, 6))
 
 
 def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -65,8 +65,7 @@ def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
     count, pairs, links, p, room = i[OWN], i[OWN + 1], at(i, OWN + 2), at(x, i[NUMBERS]), at(w, i[RECORD])
     centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
     for k in range(count):
-        c = at(centers, 3 * k)
-        c[0], c[1], c[2] = station(s, w, links[k], p[4 * k], p[4 * k + 1], p[4 * k + 2])
+        put(centers, 3 * k, station(s, w, links[k], vector(p, 4 * k)))
     axis = 0
     widest = -1.0
     for side in range(3):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
+from osimlite.forces.vectors import dot, vector
 from osimlite.simulation.kernels.error_control import projected
 from osimlite.simulation.kernels.layout import (
     CONSTRAINED,
@@ -135,8 +136,7 @@ def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
         elif watch[0] == TOUCH:
             levels[pairs + number] = levels[watch[1]]
         else:
-            px, py, pz = station(m.s, m.w, watch[1], a[0], a[1], a[2])
-            levels[pairs + number] = px * a[3] + py * a[4] + pz * a[5] - a[6]
+            levels[pairs + number] = dot(station(m.s, m.w, watch[1], vector(a, 0)), vector(a, 3)) - a[6]
 
 
 def note_events(

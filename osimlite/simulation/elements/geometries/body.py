@@ -3,94 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from osimlite.errors import ModelError
+from osimlite.forces.vectors import Vector, dot, minus, norm, put, times, turned_back, vector
 from osimlite.multibody.mechanism import GROUND
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
 
 
 def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:
     """Turn a body about an axis, and another the other way."""
-    ax, ay, az = direction(s, w, g[2], gp[0], gp[1], gp[2])
-    apply_torque(s, w, g[0], torque * ax, torque * ay, torque * az)
-    apply_torque(s, w, g[1], -torque * ax, -torque * ay, -torque * az)
+    axis = direction(s, w, g[2], vector(gp, 0))
+    apply_torque(s, w, g[0], times(torque, axis))
+    apply_torque(s, w, g[1], times(-torque, axis))
 
 
 def turning_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
     """How fast a body turns against another about an axis (rad/s), which OpenSim takes for one of ground."""
-    ax, ay, az = angular_velocity(s, w, g[0])
-    bx, by, bz = angular_velocity(s, w, g[1])
-    return gp[3] * (ax - bx) + gp[4] * (ay - by) + gp[5] * (az - bz)
+    return dot(vector(gp, 3), minus(angular_velocity(s, w, g[0]), angular_velocity(s, w, g[1])))
 
 
 def push_along(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     """Push a body along a direction at a point."""
-    px, py, pz = station(s, w, g[1], gp[0], gp[1], gp[2])
-    ax, ay, az = direction(s, w, g[3], gp[6], gp[7], gp[8])
-    apply_force(s, w, g[0], px, py, pz, force * ax, force * ay, force * az)
+    apply_force(s, w, g[0], station(s, w, g[1], vector(gp, 0)), times(force, direction(s, w, g[3], vector(gp, 6))))
 
 
 def station_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
     """How fast a station moves (m/s), in whatever direction, which is what OpenSim takes."""
-    px, py, pz = station(s, w, g[2], gp[3], gp[4], gp[5])
-    vx, vy, vz = velocity(s, w, g[2], px, py, pz)
-    return sqrt(vx * vx + vy * vy + vz * vz)
+    return norm(velocity(s, w, g[2], station(s, w, g[2], vector(gp, 3))))
 
 
 def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
     """Push two points apart."""
-    ax, ay, az = station(s, w, g[2], gp[0], gp[1], gp[2])
-    bx, by, bz = station(s, w, g[3], gp[3], gp[4], gp[5])
-    dx, dy, dz = ax - bx, ay - by, az - bz
-    length = sqrt(dx * dx + dy * dy + dz * dz)
+    point = station(s, w, g[2], vector(gp, 0))
+    between = minus(point, station(s, w, g[3], vector(gp, 3)))
+    length = norm(between)
     size = force / length if length > 0.0 else 0.0
-    apply_force(s, w, g[0], ax, ay, az, size * dx, size * dy, size * dz)
-    apply_force(s, w, g[1], ax, ay, az, -size * dx, -size * dy, -size * dz)
+    apply_force(s, w, g[0], point, times(size, between))
+    apply_force(s, w, g[1], point, times(-size, between))
 
 
 def parting_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
     """How fast two points part, m/s."""
-    ax, ay, az = station(s, w, g[2], gp[0], gp[1], gp[2])
-    bx, by, bz = station(s, w, g[3], gp[3], gp[4], gp[5])
-    dx, dy, dz = ax - bx, ay - by, az - bz
-    ux, uy, uz = velocity(s, w, g[2], ax, ay, az)
-    vx, vy, vz = velocity(s, w, g[3], bx, by, bz)
-    length = sqrt(dx * dx + dy * dy + dz * dz)
-    return ((ux - vx) * dx + (uy - vy) * dy + (uz - vz) * dz) / length if length > 0.0 else 0.0
+    one, two = station(s, w, g[2], vector(gp, 0)), station(s, w, g[3], vector(gp, 3))
+    between, parting = minus(one, two), minus(velocity(s, w, g[2], one), velocity(s, w, g[3], two))
+    length = norm(between)
+    return dot(parting, between) / length if length > 0.0 else 0.0
 
 
-def push_body(
-    s: Ints, w: Floats, g: Ints, gp: Floats, tx: float, ty: float, tz: float, fx: float, fy: float, fz: float
-) -> None:
-    """Turn a body, and push it at a point; torque and force are along three axes."""
-    px, py, pz = station(s, w, g[1], gp[0], gp[1], gp[2])
-    ax, ay, az = direction(s, w, g[2], gp[3], gp[4], gp[5])
-    bx, by, bz = direction(s, w, g[2], gp[6], gp[7], gp[8])
-    cx, cy, cz = direction(s, w, g[2], gp[9], gp[10], gp[11])
-    apply_torque(s, w, g[0], tx * ax + ty * bx + tz * cx, tx * ay + ty * by + tz * cy, tx * az + ty * bz + tz * cz)
-    fx, fy, fz = fx * ax + fy * bx + fz * cx, fx * ay + fy * by + fz * cy, fx * az + fy * bz + fz * cz
-    apply_force(s, w, g[0], px, py, pz, fx, fy, fz)
+def push_body(s: Ints, w: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector) -> None:
+    """Turn a body, and push it at a point; torque and force are along three axes, which are given by rows."""
+    apply_torque(s, w, g[0], direction(s, w, g[2], turned_back(at(gp, 3), torque)))
+    point = station(s, w, g[1], vector(gp, 0))
+    apply_force(s, w, g[0], point, direction(s, w, g[2], turned_back(at(gp, 3), force)))
 
 
 def station_motion(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
     """Height of a station in ground, and its velocity; its place goes into the record."""
-    room[0], room[1], room[2] = station(s, w, g[0], gp[0], gp[1], gp[2])
-    vx, vy, vz = velocity(s, w, g[0], room[0], room[1], room[2])
+    point = station(s, w, g[0], vector(gp, 0))
+    put(room, 0, point)
+    vx, vy, vz = velocity(s, w, g[0], point)
     return room[1], vx, vy, vz
 
 
-def push_station(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
+def push_station(s: Ints, w: Floats, g: Ints, room: Floats, force: Vector) -> None:
     """Push a station; the record then has the force."""
-    apply_force(s, w, g[0], room[0], room[1], room[2], fx, fy, fz)
-    room[0], room[1], room[2] = fx, fy, fz
+    apply_force(s, w, g[0], vector(room, 0), force)
+    put(room, 0, force)
 
 
 class Anchors(NamedTuple):
@@ -184,7 +169,7 @@ class ApartPoints(OnBodies):
 class OnBody(OnBodies):
     """A body: the outputs tx, ty, tz (N.m) turn it, and fx, fy, fz (N) push it at a point."""
 
-    after = ("push_body(s, w, g, gp, tx, ty, tz, fx, fy, fz)",)
+    after = ("push_body(s, w, g, gp, (tx, ty, tz), (fx, fy, fz))",)
     calls = (push_body,)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
@@ -209,7 +194,7 @@ class AtStation(Geometry):
 
     inputs = ("height", "vx", "vy", "vz")
     before = ("height, vx, vy, vz = station_motion(s, w, g, gp, room)",)
-    after = ("push_station(s, w, g, room, fx, fy, fz)",)
+    after = ("push_station(s, w, g, room, (fx, fy, fz))",)
     calls = (station_motion, push_station)
 
     def read(self, builder: ElementBuilder, force: Any) -> NamedStation:

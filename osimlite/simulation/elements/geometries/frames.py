@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.forces.bushing import xyz_angles, xyz_moment, xyz_rates
+from osimlite.forces.vectors import minus, put, times, turned, turned_back, vector
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
@@ -16,61 +17,40 @@ from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
 
-DEVIATIONS, LOADS, RATES, R1, R2, ROOM = 12, 18, 24, 30, 39, 48
-"""Places in the record, after force and moment on the second frame and the origins of both."""
+DEVIATIONS, LOADS, RATES, AXES, ROOM = 12, 18, 24, 30, 48
+"""Places in the record, after force and moment on the second frame and the origins of both; the axes are of both."""
 
 
 def deviate(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> None:
     """Deviations of the second frame from the first, and their rates, which go into the record."""
-    for k in range(3):
-        a, b = at(room, R1 + k), at(room, R2 + k)
-        a[0], a[3], a[6] = direction(s, w, g[0], gp[3 * k], gp[3 * k + 1], gp[3 * k + 2])
-        b[0], b[3], b[6] = direction(s, w, g[1], gp[12 + 3 * k], gp[13 + 3 * k], gp[14 + 3 * k])
-    r, z = at(room, R1), at(room, R2)
-    ax, ay, az = station(s, w, g[0], gp[9], gp[10], gp[11])
-    bx, by, bz = station(s, w, g[1], gp[21], gp[22], gp[23])
-    room[6], room[7], room[8], room[9], room[10], room[11] = ax, ay, az, bx, by, bz
     d, rates = at(room, DEVIATIONS), at(room, RATES)
-    d[0], d[1], d[2] = xyz_angles(
-        r[0] * z[0] + r[3] * z[3] + r[6] * z[6],
-        r[0] * z[1] + r[3] * z[4] + r[6] * z[7],
-        r[0] * z[2] + r[3] * z[5] + r[6] * z[8],
-        r[1] * z[0] + r[4] * z[3] + r[7] * z[6],
-        r[1] * z[1] + r[4] * z[4] + r[7] * z[7],
-        r[1] * z[2] + r[4] * z[5] + r[7] * z[8],
-        r[2] * z[2] + r[5] * z[5] + r[8] * z[8],
-    )
-    vx, vy, vz = velocity(s, w, g[1], bx, by, bz)
-    # The moving frame is carried around by the other.
-    ux, uy, uz = velocity(s, w, g[0], bx, by, bz)
-    dx, dy, dz, vx, vy, vz = bx - ax, by - ay, bz - az, vx - ux, vy - uy, vz - uz
-    wx, wy, wz = angular_velocity(s, w, g[1])
-    ux, uy, uz = angular_velocity(s, w, g[0])
-    wx, wy, wz = wx - ux, wy - uy, wz - uz
     for k in range(3):
-        d[3 + k] = r[k] * dx + r[3 + k] * dy + r[6 + k] * dz
-        rates[3 + k] = r[k] * vx + r[3 + k] * vy + r[6 + k] * vz
-    rates[0], rates[1], rates[2] = xyz_rates(
-        d[1],
-        d[2],
-        z[0] * wx + z[3] * wy + z[6] * wz,
-        z[1] * wx + z[4] * wy + z[7] * wz,
-        z[2] * wx + z[5] * wy + z[8] * wz,
-    )
+        put(room, AXES + 3 * k, direction(s, w, g[0], vector(gp, 3 * k)))
+        put(room, AXES + 9 + 3 * k, direction(s, w, g[1], vector(gp, 12 + 3 * k)))
+    one, two = at(room, AXES), at(room, AXES + 9)
+    start, end = station(s, w, g[0], vector(gp, 9)), station(s, w, g[1], vector(gp, 21))
+    put(room, 6, start)
+    put(room, 9, end)
+    x, y, z = turned(one, vector(two, 0)), turned(one, vector(two, 3)), turned(one, vector(two, 6))
+    put(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
+    put(d, 3, turned(one, minus(end, start)))
+    # The moving frame is carried around by the other.
+    put(rates, 3, turned(one, minus(velocity(s, w, g[1], end), velocity(s, w, g[0], end))))
+    wx, wy, wz = turned(two, minus(angular_velocity(s, w, g[1]), angular_velocity(s, w, g[0])))
+    put(rates, 0, xyz_rates(d[1], d[2], wx, wy, wz))
 
 
 def load_frames(s: Ints, w: Floats, g: Ints, room: Floats) -> None:
     """Apply the loads to both bodies; the record then has force and moment on the second frame."""
-    r, z, loads, d = at(room, R1), at(room, R2), at(room, LOADS), at(room, DEVIATIONS)
-    mx, my, mz = xyz_moment(d[1], d[2], loads[0], loads[1], loads[2])
-    for k in range(3):
-        room[k] = r[3 * k] * loads[3] + r[3 * k + 1] * loads[4] + r[3 * k + 2] * loads[5]
-        room[3 + k] = z[3 * k] * mx + z[3 * k + 1] * my + z[3 * k + 2] * mz
-    fx, fy, fz, tx, ty, tz = room[0], room[1], room[2], room[3], room[4], room[5]
-    apply_force(s, w, g[1], room[9], room[10], room[11], fx, fy, fz)
-    apply_force(s, w, g[0], room[9], room[10], room[11], -fx, -fy, -fz)
-    apply_torque(s, w, g[1], tx, ty, tz)
-    apply_torque(s, w, g[0], -tx, -ty, -tz)
+    loads, d = at(room, LOADS), at(room, DEVIATIONS)
+    force = turned_back(at(room, AXES), vector(loads, 3))
+    moment = turned_back(at(room, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
+    put(room, 0, force)
+    put(room, 3, moment)
+    apply_force(s, w, g[1], vector(room, 9), force)
+    apply_force(s, w, g[0], vector(room, 9), times(-1.0, force))
+    apply_torque(s, w, g[1], moment)
+    apply_torque(s, w, g[0], times(-1.0, moment))
 
 
 def damped(rate: float, damping: float) -> float:

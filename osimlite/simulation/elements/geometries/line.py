@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
 from typing import Any, NamedTuple
 
+from osimlite.forces.vectors import dot, minus, norm, put, times, vector
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
@@ -16,28 +16,25 @@ from osimlite.simulation.kernels.points import apply_force, station, velocity
 
 def line(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float]:
     """Length and rate; its direction and its ends go into the record."""
-    ax, ay, az = station(s, w, g[0], gp[0], gp[1], gp[2])
-    bx, by, bz = station(s, w, g[1], gp[3], gp[4], gp[5])
-    dx, dy, dz = bx - ax, by - ay, bz - az
-    length = sqrt(dx * dx + dy * dy + dz * dz)
-    inverse = 1.0 / length if length > 0.0 else 0.0
-    dx, dy, dz = inverse * dx, inverse * dy, inverse * dz
-    ux, uy, uz = velocity(s, w, g[0], ax, ay, az)
-    vx, vy, vz = velocity(s, w, g[1], bx, by, bz)
-    room[0], room[1], room[2], room[3], room[4], room[5] = dx, dy, dz, ax, ay, az
-    room[6], room[7], room[8] = bx, by, bz
-    return length, (vx - ux) * dx + (vy - uy) * dy + (vz - uz) * dz
+    one, two = station(s, w, g[0], vector(gp, 0)), station(s, w, g[1], vector(gp, 3))
+    between = minus(two, one)
+    length = norm(between)
+    ahead = times(1.0 / length if length > 0.0 else 0.0, between)
+    put(room, 0, ahead)
+    put(room, 3, one)
+    put(room, 6, two)
+    return length, dot(minus(velocity(s, w, g[1], two), velocity(s, w, g[0], one)), ahead)
 
 
 def pull_ends(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, tension: float) -> None:
     """Pull at both ends; then the record has force and recorded point of either."""
-    fx, fy, fz = tension * room[0], tension * room[1], tension * room[2]
-    apply_force(s, w, g[0], room[3], room[4], room[5], fx, fy, fz)
-    apply_force(s, w, g[1], room[6], room[7], room[8], -fx, -fy, -fz)
-    room[0], room[1], room[2] = fx, fy, fz
-    room[3], room[4], room[5] = station(s, w, g[0], gp[6], gp[7], gp[8])
-    room[6], room[7], room[8] = -fx, -fy, -fz
-    room[9], room[10], room[11] = station(s, w, g[1], gp[9], gp[10], gp[11])
+    pull, back = times(tension, vector(room, 0)), times(-tension, vector(room, 0))
+    apply_force(s, w, g[0], vector(room, 3), pull)
+    apply_force(s, w, g[1], vector(room, 6), back)
+    put(room, 0, pull)
+    put(room, 3, station(s, w, g[0], vector(gp, 6)))
+    put(room, 6, back)
+    put(room, 9, station(s, w, g[1], vector(gp, 9)))
 
 
 class Ends(NamedTuple):

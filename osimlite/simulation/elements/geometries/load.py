@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from osimlite.forces.vectors import dot, minus, plus, put, turned_back, vector
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement
 from osimlite.simulation.elements.geometries.geometry import Geometry
@@ -29,33 +30,23 @@ def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) 
     link = g[0]
     if g[3] > 0:
         turn_vector(s, w, g[1], at(gp, FRAME), room)
-        px, py, pz = station(s, w, link, gp[9], gp[10], gp[11])
+        point = station(s, w, link, vector(gp, 9))
         if g[4] > 0:
-            ox, oy, oz = px, py, pz
+            origin = point
             turn_vector(s, w, g[2], at(gp, 2 * FRAME), at(room, 3))
-            px, py, pz = station(s, w, g[2], gp[33], gp[34], gp[35])
-            px, py, pz = px + room[3], py + room[4], pz + room[5]
-            ax, ay, az = px - ox, py - oy, pz - oz
+            point = plus(station(s, w, g[2], vector(gp, 33)), vector(room, 3))
+            away = minus(point, origin)
             for k in range(3):
-                ex, ey, ez = direction(s, w, link, gp[3 * k], gp[3 * k + 1], gp[3 * k + 2])
-                room[3 + k] = ex * ax + ey * ay + ez * az
-        apply_force(s, w, link, px, py, pz, room[0], room[1], room[2])
+                room[3 + k] = dot(direction(s, w, link, vector(gp, 3 * k)), away)
+        apply_force(s, w, link, point, vector(room, 0))
     if g[5] > 0:
         turn_vector(s, w, g[1], at(gp, FRAME), at(room, 6))
-        apply_torque(s, w, link, room[6], room[7], room[8])
+        apply_torque(s, w, link, vector(room, 6))
 
 
-def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, vector: Floats) -> None:
+def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, turning: Floats) -> None:
     """From along the axes of a frame, which are given by columns in its link, to along those of ground."""
-    a, b, c = vector[0], vector[1], vector[2]
-    vector[0], vector[1], vector[2] = direction(
-        s,
-        w,
-        link,
-        axes[0] * a + axes[3] * b + axes[6] * c,
-        axes[1] * a + axes[4] * b + axes[7] * c,
-        axes[2] * a + axes[5] * b + axes[8] * c,
-    )
+    put(turning, 0, direction(s, w, link, turned_back(axes, vector(turning, 0))))
 
 
 class Load(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.forces.vectors import Vector, along, dot, minus, put, vector
+from osimlite.forces.vectors import Vector, along, dot, minus, put, times, vector
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.contact import ContactSurface, surface_of
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
@@ -22,8 +22,8 @@ NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 def sphere_depth(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, Vector]:
     """Depth, radius and normal; the point of contact goes into the record."""
-    o, n = station(s, w, g[0], gp[0], gp[1], gp[2]), direction(s, w, g[0], gp[3], gp[4], gp[5])
-    center = station(s, w, g[1], gp[6], gp[7], gp[8])
+    o, n = station(s, w, g[0], vector(gp, 0)), direction(s, w, g[0], vector(gp, 3))
+    center = station(s, w, g[1], vector(gp, 6))
     d = gp[9] - dot(minus(center, o), n)
     # Half the depth is either surface's.
     put(room, 3, along(center, 0.5 * d - gp[9], n))
@@ -32,15 +32,14 @@ def sphere_depth(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple
 
 def approach(s: Ints, w: Floats, g: Ints, room: Floats) -> Vector:
     """Velocity of the half space relative to the sphere, at the point of contact."""
-    px, py, pz = vector(room, 3)
-    return minus(velocity(s, w, g[0], px, py, pz), velocity(s, w, g[1], px, py, pz))
+    return minus(velocity(s, w, g[0], vector(room, 3)), velocity(s, w, g[1], vector(room, 3)))
 
 
-def push_both(s: Ints, w: Floats, g: Ints, room: Floats, fx: float, fy: float, fz: float) -> None:
+def push_both(s: Ints, w: Floats, g: Ints, room: Floats, force: Vector) -> None:
     """Push the sphere and, the other way, the half space at the point of contact; the force goes into the record."""
-    room[0], room[1], room[2] = fx, fy, fz
-    apply_force(s, w, g[1], room[3], room[4], room[5], fx, fy, fz)
-    apply_force(s, w, g[0], room[3], room[4], room[5], -fx, -fy, -fz)
+    put(room, 0, force)
+    apply_force(s, w, g[1], vector(room, 3), force)
+    apply_force(s, w, g[0], vector(room, 3), times(-1.0, force))
 
 
 class SphereOnPlane(Geometry):
@@ -51,7 +50,7 @@ class SphereOnPlane(Geometry):
 
     inputs = ("d", "radius", "n", "v")
     before = ("d, radius, n = sphere_depth(s, w, g, gp, room)", "v = approach(s, w, g, room)")
-    after = ("push_both(s, w, g, room, fx, fy, fz)",)
+    after = ("push_both(s, w, g, room, (fx, fy, fz))",)
     calls = (sphere_depth, approach, push_both)
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[ContactSurface, ContactSurface]:
