@@ -44,6 +44,7 @@ def build(
     from osimlite.errors import OsimliteError
     from osimlite.lint import validate
     from osimlite.models.source import make_model
+    from osimlite.text import counted
 
     if list_models:
         _list_models()
@@ -65,8 +66,8 @@ def build(
     target = output or Path(f"{model.name or 'model'}.osim")
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
-    warnings = len(report.warnings)
-    advice = f"; {warnings} warning{'s' * (warnings != 1)}: see osimlite validate {target}" if warnings else ""
+    warned = len(report.warnings)
+    advice = f"; {counted(warned, 'warning')}: see osimlite validate {target}" if warned else ""
     say(f"{target}: {count} components{advice}")
 
 

@@ -24,10 +24,14 @@ def coordinates_of(joint: Joint) -> list[Coordinate]:
     return [item for item in joint.coordinates if isinstance(item, Coordinate)]
 
 
+def names_on(axis: TransformAxis) -> list[str]:
+    """The coordinates that an axis names."""
+    return [word if isinstance(word, str) else word.name for word in axis.coordinates]
+
+
 def names_on_axes(joint: CustomJoint) -> list[str]:
     """The coordinates that the axes name, each once, in the order in which they are met."""
-    words = [word if isinstance(word, str) else word.name for axis in axes_of(joint) for word in axis.coordinates]
-    return list(dict.fromkeys(words))
+    return list(dict.fromkeys(name for axis in axes_of(joint) for name in names_on(axis)))
 
 
 def axes_refused(joint: CustomJoint) -> bool:

@@ -16,7 +16,7 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite.lint.axes import axes_of, coordinates_of
+from osimlite.lint.axes import axes_of, coordinates_of, names_on
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject, once
 from osimlite.schema.base import Component, Unknown
@@ -217,7 +217,7 @@ def _custom(joint: CustomJoint, values: dict[str, float], *, rough: bool) -> Pos
 
 
 def _along(axis: TransformAxis, values: dict[str, float], rough: bool) -> float | None:
-    names = [word if isinstance(word, str) else word.name for word in axis.coordinates]
+    names = names_on(axis)
     return _value(axis.function, [values.get(name, 0.0) for name in names], rough)
 
 

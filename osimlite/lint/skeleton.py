@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -34,6 +35,13 @@ class Skeleton:
     def complete(self) -> bool:
         """Whether every joint's frames lead to a body."""
         return all(link.parent_base is not None and link.child_base is not None for link in self.links)
+
+    def pairs(self) -> Iterator[tuple[Link, Component, Component]]:
+        """The joints that connect two bodies, with the parent and the child."""
+        for link in self.links:
+            parent, child = link.parent_base, link.child_base
+            if parent is not None and child is not None and parent is not child:
+                yield link, parent, child
 
     def depths(self) -> dict[int, int]:
         """How many joints lie between ground and each body (by identity); bodies that none reach are left out."""

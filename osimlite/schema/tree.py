@@ -53,6 +53,11 @@ class Use(NamedTuple):
         """The kind of the reference."""
         return self.spec.reference
 
+    @property
+    def text(self) -> str:
+        """The text that names something, or the name of a component that is given itself."""
+        return self.value if isinstance(self.value, str) else self.value.name
+
 
 class Tree:
     """Index of one model: component by path, path by component, children, and the names each rule looks up."""
@@ -178,7 +183,7 @@ class Tree:
         use = Use(owner, owner, spec, value)
         found = self.resolve(use).target
         if found is None:
-            text = value if isinstance(value, str) else value.name
+            text = use.text
             if not text:
                 raise ModelError(
                     f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} is missing or empty; "

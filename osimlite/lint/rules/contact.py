@@ -34,7 +34,7 @@ def contact_without_partner(subject: Subject, found: Found) -> None:
     for force, holders, uses in _contact_lists(subject):
         if len(uses) > 1:
             continue
-        listed_one = f"one surface, '{_text(uses[0])}'" if uses else "no contact geometry"
+        listed_one = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
         message = f"{called(force)} lists {listed_one}: it never acts"
         if holders:
             found(message, holders[0], tag="geometry")
@@ -62,8 +62,8 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
         words: dict[tuple[int, str], int] = {}
         for use in uses:
             target = subject.resolution(use).target
-            nth = words.get((id(use.holder), _text(use)), 0)
-            words[id(use.holder), _text(use)] = nth + 1
+            nth = words.get((id(use.holder), use.text), 0)
+            words[id(use.holder), use.text] = nth + 1
             if target is None:
                 continue
             if id(target) in seen:
@@ -71,7 +71,7 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
                     f"{called(force)} lists '{target.name}' again: OpenSim counts it twice and the force is doubled",
                     use.holder,
                     tag=use.spec.tag,
-                    word=_text(use),
+                    word=use.text,
                     nth=nth,
                 )
             seen.add(id(target))
@@ -129,7 +129,3 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
 
 def _lists_contacts(holder: Object) -> bool:
     return any(s.reference.target == "ContactGeometry" for s in reference_specs(type(holder)))
-
-
-def _text(use: Use) -> str:
-    return use.value if isinstance(use.value, str) else use.value.name

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
+from osimlite.lint.axes import axes_of, axes_refused, coordinates_of, names_on
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -27,7 +27,7 @@ from osimlite.schema.tree import is_a
 from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:
-    from osimlite.schema.custom_joint import CustomJoint, TransformAxis
+    from osimlite.schema.custom_joint import CustomJoint
 
 
 @rule("OSIM410", "made-up-coordinate", severity=ERROR)
@@ -156,7 +156,7 @@ def idle_coordinate(subject: Subject, found: Found) -> None:
         columns = {coordinate.name: _motion_by(joint, coordinate) for coordinate in coordinates}
         idle = [coordinate for coordinate in coordinates if not any(columns[coordinate.name])]
         for coordinate in idle:
-            axes = [axis.name for axis in axes_of(joint) if coordinate.name in _names(axis)]
+            axes = [axis.name for axis in axes_of(joint) if coordinate.name in names_on(axis)]
             state = f"does not change {listed(axes)} of it" if axes else "is on no axis of it"
             found(
                 f"{called(coordinate)} of {called(joint)} {state}: accelerations become NaN, without a message",
@@ -182,16 +182,12 @@ def _parallel(one: Vector, other: Vector) -> bool:
     return not math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) >= _COLLINEAR
 
 
-def _names(axis: TransformAxis) -> list[str]:
-    return [word if isinstance(word, str) else word.name for word in axis.coordinates]
-
-
 def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
     """How fast each axis moves with a coordinate in the default pose; where nobody can tell, some number but 0."""
     values = {item.name: item.default_value for item in coordinates_of(joint)}
     found = []
     for number, axis in enumerate(axes_of(joint)):
-        names = _names(axis)
+        names = names_on(axis)
         # Of a name that stands twice the last place counts.
         place = max((place for place, name in enumerate(names) if name == coordinate.name), default=None)
         known = 0.0 if place is None else _slope(axis.function, place, values.get(names[0], 0.0))

@@ -6,7 +6,7 @@ from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import a, called
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
@@ -88,7 +88,7 @@ def wrong_coordinate_count(subject: Subject, found: Found) -> None:
             )
         elif given != wanted and (declared or given):
             found(
-                f"{called(joint)} has {counted(given, 'coordinate')}, {a_joint(joint)} has {wanted}: "
+                f"{called(joint)} has {counted(given, 'coordinate')}, {a(type(joint).tag)} has {wanted}: "
                 "OpenSim refuses the model",
                 joint,
                 number=subject.element_of(joint, "coordinates"),
@@ -128,9 +128,8 @@ def shared_coordinate_name(subject: Subject, found: Found) -> None:
         known = first.setdefault(component.name, component)
         if known is component or not component.name or tree.parent_of(known) is joint:
             continue
-        users = [
-            called(use.owner) for use in subject.uses if use.value == component.name and _by_name(use.reference.rule)
-        ]
+        named = (use for use in subject.uses if use.reference.rule == "coordinate-name")
+        users = [called(use.owner) for use in named if use.value == component.name]
         message = f"{called(component)} has the name of a coordinate of {called(tree.parent_of(known) or known)}"
         if users:
             message += f"; {listed(dict.fromkeys(users), most=3)} {'finds' if len(users) == 1 else 'all find'} that one"
@@ -213,12 +212,3 @@ def stray_joint_frame(subject: Subject, found: Found) -> None:
                 tag="socket_parent",
                 severity=ERROR if late else None,
             )
-
-
-def a_joint(joint: Joint) -> str:
-    """``a PinJoint``."""
-    return f"a {type(joint).tag}"
-
-
-def _by_name(rule_name: str) -> bool:
-    return rule_name == "coordinate-name"

@@ -197,9 +197,8 @@ def _find(subject: Subject) -> Iterator[Broken]:
             continue
         if resolution.failure != "illegal" and (_overwritten(subject, use) or _made_up(subject, use)):
             continue
-        value = use.value
-        text = value if isinstance(value, str) else value.name
-        if isinstance(value, str) and (resolution.failure == "empty" or _unassigned(use)):
+        text = use.text
+        if isinstance(use.value, str) and (resolution.failure == "empty" or _unassigned(use)):
             if use.reference.required and use.position is None:
                 yield Broken(use, text, "empty")
         elif use.reference.rule == "own-joint-coordinate" and is_a(use.owner, "CustomJoint"):

@@ -86,23 +86,20 @@ def closed_loop(subject: Subject, found: Found) -> None:
     groups = _Groups()
     moved_by: dict[int, Joint] = {}
     pairs: set[frozenset[int]] = set()
-    for link in skeleton(subject).links:
-        if link.parent_base is None or link.child_base is None or link.parent_base is link.child_base:
-            continue
-        pair = frozenset((id(link.parent_base), id(link.child_base)))
-        closes = groups.of(link.parent_base) == groups.of(link.child_base)
-        if closes and pair not in pairs:
-            before = moved_by.get(id(link.child_base))
+    for link, parent, child in skeleton(subject).pairs():
+        pair = frozenset((id(parent), id(child)))
+        if groups.of(parent) == groups.of(child) and pair not in pairs:
+            before = moved_by.get(id(child))
             other = f", which {called(before)} has placed already" if before is not None else ""
             found(
-                f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; "
+                f"{called(link.joint)} closes a loop at {called(child)}{other}; "
                 "OpenSim splits a body, with inertias of its own, and adds a constraint, or refuses the model",
                 link.joint,
                 tag="socket_child_frame",
             )
-        groups.join(link.parent_base, link.child_base)
+        groups.join(parent, child)
         pairs.add(pair)
-        moved_by.setdefault(id(link.child_base), link.joint)
+        moved_by.setdefault(id(child), link.joint)
 
 
 @rule("OSIM404", "parallel-joints", severity=ERROR)
@@ -129,10 +126,8 @@ def parallel_joints(subject: Subject, found: Found) -> None:
     """
     first: dict[frozenset[int], Joint] = {}
     bones = skeleton(subject)
-    for link in skeleton(subject).links:
-        if link.parent_base is None or link.child_base is None or link.parent_base is link.child_base:
-            continue
-        pair = frozenset((id(link.parent_base), id(link.child_base)))
+    for link, parent, child in bones.pairs():
+        pair = frozenset((id(parent), id(child)))
         if pair in first:
             found(
                 f"{called(link.joint)} connects the same two bodies as {called(first[pair])}: OpenSim "

@@ -119,7 +119,7 @@ def connected_twice(subject: Subject, found: Found) -> None:
         target = subject.resolution(use).target
         if target is None:
             continue
-        text = use.value if isinstance(use.value, str) else use.value.name
+        text = use.text
         known = seen.setdefault((id(use.holder), use.spec.tag), [])
         if any(other is target for other, _ in known):
             found(
