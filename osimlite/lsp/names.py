@@ -90,7 +90,7 @@ def _owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
 
 
 def _components(tree: Tree, reference: Reference, owner: Component) -> Iterator[Name]:
-    spec = FieldSpec("", "", reference, None, None, None, type(owner))
+    spec = FieldSpec("", "", reference, None, None, None, (type(owner),))
     for text in tree.spellings(Use(owner, owner, spec, "")):
         target = tree.lookup(reference, text, owner).target
         yield Name(text, "" if target is None else f"{type(target).tag} {tree.path_of(target)}")

@@ -2,7 +2,7 @@
 
 from osimlite.schema.base import ModelComponent, none
 from osimlite.schema.fields import Flag, LegacyMany
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class Constraint(ModelComponent, abstract=True):
@@ -17,5 +17,3 @@ class ConstraintSet(ModelComponentSet):
 
     objects: LegacyMany[Constraint] = none()
     """The constraints; one that is not enforced does nothing."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the constraints; the mechanics ignore them."""

@@ -6,7 +6,7 @@ from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.fields import LegacyMany, Unnamed, Vec3, real, vec3
 from osimlite.schema.geometry import Appearance, SurfaceProperties
 from osimlite.schema.references import FileName, PhysicalFrameSocket
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class ContactGeometry(ModelComponent, abstract=True):
@@ -72,5 +72,3 @@ class ContactGeometrySet(ModelComponentSet):
 
     objects: LegacyMany[ContactGeometry] = none()
     """The surfaces; contact forces name those that touch."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the surfaces; the mechanics ignore them."""

@@ -12,7 +12,7 @@ from osimlite.schema.references import (
     ContactSphereSocket,
     StationSocket,
 )
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::ContactParameters"):
@@ -35,13 +35,11 @@ class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::Co
     """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
 
 
-class ElasticFoundationContactParametersSet(Object, tag="ElasticFoundationForce::ContactParametersSet"):
+class ElasticFoundationContactParametersSet(Set, tag="ElasticFoundationForce::ContactParametersSet"):
     """The layers of one elastic foundation force."""
 
     objects: LegacyMany[ElasticFoundationContactParameters] = none()
     """The materials, each with the surfaces that are made of it."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the materials; the mechanics ignore them."""
 
 
 class ElasticFoundationForce(Force):

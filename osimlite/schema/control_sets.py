@@ -4,7 +4,7 @@ from typing import Annotated
 
 from osimlite.schema.base import Object, none
 from osimlite.schema.fields import LegacyFlag, LegacyMany, LegacyNumber, real
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class Control(Object, abstract=True):
@@ -56,10 +56,8 @@ class ControlLinear(Control):
     """How strongly CMC's smoothing damps changes."""
 
 
-class ControlSet(Object):
+class ControlSet(Set):
     """The controls of a model over time."""
 
     objects: LegacyMany[Control] = none()
     """The controls, each with the name of an actuator."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the controls; the mechanics ignore them."""

@@ -3,7 +3,7 @@
 from osimlite.schema.base import ModelComponent, none
 from osimlite.schema.fields import Flag, LegacyMany
 from osimlite.schema.references import ActuatorSockets
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class Controller(ModelComponent, abstract=True):
@@ -20,5 +20,3 @@ class ControllerSet(ModelComponentSet):
 
     objects: LegacyMany[Controller] = none()
     """The controllers; what several want of one actuator is added up."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the controllers; the mechanics ignore them."""

@@ -2,10 +2,10 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, Object, none
+from osimlite.schema.base import ModelComponent, none
 from osimlite.schema.fields import Flag, LegacyMany, Optional, real, reals
 from osimlite.schema.functions import Function
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class Coordinate(ModelComponent):
@@ -29,10 +29,8 @@ class Coordinate(ModelComponent):
     """Whether assembly may move the coordinate at will; otherwise it keeps near the default value."""
 
 
-class CoordinateSet(Object):
+class CoordinateSet(Set):
     """Coordinates in a document of their own."""
 
     objects: LegacyMany[Coordinate] = none()
     """The coordinates."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the coordinates; the mechanics ignore them."""

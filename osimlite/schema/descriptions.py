@@ -15,8 +15,8 @@ from osimlite.schema.specs import FieldSpec, field_specs
 
 def meaning_of(spec: FieldSpec) -> str:
     """What a property means: the text below its declaration; "" if there is none, or no source to read it from."""
-    declared = spec.declared_in
-    return _described(declared.__module__).get((declared.__name__, spec.name), "")
+    texts = (_described(cls.__module__).get((cls.__name__, spec.name)) for cls in spec.declarers)
+    return next(filter(None, texts), "")
 
 
 def value_of(spec: FieldSpec) -> str:
@@ -32,7 +32,8 @@ def value_of(spec: FieldSpec) -> str:
         many = kind.shape == "list"
         return f"names of {kind.target} components" if many else f"the name of a {kind.target}"
     assert isinstance(kind, Held) and spec.accepts is not None
-    return f"objects of class {spec.accepts.tag}" if kind.form == "list" else f"one {spec.accepts.tag}"
+    tag = spec.accepts.tag or "Object"
+    return f"objects of class {tag}" if kind.form == "list" else f"one {tag}"
 
 
 def described(cls: type[Object]) -> str:

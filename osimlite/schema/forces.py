@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 from osimlite.schema.base import ModelComponent, Object, made, none
 from osimlite.schema.fields import Flag, LegacyMany, Single, real
 from osimlite.schema.references import ContactGeometryNames, CoordinateName
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet, ObjectGroup, Set
 
 
 class Force(ModelComponent, abstract=True):
@@ -36,13 +36,11 @@ class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParam
     """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
 
 
-class HuntCrossleyContactParametersSet(Object, tag="HuntCrossleyForce::ContactParametersSet"):
+class HuntCrossleyContactParametersSet(Set, tag="HuntCrossleyForce::ContactParametersSet"):
     """The materials of one Hunt-Crossley force."""
 
     objects: LegacyMany[HuntCrossleyContactParameters] = none()
     """The materials, each with the surfaces that are made of it."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the materials; the mechanics ignore them."""
 
 
 class HuntCrossleyForce(Force):

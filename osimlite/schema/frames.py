@@ -7,7 +7,7 @@ from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3, word
 from osimlite.schema.geometry import FrameGeometry, Geometry
 from osimlite.schema.references import PhysicalFrameSocket, StationSocket
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.wrapping import WrapObjectSet
 
 
@@ -96,5 +96,3 @@ class BodySet(ModelComponentSet):
 
     objects: LegacyMany[Body] = none()
     """The bodies; joints say how they hang together."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the bodies; the mechanics ignore them."""

@@ -13,7 +13,7 @@ from osimlite.schema.fields import (
     Vector,
     real,
 )
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class Function(Object, abstract=True):
@@ -140,13 +140,11 @@ class ExpressionBasedFunction(Function):
     """Names in the formula, in the order of the arguments."""
 
 
-class FunctionSet(Object):
+class FunctionSet(Set):
     """A list of functions."""
 
     objects: LegacyMany[Function] = none()
     """The functions; whoever owns the set says what their order means."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the functions; the mechanics ignore them."""
 
 
 class GCVSplineSet(FunctionSet):

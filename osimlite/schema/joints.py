@@ -15,7 +15,7 @@ from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, 
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
 from osimlite.schema.geometry import Appearance
 from osimlite.schema.references import PhysicalFrameSocket
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 MotionType = Literal["rotational", "translational", "coupled"]
 
@@ -196,5 +196,3 @@ class JointSet(ModelComponentSet):
 
     objects: LegacyMany[Joint] = none()
     """The joints; each carries its own coordinates."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the joints; the mechanics ignore them."""

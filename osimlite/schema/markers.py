@@ -5,7 +5,7 @@ from typing import Annotated
 from osimlite.schema.base import ModelComponent, none
 from osimlite.schema.fields import Flag, LegacyMany, Vec3, vec3
 from osimlite.schema.references import PhysicalFrameSocket
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class Point(ModelComponent, abstract=True):
@@ -33,8 +33,6 @@ class MarkerSet(ModelComponentSet):
 
     objects: LegacyMany[Marker] = none()
     """The markers, named as the columns of measured data."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the markers; the mechanics ignore them."""
 
 
 class IMU(ModelComponent):

@@ -20,7 +20,7 @@ from osimlite.schema.fields import (
 from osimlite.schema.functions import PiecewiseLinearFunction
 from osimlite.schema.probes import Probe
 from osimlite.schema.references import MuscleSocket
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 _NAME_OF_MUSCLE = Reference("muscle-name", "Muscle")
 
@@ -42,13 +42,11 @@ class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
     """Mass of the muscle; only used where the switch above says so."""
 
 
-class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Object):
+class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
     """The muscles of one probe."""
 
     objects: LegacyMany[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter] = none()
     """What the probe must know of each muscle; muscles that are not here use no energy."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the entries; the mechanics ignore them."""
 
 
 class Umberger2010MuscleMetabolicsProbe(Probe):
@@ -111,13 +109,11 @@ class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
     """Heat of maintenance per mass of fully excited fast-twitch fibres."""
 
 
-class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Object):
+class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
     """The muscles of one probe."""
 
     objects: LegacyMany[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter] = none()
     """What the probe must know of each muscle; muscles that are not here use no energy."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the entries; the mechanics ignore them."""
 
 
 class Bhargava2004MuscleMetabolicsProbe(Probe):

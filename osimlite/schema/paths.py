@@ -6,7 +6,7 @@ a component stands in the tree; the word ``path`` is understood when a component
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, Object, made, none
+from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.fields import LegacyMany, Many, Optional, Unnamed, Value, Vec3, reals, vec3, word
 from osimlite.schema.functions import Constant, Function
 from osimlite.schema.geometry import Appearance
@@ -17,7 +17,7 @@ from osimlite.schema.references import (
     PhysicalFrameSocket,
     WrapObjectName,
 )
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class AbstractPathPoint(Point, abstract=True):
@@ -62,13 +62,11 @@ class MovingPathPoint(AbstractPathPoint):
     """z of the point in its parent frame, as a function of the coordinate."""
 
 
-class PathPointSet(Object):
+class PathPointSet(Set):
     """The points of a path, in order."""
 
     objects: LegacyMany[AbstractPathPoint] = none()
     """The points, in the order in which the path runs through them; the ends are the attachments."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the points; the mechanics ignore them."""
 
 
 class PathWrapPoint(AbstractPathPoint, abstract=True):
@@ -88,13 +86,11 @@ class PathWrap(ModelComponent):
     """First and last point, counted from 1, between which the path may wrap; below 1 there is no such limit."""
 
 
-class PathWrapSet(Object):
+class PathWrapSet(Set):
     """The surfaces a path wraps around."""
 
     objects: LegacyMany[PathWrap] = none()
     """The surfaces that the path may wrap around, with an entry for each."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the wraps; the mechanics ignore them."""
 
 
 class AbstractGeometryPath(ModelComponent, abstract=True):

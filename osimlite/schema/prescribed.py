@@ -7,7 +7,7 @@ from osimlite.schema.fields import Flag, LegacyMany, Single
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.functions import FunctionSet
 from osimlite.schema.references import ExpressedInFrame, FrameName, MaybeColumnName, PhysicalFrameSocket, reads
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class PrescribedForce(ForceProducer):
@@ -51,7 +51,5 @@ class ExternalLoads(ModelComponentSet):
 
     objects: LegacyMany[ExternalForce] = none()
     """The forces, each with its columns of the file."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the forces; the mechanics ignore them."""
     datafile: Annotated[str, reads("table", legacy=True, required=True)] = ""
     """File of the columns (.sto, .mot); it replaces what the forces name as their source."""

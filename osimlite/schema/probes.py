@@ -4,7 +4,7 @@ from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, none
 from osimlite.schema.fields import Flag, LegacyMany, Number, Reals, reals, word
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class Probe(ModelComponent, abstract=True):
@@ -27,5 +27,3 @@ class ProbeSet(ModelComponentSet):
 
     objects: LegacyMany[Probe] = none()
     """The probes; tools write their values to a file."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the probes; the mechanics ignore them."""

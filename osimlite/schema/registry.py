@@ -128,7 +128,7 @@ _AREAS = {
         "Scholz2015GeometryPath Scholz2015GeometryPathElement Scholz2015GeometryPathObstacle "
         "Scholz2015GeometryPathPoint"
     ),
-    "sets": "ComponentSet ModelComponentSet ObjectGroup",
+    "sets": "ComponentSet ModelComponentSet ObjectGroup Set",
     "springs": (
         "BushingForce ExpressionBasedBushingForce ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce "
         "FunctionBasedBushingForce PointToPointSpring SpringGeneralizedForce"

@@ -27,8 +27,13 @@ class FieldSpec(NamedTuple):
     accepts: type[Object] | None
     default: Any
     factory: Any
-    declared_in: type[Object]
+    declarers: tuple[type[Object], ...]
     names: Reference | None = None
+
+    @property
+    def declared_in(self) -> type[Object]:
+        """The class that has the property first; those derived from it may declare it anew."""
+        return self.declarers[-1]
 
     @property
     def legacy(self) -> bool:
@@ -55,7 +60,7 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
         accepts = class_in(info.annotation) if held else None
         tag = accepts.tag if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed" else name
         tag = next((item.text for item in info.metadata if isinstance(item, Tag)), tag)
-        declared = next(base for base in reversed(cls.__mro__) if name in getattr(base, "__annotations__", {}))
+        declared = tuple(base for base in cls.__mro__ if name in getattr(base, "__annotations__", {}))
         default = info.default if info.default_factory is None else None
         names = next((item.reference for item in info.metadata if isinstance(item, NamesOf)), None)
         specs.append(FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared, names))
@@ -138,7 +143,7 @@ def name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpec:
     """
     reference = names or cls.name_reference
     assert reference is not None
-    return FieldSpec("name", "@name", reference, None, "", None, cls, names)
+    return FieldSpec("name", "@name", reference, None, "", None, (cls,), names)
 
 
 @cache

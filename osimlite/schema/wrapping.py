@@ -5,7 +5,7 @@ from typing import Annotated
 from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.fields import Flag, LegacyMany, Unnamed, Vec3, real, vec3, word
 from osimlite.schema.geometry import Appearance
-from osimlite.schema.sets import ModelComponentSet, ObjectGroup
+from osimlite.schema.sets import ModelComponentSet
 
 
 class WrapObject(ModelComponent, abstract=True):
@@ -62,5 +62,3 @@ class WrapObjectSet(ModelComponentSet):
 
     objects: LegacyMany[WrapObject] = none()
     """The surfaces; a path names those that it wraps around."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the surfaces; the mechanics ignore them."""

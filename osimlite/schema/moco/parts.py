@@ -17,7 +17,7 @@ from osimlite.schema.fields import (
     reals,
 )
 from osimlite.schema.references import Names
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 Bounds = Annotated[Reals, reals(most=2)]
 Strings = Annotated[tuple[str, ...], Value("string", "list")]
@@ -56,13 +56,11 @@ class MocoWeight(Object):
     """Beside those of the others."""
 
 
-class MocoWeightSet(Object):
+class MocoWeightSet(Set):
     """Weights by name."""
 
     objects: LegacyMany[MocoWeight] = none()
     """The weights; what has none counts one."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the weights; Moco ignores them."""
 
 
 StateWeights = Annotated[Single[MocoWeightSet], OfStates]

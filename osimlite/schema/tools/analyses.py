@@ -26,7 +26,7 @@ from osimlite.schema.references import (
     Names,
     several,
 )
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class Analysis(Object, abstract=True):
@@ -44,13 +44,11 @@ class Analysis(Object, abstract=True):
     """Whether angles are written in degrees."""
 
 
-class AnalysisSet(Object):
+class AnalysisSet(Set):
     """The analyses of a run."""
 
     objects: LegacyMany[Analysis] = none()
     """The analyses."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the analyses; the tools ignore them."""
 
 
 class Actuation(Analysis):

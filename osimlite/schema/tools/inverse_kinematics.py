@@ -19,7 +19,7 @@ from osimlite.schema.fields import (
     word,
 )
 from osimlite.schema.references import InputModel, InputTable, OutputFolder, OutputTable, reads, writes
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class Tool(Object, abstract=True):
@@ -55,13 +55,11 @@ class IKCoordinateTask(IKTask):
     """The value if `value_type` is manual_value, in radians or metres."""
 
 
-class IKTaskSet(Object):
+class IKTaskSet(Set):
     """What inverse kinematics fits."""
 
     objects: LegacyMany[IKTask] = none()
     """The tasks, each with the name of a marker or a coordinate."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the tasks; the tools ignore them."""
 
 
 class InverseKinematicsToolBase(Tool, abstract=True):
@@ -102,13 +100,11 @@ class OrientationWeight(Object):
     """Beside those of the others."""
 
 
-class OrientationWeightSet(Object):
+class OrientationWeightSet(Set):
     """Weights of orientation sensors."""
 
     objects: LegacyMany[OrientationWeight] = none()
     """The weights; a sensor without one counts one."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the weights; the tools ignore them."""
 
 
 class IMUInverseKinematicsTool(InverseKinematicsToolBase):
@@ -129,13 +125,11 @@ class MarkerWeight(Object):
     """Beside those of the others."""
 
 
-class MarkerWeightSet(Object, tag="Set_MarkerWeight_"):
+class MarkerWeightSet(Set, tag="Set_MarkerWeight_"):
     """Weights of markers."""
 
     objects: LegacyMany[MarkerWeight] = none()
     """The weights."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the weights; nothing uses them."""
 
 
 class MarkersReference(Object):

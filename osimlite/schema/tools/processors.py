@@ -7,7 +7,7 @@ from osimlite.schema.fields import Flag, LegacyMany, Many, Number, Optional, Ref
 from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.schema.references import InputTable, Names, reads
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 
 
 class ModelOperator(Object, abstract=True):
@@ -104,13 +104,11 @@ class ModOpTendonComplianceDynamicsModeDGF(ModelOperator):
     """By a differential equation, or by one that is implicit."""
 
 
-class FunctionBasedPathSet(Object, tag="Set_FunctionBasedPath_"):
+class FunctionBasedPathSet(Set, tag="Set_FunctionBasedPath_"):
     """Paths as functions of coordinates, in a document of their own."""
 
     objects: LegacyMany[FunctionBasedPath] = none()
     """The paths, each with the path of the force that it belongs to as its name."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the paths; nothing uses them."""
 
 
 class TableOperator(Object, abstract=True):

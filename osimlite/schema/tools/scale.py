@@ -25,7 +25,7 @@ from osimlite.schema.references import (
     reads,
     writes,
 )
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 from osimlite.schema.tools.inverse_kinematics import IKTaskSet
 
 LegacyTimeRange = Annotated[Reals, reals("s", least=2, most=2, legacy=True)]
@@ -47,13 +47,11 @@ class MarkerPair(Object):
     """Names of the two markers, of the model and of the data."""
 
 
-class MarkerPairSet(Object):
+class MarkerPairSet(Set):
     """The pairs of markers of a measurement."""
 
     objects: LegacyMany[MarkerPair] = none()
     """The pairs; the measurement is the mean of their ratios."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the pairs; the tools ignore them."""
 
 
 class BodyScale(Object):
@@ -65,13 +63,11 @@ class BodyScale(Object):
     """Axes of the body along which it is scaled: X, Y, Z; other words do nothing."""
 
 
-class BodyScaleSet(Object):
+class BodyScaleSet(Set):
     """The bodies that a measurement scales."""
 
     objects: LegacyMany[BodyScale] = none()
     """The bodies with their axes."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the bodies; the tools ignore them."""
 
 
 class Measurement(Object):
@@ -85,13 +81,11 @@ class Measurement(Object):
     """What is scaled by the ratio."""
 
 
-class MeasurementSet(Object):
+class MeasurementSet(Set):
     """The measurements of a subject."""
 
     objects: LegacyMany[Measurement] = none()
     """The measurements; where two scale the same axis, the last counts."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the measurements; the tools ignore them."""
 
 
 class Scale(Object):
@@ -105,13 +99,11 @@ class Scale(Object):
     """Whether the factors count."""
 
 
-class ScaleSet(Object):
+class ScaleSet(Set):
     """Scale factors given by hand."""
 
     objects: LegacyMany[Scale] = none()
     """The factors, body by body."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the factors; the tools ignore them."""
 
 
 class ModelScaler(Object):

@@ -28,7 +28,7 @@ from osimlite.schema.references import (
     reads,
     several,
 )
-from osimlite.schema.sets import ObjectGroup
+from osimlite.schema.sets import Set
 from osimlite.schema.tools.dynamics import AbstractTool
 
 _Direction = Annotated[Reals, reals(least=3, most=3, legacy=True)]
@@ -107,13 +107,11 @@ class SMC_Joint(CMC_Joint):
     """Thickness of the layer around the sliding surface."""
 
 
-class CMC_TaskSet(Object):
+class CMC_TaskSet(Set):
     """What RRA and CMC follow."""
 
     objects: LegacyMany[TrackingTask] = none()
     """The tasks."""
-    groups: LegacyMany[ObjectGroup] = none()
-    """Named selections of the tasks; the tools ignore them."""
 
 
 class CMCTool(AbstractTool):
