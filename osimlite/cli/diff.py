@@ -27,7 +27,7 @@ def diff(
 
     Example: osimlite diff gait2392.osim gait2392_scaled.osim
     """
-    from osimlite.cli._console import complain, say
+    from osimlite.cli._console import say
     from osimlite.document.reader import read_any
     from osimlite.errors import OsimliteError
     from osimlite.lint.suffixes import is_table
@@ -43,19 +43,14 @@ def diff(
         title, (old, new) = "", files
     else:
         raise OsimliteError("diff takes two files")
-    try:
-        if all(is_table(str(file)) for file in (old, new) if str(file) != "/dev/null"):
-            from osimlite.cli._table_diff import table_differences
+    if all(is_table(str(file)) for file in (old, new) if str(file) != "/dev/null"):
+        from osimlite.cli._table_diff import table_differences
 
-            lines = table_differences(old, new)
-        else:
-            read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
-            kind = next((type(top) for top in read if top is not None), Model)
-            lines = described(differences(*(kind() if top is None else top for top in read)))
-    except OsimliteError as error:
-        # 1 says that the models differ.
-        complain(error)
-        raise typer.Exit(2) from None
+        lines = table_differences(old, new)
+    else:
+        read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
+        kind = next((type(top) for top in read if top is not None), Model)
+        lines = described(differences(*(kind() if top is None else top for top in read)))
     if git:
         say(f"--- {title}")
         say(f"+++ {title}")

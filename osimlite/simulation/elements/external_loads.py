@@ -41,8 +41,8 @@ def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[Declare
     Its data file is looked for beside it, then from the folder that the program runs in.
 
     Raises:
-        DocumentError: a file is missing, or holds something else.
-        ModelError: the mechanism has no body of a name, or the data file no three columns for an identifier.
+        DocumentError: a file is missing, or holds something else; the mechanism has no body of a name, or the data file
+            no three columns for an identifier.
     """
     loads, file = read_object(path, ExternalLoads), str(path)
     columns = _data(loads, Path(path).parent, file)
@@ -70,7 +70,7 @@ def _data(loads: ExternalLoads, folder: Path, file: str) -> _Columns:
     """The data of some loads, looked for in a folder first."""
     name = loads.datafile.strip()
     if not name:
-        raise ModelError("it names no data file; give it a <datafile>", file=file)
+        raise DocumentError("it names no data file; give it a <datafile>", file=file)
     return _Columns(read_beside(folder, name))
 
 
@@ -82,9 +82,9 @@ def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: s
         if identifier not in ("", "Unassigned")
     }
     if not given.keys() & {"force", "torque"}:
-        raise ModelError(f"'{force.name}' has no force_identifier and no torque_identifier; give it one", file=file)
+        raise DocumentError(f"'{force.name}' has no force_identifier and no torque_identifier; give it one", file=file)
     if "point" in given and "force" not in given:
-        raise ModelError(f"'{force.name}' has a point_identifier without a force_identifier; leave it out", file=file)
+        raise DocumentError(f"'{force.name}' has a point_identifier and no force_identifier; leave it out", file=file)
 
     def place(field: str) -> FramePlacement:
         return _place(mechanism, getattr(force, field), f"the {field} of '{force.name}'", file)
@@ -107,7 +107,7 @@ def _place(mechanism: Mechanism, value: Any, what: str, file: str) -> FramePlace
     try:
         return mechanism.placement(f"/{name.lstrip('./')}" if "/" in name else name)
     except ModelError as error:
-        raise ModelError(f"{what} is '{name}', but {error.message}", file=file) from None
+        raise DocumentError(f"{what} is '{name}', but {error.message}", file=file) from None
 
 
 class _Columns:
@@ -129,7 +129,7 @@ class _Columns:
             labels = self.table.columns
             places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
             if len(places) != 3:
-                raise ModelError(f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file)
+                raise DocumentError(f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file)
             rows = self.table.rows[:, places]
             bad = np.argwhere(~np.isfinite(rows))
             if len(bad):
