@@ -179,14 +179,18 @@ class ControlledSteps(Stepper):
         index = max(range(len(off)), key=lambda k: off[k] if isfinite(off[k]) else inf)
         if not isfinite(off[index]):
             what = f"leaves the range of numbers in {self._name(index)}"
-        elif off[index] > self._accuracy or not self._engine.structure[layout.CONSTRAINED]:
+        elif off[index] > self._accuracy:
             what = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._name(index)}"
-        else:
+        elif self._engine.structure[layout.CONSTRAINED]:
             what = "ends too far from where the constraints hold"
+        else:
+            what = "has no end that can be computed"
+        # Where steps may err by centimetres, fibers of muscles run away.
+        other = "more" if self._accuracy > DEFAULT_ACCURACY else "less"
         raise IntegrationError(
             f"The integrator cannot go on at t = {t0:.9g} s: even its shortest step of {h:.3g} s {what}. "
             "Something changes too abruptly there, such as a very stiff contact or a sharp limit: soften it, or "
-            "ask for less accuracy.",
+            f"ask for {other} accuracy.",
             t0,
             index,
         )
