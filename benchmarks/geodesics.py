@@ -1,7 +1,8 @@
 """Paths along geodesics: are speeds and moment arms derivatives, are lengths continuous, what does a path cost?
 
 Two ends at random places on either side of surfaces. A jump is counted where a length changes on a short way by more
-than the ends move. OpenSim's own times are those of one PathWrap on the machine of shared/oracle/muscles.
+than the ends move. Where a surface is met, or another way gets shorter, within the step of a difference, smaller steps
+are taken. OpenSim's own times are those of one PathWrap on the machine of shared/oracle/muscles.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ CASES = {
     "cylinder and ellipsoid": (["Cylinder all", "Ellipsoid all"], ""),
     "two cylinders": (["Cylinder all", "Cylinder all"], ""),
 }
-POSES, SWEEPS, STEPS, H = 1500, 150, 400, 2e-4
+POSES, SWEEPS, STEPS = 1500, 150, 400
+H, EXACT = (2e-4, 2e-5, 4e-6, 1e-6), 1e-9
 MOVING = [3, 4, 5, 9, 10, 11]
 Ends = np.ndarray
 
@@ -80,6 +82,12 @@ def jumps(length: Callable[[Ends], float], one: Ends, two: Ends) -> int:
     return int(np.sum(np.abs(lengths) > 1.01 * np.linalg.norm(step[:3]) + 1.01 * np.linalg.norm(step[3:])))
 
 
+def slope(length: Callable[[Ends], float], ends: Ends, way: Ends, h: float) -> float:
+    """The rate of a length on a way, by differences, extrapolated."""
+    one, two, four = ((length(ends + h / k * way) - length(ends - h / k * way)) * k / (2 * h) for k in (1, 2, 4))
+    return (64 * four - 20 * two + one) / 45
+
+
 def cost(paths: osimlite.simulation.paths.Paths, poses: list[Ends]) -> float:
     """Time of an evaluation, us."""
     still, times = np.zeros(12), []
@@ -104,15 +112,19 @@ def measured(case: str, kinds: list[str], opensim: str) -> list[str]:
     poses, errors = [drawn(rng, case) for _ in range(POSES)], []
     for ends in poses:
         way = rng.normal(size=6) / 3.0
-        one, two, four = ((length(ends + H / k * way) - length(ends - H / k * way)) * k / (2 * H) for k in (1, 2, 4))
-        slope, arms = (64 * four - 20 * two + one) / 45, paths.moment_arms(pose(ends))[owner]
+        arms, speed = paths.moment_arms(pose(ends))[owner], paths.speeds(pose(ends), pose(way))[owner]
         by_arms = -sum(arms.get(coordinates[k], 0.0) * part for k, part in zip(MOVING, way, strict=True))
-        errors.append(max(abs(slope - by_arms), abs(slope - paths.speeds(pose(ends), pose(way))[owner])))
+        error = np.inf
+        for h in H:
+            if error > EXACT:
+                quotient = slope(length, ends, way, h)
+                error = min(error, max(abs(quotient - by_arms), abs(quotient - speed)))
+        errors.append(error)
     torn = sum(jumps(length, drawn(rng, case), drawn(rng, case)) for _ in range(SWEEPS))
     bent = [pose(ends) for ends in poses if len(paths.points(pose(ends))[owner]) > 2]
     straight = [pose(np.array((0.3, 0.0, 0.3, 0.3, 0.2, 0.3)))] * len(bent)
     costs = [cost(each, bent) - cost(each, straight) for each in ways.values()]
-    bad = sum(error > 1e-9 for error in errors)
+    bad = sum(error > EXACT for error in errors)
     quantiles = (f"{value:.0e}" for value in np.quantile(errors, (0.5, 0.999)))
     return [case, f"{len(bent)}", *quantiles, f"{bad}", f"{torn}", *(f"{each:.1f}" for each in costs), opensim]
 

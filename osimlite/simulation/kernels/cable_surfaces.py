@@ -51,8 +51,9 @@ GEODESIC_ROOM = (3 + COLUMNS) * SIZE
 """Of room for an integration: columns of the extrapolation, or what a step of Merson's takes."""
 ACCURACY, CONSTRAINT, SMALLEST = 1e-10, 1e-9, 2.0**-45.5
 """Of a step, of what the surface demands, and the smallest step, m."""
-EXACT = 1e-12
-"""By this the last column of an extrapolation may move the end, m; it is better than that by far."""
+EXACT, ROUNDED = 1e-12, 1e-15
+"""By this the last column of an extrapolation may move the end, m; it is better than that by far. So near to 0 the
+function of the surface is then; moment arms need that."""
 MOST_STEPS, MOST_CORRECTIONS = 10_000, 10
 LEAST, MOST, SAFETY, STRETCH, LESS, MORE = 0.1, 5.0, 0.9, 0.1, 0.9, 1.2
 """How step sizes change, as in Simbody's GeodesicIntegrator."""
@@ -171,7 +172,7 @@ def integrate(p: Floats, point: Vector, direction: Vector, length: float, geodes
     put(y, 0, point)
     put(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
-    if not project(p, y):
+    if not project(p, y, 0.1 * CONSTRAINT):
         return False
     slope(p, y, rates)
     set_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
@@ -183,7 +184,7 @@ def integrate(p: Floats, point: Vector, direction: Vector, length: float, geodes
         while True:
             h = next_t - t
             error = merson(p, h, room)
-            if error <= ACCURACY and project(p, trial):
+            if error <= ACCURACY and project(p, trial, 0.1 * CONSTRAINT):
                 break
             if not h > SMALLEST:
                 return False
@@ -219,7 +220,7 @@ def extrapolate(p: Floats, point: Vector, direction: Vector, length: float, geod
     put(y, 0, point)
     put(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
-    if not project(p, y):
+    if not project(p, y, ROUNDED):
         return False
     set_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
     left = step = length
@@ -230,7 +231,7 @@ def extrapolate(p: Floats, point: Vector, direction: Vector, length: float, geod
             if not step > SMALLEST:
                 return False
         left -= step
-        if not project(p, y):
+        if not project(p, y, ROUNDED):
             return False
     set_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
     geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
@@ -287,12 +288,12 @@ def slope(p: Floats, y: Floats, f: Floats) -> None:
     f[3], f[4], f[8], f[9] = y[8], y[9], -gaussian * y[3], -gaussian * y[4]
 
 
-def project(p: Floats, y: Floats) -> bool:
+def project(p: Floats, y: Floats, exactness: float) -> bool:
     """Bring the state of a geodesic back to the surface; whether that came to an end."""
     point = vector(y, 0)
     error = value(p, point)
     for _ in range(MOST_CORRECTIONS):
-        if abs(error) <= 0.1 * CONSTRAINT:
+        if abs(error) <= exactness:
             break
         g = gradient(p, point)
         point = along(point, -error / dot(g, g), g)

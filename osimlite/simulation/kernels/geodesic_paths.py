@@ -225,7 +225,7 @@ def settle(
                 continue
             count += 1
         elif count == 0:
-            return 0, step
+            break
         if NEARLY * chain_length(chain, count) > least or not smooth(chain, count, room):
             break
     return -1, step

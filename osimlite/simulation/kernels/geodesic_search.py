@@ -54,7 +54,7 @@ SMOOTH, STALLED, NEAR = 1e-12, 1e-8, 1e-3
 (m) count as so long."""
 STIFF, STIFFER = 1.0, 3.0
 """How stiff springs are at least (N/m) if the string is pulled by 1 N, and how many times stiffer the next ones."""
-ROUNDS, MOST_TURN, LEAST_PART, SHORT = 60, 0.2, 0.1, 0.01
+ROUNDS, MOST_TURN, LEAST_PART, SHORT = 60, 0.2, 0.1, 1e-6
 """Of a search: its rounds; by how much (rad) an end of a geodesic may turn in a round; what must be left of a geodesic
 after it, unless that is so short (rad)."""
 
@@ -125,7 +125,7 @@ def part_of(slot: Floats, corrections: Floats) -> float:
         if arc + corrections[3] <= 0.0 and arc * abs(start[ALONG_BENDS]) < SHORT:
             slot[GEODESIC + ARC] = part = 0.0
         else:
-            part = (LEAST_PART - 1.0) * arc / corrections[3]
+            corrections[3] = (LEAST_PART - 1.0) * arc
     return part
 
 
