@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import ZERO, along, cross, minus, times, vector
 from osimlite.simulation.kernels.layout import (
     AMOUNT,
     ARGUMENT_COUNT,
@@ -20,7 +21,9 @@ from osimlite.simulation.kernels.layout import (
     SCRATCH,
     WORK_OPERATION,
 )
+from osimlite.simulation.kernels.motion import set_row
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.kernels.states import copy
 
 SIGN, COORDINATES, TURNS = 0, 1, 3
 """Of its integers: -1 if it is passed backwards, else 1; the degrees of freedom of the first two coordinates of the
@@ -30,8 +33,7 @@ joint, and the operations that are the three turns, -1 for what does not move.""
 def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Nothing moves."""
     kept, frame = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH)
-    for k in range(12):
-        kept[k] = frame[k]
+    copy(12, frame, kept)
     return OK
 
 
@@ -39,14 +41,13 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
     """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
     own = at(s, s[s[OPERATION_AT] + OPERATION_INTS * operation + ARGUMENTS])
     kept, found, u = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(y, s[FREEDOMS])
-    px, py, pz = kept[POINT] - found[0], kept[POINT + 1] - found[1], kept[POINT + 2] - found[2]
-    tx = ty = tz = 0.0
+    arm, total = minus(vector(kept, POINT), vector(found, 0)), ZERO
     for row in range(1, 3):
         last = own[TURNS + row]
         if last < 0:
             continue
         # What Simbody takes for the rates of the angles before this one turns its axis, and should not.
-        dx = dy = dz = 0.0
+        drift = ZERO
         for turn in range(3):
             number = own[TURNS + turn]
             if number < 0:
@@ -58,21 +59,13 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
                     wrong += share(s, w, number, freedom) * u[freedom]
             if turn < row:
                 wrong -= rate(s, w, u, number)
-            axis = at(w, s[WORK_OPERATION] + OPERATION_WORK * number + AXIS)
-            dx += wrong * axis[0]
-            dy += wrong * axis[1]
-            dz += wrong * axis[2]
-        axis = at(w, s[WORK_OPERATION] + OPERATION_WORK * last + AXIS)
-        size = -rate(s, w, u, last)
-        tx += size * (axis[1] * dz - axis[2] * dy)
-        ty += size * (axis[2] * dx - axis[0] * dz)
-        tz += size * (axis[0] * dy - axis[1] * dx)
-    kept[AMOUNT], kept[RATE], kept[CURVATURE] = tx, ty, tz
-    tx, ty, tz = own[SIGN] * tx, own[SIGN] * ty, own[SIGN] * tz
-    for k in range(6):
-        found[k] = 0.0
-    found[6], found[7], found[8] = py * tz - pz * ty, pz * tx - px * tz, px * ty - py * tx
-    found[9], found[10], found[11] = tx, ty, tz
+            drift = along(drift, wrong, vector(w, s[WORK_OPERATION] + OPERATION_WORK * number + AXIS))
+        axis = vector(w, s[WORK_OPERATION] + OPERATION_WORK * last + AXIS)
+        total = along(total, -rate(s, w, u, last), cross(axis, drift))
+    kept[AMOUNT], kept[RATE], kept[CURVATURE] = total
+    total = times(float(own[SIGN]), total)
+    set_row(found, ZERO, ZERO)
+    set_row(at(found, 6), cross(arm, total), total)
     return OK
 
 

@@ -8,6 +8,8 @@ share.
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import ZERO, cross, dot, put, replaced, times, vector
+from osimlite.simulation.kernels.ball_joint import angle_drift, angle_row, last_axis
 from osimlite.simulation.kernels.layout import (
     ABOVE,
     ACCELERATION,
@@ -56,7 +58,6 @@ from osimlite.simulation.kernels.layout import (
     WORK_SHARES,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
-from osimlite.simulation.kernels.trigonometry import sine_cosine
 
 
 def chain_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
@@ -140,37 +141,15 @@ def move_joints(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
 
 
 def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:
-    """Acceleration of one angle of a ball without udot; fills its row of N, as `SphericalMotion` has it."""
-    s1, c1 = sine_cosine(y[angles[0]])
-    s2, c2 = sine_cosine(y[angles[1]])
-    r1, r2, r3 = f[angles[0]], f[angles[1]], f[angles[2]]
-    if part == 0:
-        row[0], row[1], row[2] = 1.0, s1 * s2 / c2, -c1 * s2 / c2
-    elif part == 1:
-        row[0], row[1], row[2] = 0.0, c1, s1
-    else:
-        row[0], row[1], row[2] = 0.0, -s1 / c2, c1 / c2
-    drift: float = row[0] * c2 * r2 * r3
-    drift += row[1] * ((s1 * s2 * r2 - c1 * c2 * r1) * r3 - s1 * r1 * r2)
-    drift += row[2] * (c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3)
-    return -drift
+    """Acceleration of one angle of a ball without udot; fills its row."""
+    put(row, 0, angle_row(y, angles, part))
+    return angle_drift(y, f, angles, vector(row, 0))
 
 
 def move_end(angles: Ints, y: Floats, u: Floats, part: int, radius: float, row: Floats) -> tuple[float, float, float]:
     """Value, rate and acceleration without udot of a component of r n, n the last axis of a ball; fills its row."""
-    s1, c1 = sine_cosine(y[angles[0]])
-    s2, c2 = sine_cosine(y[angles[1]])
-    nx, ny, nz = s2, -s1 * c2, c1 * c2
-    ux, uy, uz = u[angles[0]], u[angles[1]], u[angles[2]]
+    n, spin = last_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
     # n moves by u x n, and that by u x (u x n).
-    if part == 0:
-        n, own = nx, ux
-        row[0], row[1], row[2] = 0.0, radius * nz, -radius * ny
-    elif part == 1:
-        n, own = ny, uy
-        row[0], row[1], row[2] = -radius * nz, 0.0, radius * nx
-    else:
-        n, own = nz, uz
-        row[0], row[1], row[2] = radius * ny, -radius * nx, 0.0
-    along, square = ux * nx + uy * ny + uz * nz, ux * ux + uy * uy + uz * uz
-    return radius * n, row[0] * ux + row[1] * uy + row[2] * uz, radius * (own * along - n * square)
+    put(row, 0, times(radius, cross(n, replaced(ZERO, part, 1.0))))
+    own = spin[part] * dot(spin, n) - n[part] * dot(spin, spin)
+    return radius * n[part], dot(vector(row, 0), spin), radius * own

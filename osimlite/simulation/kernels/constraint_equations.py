@@ -8,6 +8,7 @@ What a unit of a vector's rate takes of the speeds is what a force along it woul
 from __future__ import annotations
 
 from osimlite.forces.vectors import ZERO, Vector, cross, dot, minus, norm, over, plus, times, vector
+from osimlite.simulation.kernels.ball_joint import angle_drift, angle_row
 from osimlite.simulation.kernels.functions import MONOMIALS, several_at, value_at
 from osimlite.simulation.kernels.layout import (
     ABOVE,
@@ -42,7 +43,6 @@ from osimlite.simulation.kernels.points import (
     station,
     velocity,
 )
-from osimlite.simulation.kernels.trigonometry import sine_cosine
 
 AXIS, ARM, MEETING = 0, 1, 2
 """Kinds of vectors; that of a meeting is an arm whose rate is how fast its end leaves the point of its first link that
@@ -107,23 +107,11 @@ def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: floa
     if ball < 0:
         row[freedom] += factor
         return 0.0
-    a = at(s, ball)
-    s1, c1 = sine_cosine(y[a[0]])
-    s2, c2 = sine_cosine(y[a[1]])
-    r1, r2, r3 = f[a[0]], f[a[1]], f[a[2]]
-    # The rate is nx ux + ny uy + nz uz. The speeds are B r with the axes of the angles as columns, which turn.
-    nx, ny, nz = 0.0, c1, s1
-    if coordinate[2] == 0:
-        nx, ny, nz = 1.0, s1 * s2 / c2, -c1 * s2 / c2
-    elif coordinate[2] == 2:
-        nx, ny, nz = 0.0, -s1 / c2, c1 / c2
-    row[a[0]] += factor * nx
-    row[a[1]] += factor * ny
-    row[a[2]] += factor * nz
-    dx = c2 * r2 * r3
-    dy = -s1 * r1 * r2 + (s1 * s2 * r2 - c1 * c2 * r1) * r3
-    dz = c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3
-    return -factor * (nx * dx + ny * dy + nz * dz)
+    angles = at(s, ball)
+    n = angle_row(y, angles, coordinate[2])
+    for k in range(3):
+        row[angles[k]] += factor * n[k]
+    return factor * angle_drift(y, f, angles, n)
 
 
 def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:

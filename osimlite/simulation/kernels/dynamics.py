@@ -8,6 +8,7 @@ degrees of freedom times the square of how many of them carry one another.
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import Vector, cross, dot, minus, plus, put, times, turned, vector
 from osimlite.simulation.kernels.layout import (
     ABOVE,
     ACCELERATION,
@@ -114,18 +115,19 @@ def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int)
     return status
 
 
-def momentum(
-    i: Floats, wx: float, wy: float, wz: float, vx: float, vy: float, vz: float
-) -> tuple[float, float, float, float, float, float]:
+def spun(moments: Floats, a: Vector) -> Vector:
+    """A symmetric matrix times a vector."""
+    x, y, z = a
+    xx, yy, zz, xy, xz, yz = moments[0], moments[1], moments[2], moments[3], moments[4], moments[5]
+    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
+
+
+def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]:
     """Inertia times a spatial vector."""
-    m, cx, cy, cz, xx, yy, zz, xy, xz, yz = i[0], i[1], i[2], i[3], i[4], i[5], i[6], i[7], i[8], i[9]
+    first = vector(i, 1)
     return (
-        xx * wx + xy * wy + xz * wz + cy * vz - cz * vy,
-        xy * wx + yy * wy + yz * wz + cz * vx - cx * vz,
-        xz * wx + yz * wy + zz * wz + cx * vy - cy * vx,
-        m * vx + wy * cz - wz * cy,
-        m * vy + wz * cx - wx * cz,
-        m * vz + wx * cy - wy * cx,
+        plus(spun(at(i, 4), spin), cross(first, velocity)),
+        plus(times(i[0], velocity), cross(spin, first)),
     )
 
 
@@ -133,35 +135,26 @@ def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
     """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
     for link in range(s[LINKS]):
         b, here = at(x, INERTIA_AT + 10 * link), at(w, s[WORK_LINK] + LINK_WORK * link)
-        r, p, o, i = at(here, ROTATION), at(here, POSITION), at(here, ORIGIN), at(here, INERTIA)
-        m, bx, by, bz = b[0], b[1], b[2], b[3]
-        r0, r1, r2, r3, r4, r5, r6, r7, r8 = r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]
-        cx = p[0] - o[0] + r0 * bx + r1 * by + r2 * bz
-        cy = p[1] - o[1] + r3 * bx + r4 * by + r5 * bz
-        cz = p[2] - o[2] + r6 * bx + r7 * by + r8 * bz
-        xx, yy, zz, xy, xz, yz = b[4], b[5], b[6], b[7], b[8], b[9]
+        r, i, m = at(here, ROTATION), at(here, INERTIA), b[0]
+        center = plus(minus(vector(here, POSITION), vector(here, ORIGIN)), turned(r, vector(b, 1)))
+        cx, cy, cz = center
+        mx, my, mz = times(m, center)
+        one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
         # Rows of R I.
-        ax, ay, az = r0 * xx + r1 * xy + r2 * xz, r0 * xy + r1 * yy + r2 * yz, r0 * xz + r1 * yz + r2 * zz
-        ex, ey, ez = r3 * xx + r4 * xy + r5 * xz, r3 * xy + r4 * yy + r5 * yz, r3 * xz + r4 * yz + r5 * zz
-        gx, gy, gz = r6 * xx + r7 * xy + r8 * xz, r6 * xy + r7 * yy + r8 * yz, r6 * xz + r7 * yz + r8 * zz
-        mx, my, mz = m * cx, m * cy, m * cz
+        first, second, third = spun(at(b, 4), one), spun(at(b, 4), two), spun(at(b, 4), three)
         i[0], i[1], i[2], i[3] = m, mx, my, mz
-        i[4] = ax * r0 + ay * r1 + az * r2 + my * cy + mz * cz
-        i[5] = ex * r3 + ey * r4 + ez * r5 + mx * cx + mz * cz
-        i[6] = gx * r6 + gy * r7 + gz * r8 + mx * cx + my * cy
-        i[7] = ax * r3 + ay * r4 + az * r5 - mx * cy
-        i[8] = ax * r6 + ay * r7 + az * r8 - mx * cz
-        i[9] = ex * r6 + ey * r7 + ez * r8 - my * cz
-        v, a, load = at(here, VELOCITY), at(here, ACCELERATION), at(here, WRENCH)
-        wx, wy, wz, vx, vy, vz = v[0], v[1], v[2], v[3], v[4], v[5]
-        nx, ny, nz, lx, ly, lz = momentum(i, wx, wy, wz, vx, vy, vz)
-        qx, qy, qz, hx, hy, hz = momentum(i, a[0], a[1], a[2], a[3], a[4], a[5])
-        load[0] = -qx - (wy * nz - wz * ny + vy * lz - vz * ly)
-        load[1] = -qy - (wz * nx - wx * nz + vz * lx - vx * lz)
-        load[2] = -qz - (wx * ny - wy * nx + vx * ly - vy * lx)
-        load[3] = -hx - (wy * lz - wz * ly)
-        load[4] = -hy - (wz * lx - wx * lz)
-        load[5] = -hz - (wx * ly - wy * lx)
+        i[4] = dot(first, one) + my * cy + mz * cz
+        i[5] = dot(second, two) + mx * cx + mz * cz
+        i[6] = dot(third, three) + mx * cx + my * cy
+        i[7] = dot(first, two) - mx * cy
+        i[8] = dot(first, three) - mx * cz
+        i[9] = dot(second, three) - my * cz
+        spin, velocity = vector(here, VELOCITY), vector(here, VELOCITY + 3)
+        angular, linear = momentum(i, spin, velocity)
+        torque, force = momentum(i, vector(here, ACCELERATION), vector(here, ACCELERATION + 3))
+        torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
+        put(here, WRENCH, times(-1.0, torque))
+        put(here, WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
 
 
 def clear_wrenches(s: Ints, w: Floats) -> None:
@@ -215,13 +208,13 @@ def composite_rigid_body(s: Ints, w: Floats, right: Floats) -> None:
         i, load = at(here, INERTIA), at(here, WRENCH)
         for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
             c = at(columns, 6 * freedom)
-            ex, ey, ez, mx, my, mz = c[0], c[1], c[2], c[3], c[4], c[5]
-            right[freedom] += ex * load[0] + ey * load[1] + ez * load[2] + mx * load[3] + my * load[4] + mz * load[5]
-            hx, hy, hz, lx, ly, lz = momentum(i, ex, ey, ez, mx, my, mz)
+            turn, shift = vector(c, 0), vector(c, 3)
+            right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
+            angular, linear = momentum(i, turn, shift)
             row, k, place = at(w, freedoms[FREEDOM_INTS * freedom + ROW]), freedom, 0
             while k >= 0:
                 c = at(columns, 6 * k)
-                row[place] = c[0] * hx + c[1] * hy + c[2] * hz + c[3] * lx + c[4] * ly + c[5] * lz
+                row[place] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
                 k = freedoms[FREEDOM_INTS * k + ABOVE]
                 place += 1
         if j[PARENT] >= 0:

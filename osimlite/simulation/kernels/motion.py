@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import ZERO, Vector, along, cross, minus, plus, put, times, vector
 from osimlite.simulation.kernels.layout import (
     ACCELERATION,
     ALONE,
@@ -40,7 +41,6 @@ from osimlite.simulation.kernels.layout import (
     POINT,
     POSITION,
     RATE,
-    ROTATION,
     SCRATCH,
     SUMMED,
     SUMMED_AT,
@@ -53,6 +53,8 @@ from osimlite.simulation.kernels.layout import (
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
+Axes = tuple[Vector, Vector, Vector]
+
 BALL_MOVES = 1
 """How far after the law of a ball (or a drift) that places its link is the one that moves it."""
 
@@ -61,27 +63,18 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
     """Rotations, positions and origins of all links, axes of all operations."""
     for link in range(s[LINKS]):
         i, here = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link)
-        parent = i[PARENT]
-        if parent >= 0:
-            r = at(w, s[WORK_LINK] + LINK_WORK * parent)
-            xx, xy, xz, yx, yy, yz, zx, zy, zz = r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]
-            px, py, pz = r[POSITION], r[POSITION + 1], r[POSITION + 2]
-        else:
-            xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
-            px = py = pz = 0.0
+        axes, origin = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), ZERO
+        if i[PARENT] >= 0:
+            parent = at(w, s[WORK_LINK] + LINK_WORK * i[PARENT])
+            axes, origin = axes_of(parent), vector(parent, POSITION)
         for operation in range(i[FIRST_OPERATION], i[END_OPERATION]):
             record = s[OPERATION_AT] + OPERATION_INTS * operation
             j, a = at(s, record), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
             b = at(x, s[FIXED_AT] + FIXED_NUMBERS * operation)
             if j[BEFORE] != NOTHING:
-                px += xx * b[9] + xy * b[10] + xz * b[11]
-                py += yx * b[9] + yy * b[10] + yz * b[11]
-                pz += zx * b[9] + zy * b[10] + zz * b[11]
+                origin = plus(origin, along_axes(axes, vector(b, 9)))
                 if j[BEFORE] == MOVE:
-                    b0, b1, b2, b3, b4, b5, b6, b7, b8 = b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8]
-                    xx, xy, xz = xx * b0 + xy * b3 + xz * b6, xx * b1 + xy * b4 + xz * b7, xx * b2 + xy * b5 + xz * b8
-                    yx, yy, yz = yx * b0 + yy * b3 + yz * b6, yx * b1 + yy * b4 + yz * b7, yx * b2 + yy * b5 + yz * b8
-                    zx, zy, zz = zx * b0 + zy * b3 + zz * b6, zx * b1 + zy * b4 + zz * b7, zx * b2 + zy * b5 + zz * b8
+                    axes = turned_axes(axes, axes_of(b))
             motion = j[MOTION]
             if motion < BALL:
                 if j[FREEDOM] >= 0:
@@ -90,52 +83,51 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
                     call(s[LAWS + j[FUNCTION]], s, x, w, y, f, operation)
                     amount = a[AMOUNT]
                 if motion == TURN:
-                    a[AXIS], a[AXIS + 1], a[AXIS + 2] = xz, yz, zz
-                    a[POINT], a[POINT + 1], a[POINT + 2] = px, py, pz
+                    one, two, three = axes
+                    put(a, AXIS, three)
+                    put(a, POINT, origin)
                     sine, cosine = sine_cosine(amount)
-                    xx, xy = cosine * xx + sine * xy, cosine * xy - sine * xx
-                    yx, yy = cosine * yx + sine * yy, cosine * yy - sine * yx
-                    zx, zy = cosine * zx + sine * zy, cosine * zy - sine * zx
+                    axes = along(times(cosine, one), sine, two), along(times(cosine, two), -sine, one), three
                 else:
-                    ex = xx * b[12] + xy * b[13] + xz * b[14]
-                    ey = yx * b[12] + yy * b[13] + yz * b[14]
-                    ez = zx * b[12] + zy * b[13] + zz * b[14]
-                    a[AXIS], a[AXIS + 1], a[AXIS + 2] = ex, ey, ez
-                    px += amount * ex
-                    py += amount * ey
-                    pz += amount * ez
+                    axis = along_axes(axes, vector(b, 12))
+                    put(a, AXIS, axis)
+                    origin = along(origin, amount, axis)
             else:
                 frame = at(w, SCRATCH)
-                set_frame(frame, xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz)
+                set_frame(frame, axes, origin)
                 call(s[LAWS + j[FUNCTION]], s, x, w, y, f, operation)
-                xx, xy, xz, yx, yy, yz = frame[0], frame[1], frame[2], frame[3], frame[4], frame[5]
-                zx, zy, zz, px, py, pz = frame[6], frame[7], frame[8], frame[9], frame[10], frame[11]
-        set_frame(at(here, ROTATION), xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz)
-        if parent >= 0:
-            r = at(w, s[WORK_LINK] + LINK_WORK * parent)
-            here[ORIGIN], here[ORIGIN + 1], here[ORIGIN + 2] = r[ORIGIN], r[ORIGIN + 1], r[ORIGIN + 2]
-        else:
-            here[ORIGIN], here[ORIGIN + 1], here[ORIGIN + 2] = px, py, pz
+                axes, origin = axes_of(frame), vector(frame, POSITION)
+        set_frame(here, axes, origin)
+        if i[PARENT] >= 0:
+            origin = vector(w, s[WORK_LINK] + LINK_WORK * i[PARENT] + ORIGIN)
+        put(here, ORIGIN, origin)
 
 
-def set_frame(
-    a: Floats,
-    xx: float,
-    xy: float,
-    xz: float,
-    yx: float,
-    yy: float,
-    yz: float,
-    zx: float,
-    zy: float,
-    zz: float,
-    px: float,
-    py: float,
-    pz: float,
-) -> None:
+def axes_of(rows: Floats) -> Axes:
+    """The axes of a frame, whose rotation is given by rows."""
+    return (rows[0], rows[3], rows[6]), (rows[1], rows[4], rows[7]), (rows[2], rows[5], rows[8])
+
+
+def along_axes(axes: Axes, a: Vector) -> Vector:
+    """A vector that has these components along axes."""
+    one, two, three = axes
+    x, y, z = a
+    return along(along(times(x, one), y, two), z, three)
+
+
+def turned_axes(axes: Axes, others: Axes) -> Axes:
+    """Axes that have these components along others, which are the first."""
+    one, two, three = others
+    return along_axes(axes, one), along_axes(axes, two), along_axes(axes, three)
+
+
+def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
     """Set a rotation by rows, and the position after it."""
-    a[0], a[1], a[2], a[3], a[4], a[5] = xx, xy, xz, yx, yy, yz
-    a[6], a[7], a[8], a[9], a[10], a[11] = zx, zy, zz, px, py, pz
+    one, two, three = axes
+    rows[0], rows[3], rows[6] = one
+    rows[1], rows[4], rows[7] = two
+    rows[2], rows[5], rows[8] = three
+    put(rows, POSITION, origin)
 
 
 def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
@@ -146,91 +138,62 @@ def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     for freedom in range(size):
         f[freedom] = y[size + freedom]
     for k in range(s[SUMMED]):
-        set_row(at(w, s[WORK_COLUMN] + 6 * s[s[SUMMED_AT] + k]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        set_row(at(w, s[WORK_COLUMN] + 6 * s[s[SUMMED_AT] + k]), ZERO, ZERO)
     for link in range(s[LINKS]):
         i, here = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link)
-        ox, oy, oz = here[ORIGIN], here[ORIGIN + 1], here[ORIGIN + 2]
+        origin = vector(here, ORIGIN)
+        # Links that are pushed upwards move in one another as under gravity.
+        spin, velocity, spin_rate, acceleration = ZERO, ZERO, ZERO, times(-1.0, vector(x, GRAVITY_AT))
         if i[PARENT] >= 0:
-            v = at(w, s[WORK_LINK] + LINK_WORK * i[PARENT] + VELOCITY)
-            wx, wy, wz, vx, vy, vz = v[0], v[1], v[2], v[3], v[4], v[5]
-            ax, ay, az, bx, by, bz = v[6], v[7], v[8], v[9], v[10], v[11]
-        else:
-            wx = wy = wz = vx = vy = vz = ax = ay = az = 0.0
-            # Links that are pushed upwards move in one another as under gravity.
-            bx, by, bz = -x[GRAVITY_AT], -x[GRAVITY_AT + 1], -x[GRAVITY_AT + 2]
+            parent = at(w, s[WORK_LINK] + LINK_WORK * i[PARENT])
+            spin, velocity = vector(parent, VELOCITY), vector(parent, VELOCITY + 3)
+            spin_rate, acceleration = vector(parent, ACCELERATION), vector(parent, ACCELERATION + 3)
         for operation in range(i[FIRST_OPERATION], i[END_OPERATION]):
             j = at(s, s[OPERATION_AT] + OPERATION_INTS * operation)
             a = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
             motion, freedom = j[MOTION], j[FREEDOM]
             if motion < BALL:
-                ex, ey, ez = a[AXIS], a[AXIS + 1], a[AXIS + 2]
+                turn, shift = ZERO, vector(a, AXIS)
                 if motion == TURN:
-                    px, py, pz = a[POINT] - ox, a[POINT + 1] - oy, a[POINT + 2] - oz
-                    mx, my, mz = py * ez - pz * ey, pz * ex - px * ez, px * ey - py * ex
-                else:
-                    mx, my, mz = ex, ey, ez
-                    ex = ey = ez = 0.0
+                    turn, shift = shift, cross(minus(vector(a, POINT), origin), shift)
                 if freedom >= 0:
                     rate = y[size + freedom]
                     column = at(w, s[WORK_COLUMN] + 6 * freedom)
                     if j[FUNCTION] == ALONE:
-                        set_row(column, ex, ey, ez, mx, my, mz)
+                        set_row(column, turn, shift)
                     else:
-                        add_row(column, 1.0, ex, ey, ez, mx, my, mz)
+                        add_row(column, 1.0, turn, shift)
                 else:
                     rate, curvature = a[RATE], a[CURVATURE]
-                    ax += curvature * ex
-                    ay += curvature * ey
-                    az += curvature * ez
-                    bx += curvature * mx
-                    by += curvature * my
-                    bz += curvature * mz
+                    spin_rate = along(spin_rate, curvature, turn)
+                    acceleration = along(acceleration, curvature, shift)
                     for k in range(j[ARGUMENT_COUNT]):
                         freedom = s[j[ARGUMENTS] + k]
                         if freedom >= 0:
-                            factor = w[j[GRADIENT] + k]
-                            add_row(at(w, s[WORK_COLUMN] + 6 * freedom), factor, ex, ey, ez, mx, my, mz)
-                sx, sy, sz, tx, ty, tz = rate * ex, rate * ey, rate * ez, rate * mx, rate * my, rate * mz
+                            add_row(at(w, s[WORK_COLUMN] + 6 * freedom), w[j[GRADIENT] + k], turn, shift)
+                turn, shift = times(rate, turn), times(rate, shift)
             else:
                 # The origin goes to the law, and what it finds comes back.
                 found = at(w, SCRATCH)
-                found[0], found[1], found[2] = ox, oy, oz
+                put(found, 0, origin)
                 status = max(status, call(s[LAWS + j[FUNCTION] + BALL_MOVES], s, x, w, y, f, operation))
-                sx, sy, sz, tx, ty, tz = found[0], found[1], found[2], found[3], found[4], found[5]
-                bx += found[6]
-                by += found[7]
-                bz += found[8]
-                ax += found[9]
-                ay += found[10]
-                az += found[11]
+                turn, shift = vector(found, 0), vector(found, 3)
+                acceleration, spin_rate = plus(acceleration, vector(found, 6)), plus(spin_rate, vector(found, 9))
             # The axes are carried around by what moved before.
-            ax += wy * sz - wz * sy
-            ay += wz * sx - wx * sz
-            az += wx * sy - wy * sx
-            bx += vy * sz - vz * sy + wy * tz - wz * ty
-            by += vz * sx - vx * sz + wz * tx - wx * tz
-            bz += vx * sy - vy * sx + wx * ty - wy * tx
-            wx += sx
-            wy += sy
-            wz += sz
-            vx += tx
-            vy += ty
-            vz += tz
-        set_row(at(here, VELOCITY), wx, wy, wz, vx, vy, vz)
-        set_row(at(here, ACCELERATION), ax, ay, az, bx, by, bz)
+            spin_rate = plus(spin_rate, cross(spin, turn))
+            acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))
+            spin, velocity = plus(spin, turn), plus(velocity, shift)
+        set_row(at(here, VELOCITY), spin, velocity)
+        set_row(at(here, ACCELERATION), spin_rate, acceleration)
     return status
 
 
-def set_row(row: Floats, ex: float, ey: float, ez: float, mx: float, my: float, mz: float) -> None:
+def set_row(row: Floats, turn: Vector, shift: Vector) -> None:
     """Set a spatial vector."""
-    row[0], row[1], row[2], row[3], row[4], row[5] = ex, ey, ez, mx, my, mz
+    put(row, 0, turn)
+    put(row, 3, shift)
 
 
-def add_row(row: Floats, factor: float, ex: float, ey: float, ez: float, mx: float, my: float, mz: float) -> None:
+def add_row(row: Floats, factor: float, turn: Vector, shift: Vector) -> None:
     """Add a multiple to a spatial vector."""
-    row[0] += factor * ex
-    row[1] += factor * ey
-    row[2] += factor * ez
-    row[3] += factor * mx
-    row[4] += factor * my
-    row[5] += factor * mz
+    set_row(row, along(vector(row, 0), factor, turn), along(vector(row, 3), factor, shift))
