@@ -201,6 +201,7 @@ def settle(
     chain, room, poses = at(found, slots[CHAIN]), at(found, slots[SEARCH]), at(found, slots[POSES])
     for number in range(i[WRAPS]):
         put(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
+    waits = False
     for _ in range(TURNS):
         before = count
         for k in range(count, 0, -1):
@@ -210,20 +211,26 @@ def settle(
         # What was left is met again, if at all, once the rest is smooth.
         if count == before:
             number, place, axis = meet_most(i, p, wraps, poses, one, chain, count, room)
-            if place == 0:
+            if place == 0 and not waits:
                 return count, step
-            numbers, pose = at(p, wraps[WRAP_INTS * number + PLACES]), at(poses, POSE_NUMBERS * number)
-            is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
-            if is_open and norm(vector(pose, ABOUT)) == 0.0:
-                a, b = seen(pose, work, one), seen(pose, work, two)
-                if near > 1 or has_two_ways(at(numbers, SURFACE), a, b):
-                    step //= 2
-                    put(pose, ABOUT, times(1.0 if way // step % 2 == 0 else -1.0, axis))
-            insert(numbers, pose, chain, count, place, number)
-            if not lay(numbers, pose, chain, count + 1, place, pulled, room):
-                take_out(chain, count + 1, place)
-                continue
-            count += 1
+            waits = False
+            if place > 0:
+                numbers, pose = at(p, wraps[WRAP_INTS * number + PLACES]), at(poses, POSE_NUMBERS * number)
+                is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
+                if is_open and norm(vector(pose, ABOUT)) == 0.0:
+                    a, b = seen(pose, work, one), seen(pose, work, two)
+                    if near > 1 or has_two_ways(at(numbers, SURFACE), a, b):
+                        step //= 2
+                        # On the other side it waits for what else is met: alone it might slide back.
+                        waits = way // step % 2 == 1
+                        put(pose, ABOUT, times(-1.0 if waits else 1.0, axis))
+                insert(numbers, pose, chain, count, place, number)
+                if not lay(numbers, pose, chain, count + 1, place, pulled, room):
+                    take_out(chain, count + 1, place)
+                    continue
+                count += 1
+                if waits:
+                    continue
         elif count == 0:
             break
         if NEARLY * chain_length(chain, count) > least or not smooth(chain, count, room):
