@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import errno
 import io
+import json
 import ntpath
 import os
 import sys
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any, cast
 
 import numpy as np
@@ -20,8 +21,11 @@ from osimlite.cli._console import wants_colour
 from osimlite.cli.simulate import _write
 from osimlite.errors import OsimliteError
 from osimlite.files import from_folder, write_atomically
+from osimlite.lint.baseline import write_baseline
 from osimlite.lint.config import Config
+from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.many import check_files
+from osimlite.lint.reporters import render
 from osimlite.simulation import Trajectory
 from osimlite.sweep.pools import _LocalPool
 
@@ -121,3 +125,16 @@ def test_an_old_console_is_shown_no_codes_of_colours(monkeypatch: pytest.MonkeyP
     for is_old in (True, False):
         monkeypatch.setattr("rich.console.detect_legacy_windows", lambda is_old=is_old: is_old)
         assert wants_colour() is not is_old
+
+
+def test_other_programs_are_told_paths_with_slashes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("osimlite.lint.reporters.sarif.PurePath", PureWindowsPath)
+    monkeypatch.setattr("osimlite.lint.baseline.Path", PureWindowsPath)
+    report = Report(
+        [Finding("OSIM101", "x", Severity.ERROR, "no", file) for file in ("models\\a b.osim", "C:\\models\\leg.osim")]
+    )
+    results = json.loads(render(report, "sarif"))["runs"][0]["results"]
+    places = [result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for result in results]
+    assert places == ["models/a%20b.osim", "file:///C:/models/leg.osim"]
+    write_baseline(tmp_path / "baseline.json", report)
+    assert "models/a b.osim" in (tmp_path / "baseline.json").read_text()

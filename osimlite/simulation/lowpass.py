@@ -65,7 +65,8 @@ def _continued(values: Array, count: int) -> Array:
 def _filtered(values: Array, cutoff: float) -> Array:
     """Values (t, n) after one run; `cutoff` in parts of the sampling frequency. The first three stay as they are."""
     signal = require("scipy.signal", extra="sim", purpose="a low-pass filter")
-    coefficients = signal.butter(3, 2.0 * cutoff)
+    # Before scipy 1.17 they are complex numbers for cutoffs near zero.
+    coefficients = np.real(signal.butter(3, 2.0 * cutoff))
     before = [signal.lfiltic(*coefficients, column, column) for column in values[2::-1].T]
     rest, _ = signal.lfilter(*coefficients, values[3:], axis=0, zi=np.transpose(before))
     return np.concatenate([values[:3], rest])

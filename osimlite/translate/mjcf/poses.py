@@ -55,7 +55,7 @@ class Poses:
 
     def points(self, body: int, station: Array) -> Array:
         """Places in ground (P, 3) or (k, P, 3) of a station of a body, (3,) or one for each pose."""
-        return self.origins[body] + each_pose(station, self.rotations[body].mT)
+        return self.origins[body] + each_pose(station, self.rotations[body].swapaxes(1, 2))
 
     def stations(self, body: int, places: Array) -> Array:
         """Stations of a body (k, P, 3) at places in ground (k, P, 3)."""

@@ -136,7 +136,7 @@ def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses,
         # Each way around each surface is one of the k, until they are chosen.
         touches = found.touches.reshape(-1, len(poses.q))
         leaves, returns = (
-            poses.points(body, (middles + at @ rotations.mT).reshape(*touches.shape, 3))
+            poses.points(body, (middles + at @ rotations.swapaxes(1, 2)).reshape(*touches.shape, 3))
             for at in (found.first, found.second)
         )
         way, back = leaves - one, returns - two
