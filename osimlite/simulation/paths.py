@@ -24,7 +24,7 @@ from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item, Places, Silent
 from osimlite.simulation.engines.linking import Code
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED, SURFACE
@@ -183,7 +183,7 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
 
 
 @dataclass(frozen=True)
-class _Measured:
+class _Measured(Silent):
     """A path as an element that is measured and does not pull.
 
     Attributes:
@@ -194,7 +194,6 @@ class _Measured:
     path: str
     along: Along
     states: tuple[StateVariable, ...] = ()
-    columns: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -205,14 +204,6 @@ class _Measured:
         """Its parts, of which the path is no part of another item."""
         *parts, last = self.along.items(places)
         return [*parts, replace(last, is_part=False)]
-
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
-        """Nothing."""
-        return []
-
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """None."""
-        return 0.0
 
 
 class _System(System):

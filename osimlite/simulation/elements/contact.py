@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy
+from osimlite.forces.vectors import cross, minus, plus, vector
 from osimlite.multibody.spatial import Array, offset
 from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.forces import HuntCrossleyForce
@@ -145,14 +146,11 @@ class PairContact:
         for pair, record in zip(self.pairs, records, strict=False):
             if not record[DEPTH_OF] > 0.0:
                 continue
-            fx, fy, fz, px, py, pz = record[:6]
-            tx, ty, tz = self.torque(records, pair)
+            force, torque = vector(record, 0), vector(self.torque(records, pair), 0)
             for surface, sign in ((self.surfaces[pair.first], -1.0), (self.surfaces[pair.second], 1.0)):
                 load = loads.setdefault(surface.body, [0.0] * 6)
-                ox, oy, oz = origins[surface.body]
-                x, y, z = px - ox, py - oy, pz - oz
-                torque = tx + y * fz - z * fy, ty + z * fx - x * fz, tz + x * fy - y * fx
-                for axis, part in enumerate((fx, fy, fz, *torque)):
+                moment = cross(minus(vector(record, 3), vector(origins[surface.body], 0)), force)
+                for axis, part in enumerate((*force, *plus(torque, moment))):
                     load[axis] += sign * part
         row: list[float] = []
         for surface in self.surfaces:

@@ -99,6 +99,20 @@ class ForceElement(Protocol):
         """Potential energy, J."""
 
 
+class Silent:
+    """An element that has no forces to report, and stores no energy."""
+
+    columns: tuple[str, ...] = ()
+
+    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+        """Nothing."""
+        return []
+
+    def energy(self, records: Sequence[Sequence[float]]) -> float:
+        """None, J."""
+        return 0.0
+
+
 @dataclass(frozen=True)
 class Places:
     """Where coordinates and bodies are.
@@ -133,3 +147,8 @@ class Places:
     def direction(self, body: int, vector: Sequence[float]) -> tuple[float, ...]:
         """A direction of a body in its link."""
         return tuple((self.placement(body).frame[:3, :3] @ np.array(vector)).tolist())
+
+    def frame(self, body: int, frame: Array) -> tuple[int, list[float]]:
+        """Link of a body, and axes and origin in the link of a frame (4, 4) of the body."""
+        link, of_body = self.placement(body)
+        return link, (of_body @ frame)[:3].T.ravel().tolist()

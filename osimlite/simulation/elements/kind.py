@@ -23,7 +23,7 @@ from typing import Any, ClassVar
 from osimlite.schema.actuators import Actuator
 from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Item, Places, Response
+from osimlite.simulation.elements.items import Item, Places, Response, Silent
 from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels import layout
@@ -260,23 +260,14 @@ class DeclaredForce:
 
 
 @dataclass(frozen=True)
-class ForceOff(DeclaredForce):
+class ForceOff(Silent, DeclaredForce):
     """A force that is off: it has nothing but its states."""
 
     form = OFF
-    columns = ()
 
     def items(self, places: Places) -> list[Item]:
         """What the kernels compute."""
         return super().items(places) if self.kind.goes_on else []
-
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
-        """Nothing."""
-        return []
-
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """None."""
-        return 0.0
 
 
 def kinds() -> list[Any]:

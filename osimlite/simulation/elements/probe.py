@@ -21,7 +21,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.quantity import tell
 from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
-from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places
+from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places, Silent
 from osimlite.simulation.elements.kernel_text import written
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.kernels import layout
@@ -126,7 +126,7 @@ class ProbeKind:
 
 
 @dataclass(frozen=True)
-class DeclaredProbe:
+class DeclaredProbe(Silent):
     """One probe; see :class:`osimlite.simulation.elements.items.ForceElement` for what it is to the kernels.
 
     Attributes:
@@ -157,11 +157,6 @@ class DeclaredProbe:
         return kind_of_probe(self.component)
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """Of force records it has none."""
-        return ()
-
-    @property
     def states(self) -> tuple[StateVariable, ...]:
         """Its integrals."""
         labels = self.reading.labels if self.operation == INTEGRATE else ()
@@ -190,14 +185,6 @@ class DeclaredProbe:
                 looks_at=looks_at,
             )
         ]
-
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
-        """Of force records it has none."""
-        return []
-
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """It stores none."""
-        return 0.0
 
 
 def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) -> list[DeclaredProbe]:

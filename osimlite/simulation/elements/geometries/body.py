@@ -218,10 +218,6 @@ class AtStation(Geometry):
         """The force on the station, in ground."""
         return tuple(f"{force.name}.{force.place.name}.force.{axis}" for axis in "XYZ")
 
-    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
-        """It."""
-        return list(record[:3])
-
 
 AXIS, POINT, POINTS, BODY, STATION = AboutAxis(), AtPoint(), ApartPoints(), OnBody(), AtStation()
 

@@ -11,7 +11,7 @@ import numpy as np
 from osimlite.forces.bushing import xyz_angles, xyz_moment, xyz_rates
 from osimlite.forces.vectors import minus, put, times, turned, turned_back, vector
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
@@ -65,12 +65,11 @@ def damp(loads: Floats, rates: Floats, damping: Floats) -> None:
 
 
 class Frame(NamedTuple):
-    """A frame of a bushing: its name, its body, and where it is in the body."""
+    """A frame of a bushing: its name, its body, and where it is in the body (4, 4)."""
 
     name: str
     body: int
-    rotation: tuple[Triple, Triple, Triple]
-    origin: Triple
+    placed: Array
 
 
 @dataclass(frozen=True)
@@ -98,21 +97,13 @@ class BetweenFrames(Geometry):
         frames = []
         for field in ("socket_frame1", "socket_frame2"):
             frame = builder.target(force, field, getattr(force, field))
-            body, placed = builder.placement(frame)
-            rows = triple(placed[0, :3]), triple(placed[1, :3]), triple(placed[2, :3])
-            frames.append(Frame(frame.name, body, rows, triple(placed[:3, 3])))
+            frames.append(Frame(frame.name, *builder.placement(frame)))
         return tuple(frames)
 
     def pack(self, place: tuple[Frame, ...], places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Links; rotation by columns and origin of each frame in its link."""
-        links: list[int] = []
-        numbers: list[float] = []
-        for frame in place:
-            link, origin = places.station(frame.body, frame.origin)
-            rotation = places.placement(frame.body).frame[:3, :3] @ np.array(frame.rotation)
-            links.append(link)
-            numbers += [*rotation.T.ravel().tolist(), *origin]
-        return links, numbers
+        """Links; axes and origin of each frame in its link."""
+        (one, first), (two, second) = (places.frame(frame.body, frame.placed) for frame in place)
+        return (one, two), (*first, *second)
 
     def room(self, place: Any) -> int:
         """See the places above."""

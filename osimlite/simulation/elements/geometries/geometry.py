@@ -61,8 +61,8 @@ class Geometry:
         return ()
 
     def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
-        """One row of these columns, from its part of the record."""
-        return []
+        """One row of these columns, from its part of the record; all of that."""
+        return list(record[: self.room(force.place)])
 
 
 NOTHING = Geometry()

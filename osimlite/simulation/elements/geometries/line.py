@@ -106,7 +106,3 @@ class BetweenPoints(Geometry):
         """Force and point in ground, for each of the frames."""
         labels = [f"{what}.{axis}" for what in ("force", "point") for axis in "XYZ"]
         return tuple(f"{force.name}.{frame}.{label}" for frame in force.place.frames for label in labels)
-
-    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
-        """All of it."""
-        return list(record[:12])

@@ -85,10 +85,9 @@ class GivenLoad(Geometry):
         links: list[int] = []
         numbers: list[float] = []
         for body, frame in (place.frame, place.force_frame, place.point_frame):
-            link, of_body = places.placement(body)
-            placed = of_body @ frame
+            link, axes = places.frame(body, frame)
             links.append(link)
-            numbers += [*placed[:3, :3].T.ravel().tolist(), *placed[:3, 3].tolist()]
+            numbers += axes
         tables: list[int] = []
         for functions in place.groups:
             for function in functions or (None, None, None):
