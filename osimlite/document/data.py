@@ -142,7 +142,7 @@ class _Writer:
         if spec.factory is not None and not default_name:
             made = spec.factory()
             default_name = made.name if isinstance(made, Object) else ""
-        if data.get("name") == default_name and "name" not in value.model_fields_set:
+        if data.get("name") == default_name:
             del data["name"]
         return data["objects"] if data.keys() == {"objects"} else data
 
