@@ -71,6 +71,11 @@ def test_written_by_hand(tmp_path: Path) -> None:
     assert from_data(yaml.safe_load(to_yaml(model))) == model
 
 
+def test_a_set_of_a_file_is_the_list_of_its_members() -> None:
+    data = to_data(osimlite.read_text(osimlite.to_text(dynamic_walker())))
+    assert [body["name"] for body in data["body_set"]][:2] == ["Platform", "Pelvis"]
+
+
 def test_values_that_json_cannot_say() -> None:
     model = Model(name="m")
     model.add(Body(name="b", mass=math.nan, mass_center=(math.inf, -math.inf, -0.0)))

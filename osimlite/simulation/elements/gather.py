@@ -87,8 +87,8 @@ def force_elements(
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {listed(by_class(skipped))}; switch off their appliesForce, "
-            "or leave them out with --skip-unsupported (skip_unsupported=True); docs/forces.md says what is computed"
+            f"osimlite cannot compute {listed(by_class(skipped))}; set appliesForce to false, "
+            "or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
         )
     if external_loads is not None:
         from osimlite.simulation.elements.external_loads import read_external_loads

@@ -90,7 +90,7 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
     Raises:
         MissingDependency: mujoco is not installed.
         OsimliteError: MuJoCo does not load the file.
-        ModelError: the two have no muscle in common.
+        ModelError: the model has no muscles, or the two have none in common.
     """
     mujoco: Any = require("mujoco", extra="mujoco", purpose="the check of a file of MuJoCo's")
     try:
@@ -98,12 +98,14 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
     except ValueError as error:
         raise OsimliteError(f"MuJoCo does not load it: {error}", file=str(file)) from error
     paths = Paths(model)
+    if not paths.names:
+        raise ModelError(f"'{model.name}' has no muscles or other paths to compare")
     theirs = _Compiled(mujoco, compiled, paths)
     owners = {name.rpartition("/")[2]: name for name in paths.names}
     tendons = {name: place for name in owners if (place := theirs.tendon(name)) is not None}
     if not tendons:
         raise ModelError(
-            f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners), '')}'",
+            f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners))}'",
             file=str(file),
         )
     known, truth = random_poses(paths, poses, seed)

@@ -59,6 +59,8 @@ def test_what_is_wrong_is_found(model, text, tmp_path):
 
 
 def test_files_that_cannot_be_compared(model, tmp_path):
+    with pytest.raises(ModelError, match="has no muscles or other paths"):
+        checked(osimlite.Model(name="bare"), "<mujoco/>", tmp_path)
     with pytest.raises(ModelError, match="no tendon or actuator with the name of a muscle of the model, such as"):
         checked(model, "<mujoco/>", tmp_path)
     with pytest.raises(OsimliteError, match="MuJoCo does not load it"):
