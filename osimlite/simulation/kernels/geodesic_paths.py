@@ -90,6 +90,8 @@ INSIDE = 1e-14
 """A point counts as inside a surface if it is so far below it, in units of its function."""
 WAYS, NEARLY = 8, 0.97
 """So many ways around surfaces that may be passed either way are tried; those that are this much longer are left."""
+MEANT, STRING, ALONE = 0, 1, 2
+"""How a piece is bent, if not otherwise: as is meant; around ellipsoids as a string; around one surface alone."""
 TURNS = 16
 """So often surfaces may come and go, at most."""
 
@@ -161,19 +163,20 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
         if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
             near += 1
     put(chain, 0, vector(work, NODE_WORK * one + PLACE))
-    most, least, way, pulled = 0, inf, 0, False
+    most, least, way, stage = 0, inf, 0, MEANT
     while way < WAYS and near > 0:
         put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
-        count, step = settle(i, p, found, one, two, near, way, pulled, least)
+        count, step = settle(i, p, found, one, two, near, way, stage, least)
         length = chain_length(chain, count) if count >= 0 else inf
         if length < least:
             most, least = count, length
             for k in range(SLOT * (count + 1)):
                 best[k] = chain[k]
         way += step
-        # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is.
-        if way == WAYS and least == inf and not pulled:
-            way, pulled = 0, True
+        # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is; and there
+        # is none where surfaces cut each other.
+        if way == WAYS and least == inf and stage < ALONE:
+            way, stage = 0, stage + 1
     return most
 
 
@@ -187,7 +190,7 @@ def chain_length(chain: Floats, count: int) -> float:
 
 
 def settle(
-    i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, way: int, pulled: bool, least: float
+    i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, way: int, stage: int, least: float
 ) -> tuple[int, int]:
     """Put into the slots what the piece between two points bends around.
 
@@ -211,7 +214,7 @@ def settle(
         # What was left is met again, if at all, once the rest is smooth.
         if count == before:
             number, place, axis = meet_most(i, p, wraps, poses, one, chain, count, room)
-            if place == 0 and not waits:
+            if (place == 0 and not waits) or (count > 0 and stage == ALONE):
                 return count, step
             waits = False
             if place > 0:
@@ -221,11 +224,12 @@ def settle(
                     a, b = seen(pose, work, one), seen(pose, work, two)
                     if near > 1 or has_two_ways(at(numbers, SURFACE), a, b):
                         step //= 2
+                        is_other = way // step % 2 == 1
+                        put(pose, ABOUT, times(-1.0 if is_other else 1.0, axis))
                         # On the other side it waits for what else is met: alone it might slide back.
-                        waits = way // step % 2 == 1
-                        put(pose, ABOUT, times(-1.0 if waits else 1.0, axis))
+                        waits = is_other and stage < ALONE
                 insert(numbers, pose, chain, count, place, number)
-                if not lay(numbers, pose, chain, count + 1, place, pulled, room):
+                if not lay(numbers, pose, chain, count + 1, place, stage, room):
                     take_out(chain, count + 1, place)
                     continue
                 count += 1
@@ -316,11 +320,11 @@ def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, numbe
         slot[OBSTACLE_WORK + k] = p[SURFACE + k]
 
 
-def lay(p: Floats, pose: Floats, chain: Floats, count: int, k: int, pulled: bool, room: Floats) -> bool:
+def lay(p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, room: Floats) -> bool:
     """Lay the chain around the surface in a slot, as those beside it are; whether it touches that."""
     first, second = in_surface(pose, end_before(chain, k)), in_surface(pose, start_after(chain, k, count))
     about, slot = vector(pose, ABOUT), at(chain, SLOT * k)
-    turn, point, way, arc = start(p, first, second, PULLED if pulled else pose[HOW], about, room)
+    turn, point, way, arc = start(p, first, second, PULLED if stage == STRING else pose[HOW], about, room)
     if not (turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room)):
         return False
     if norm(about) > 0.0:

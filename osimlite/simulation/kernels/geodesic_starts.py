@@ -206,12 +206,12 @@ def around_ellipsoid(
         return 0.0, first, way, 0.0
     out = middle
     if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
-        out = way_out(radii, elementwise(radii, middle), elementwise(radii, way), 0.0)
-    if norm(about) > 0.0:
-        if p[KIND] == ELLIPSOID:
-            out = way_out(radii, (0.0, 0.0, 0.0), elementwise(radii, way), 0.0)
-        if dot(about, cross(out, elementwise(radii, way))) < 0.0:
-            out = times(-1.0, out)
+        # Of two ways both begin where it is narrow.
+        out = way_out(
+            radii, times(0.0 if norm(about) > 0.0 else 1.0, elementwise(radii, middle)), elementwise(radii, way), 0.0
+        )
+    if dot(about, cross(out, elementwise(radii, way))) < 0.0:
+        out = times(-1.0, out)
     if side != 0.0 and not on_side(out, axis, side):
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
