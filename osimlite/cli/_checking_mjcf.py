@@ -22,7 +22,7 @@ def check(file: Path, mjcf: Path, output: Path | None) -> None:
     if found.coordinates:
         say(f"no joint has the name of {listed(list(found.coordinates), most=6)}: it stands where it stands")
     if found.bodies is not None:
-        say(f"places of bodies are off by {1e3 * found.bodies.rms:.2g} mm (root mean square)")
+        say(f"origins of bodies are off by {1e3 * found.bodies.rms:.2g} mm (root mean square)")
     if output is not None:
         make_folder(output)
         write_atomically(output / "check.json", found.to_json())
@@ -34,8 +34,8 @@ def _table(found: Any, name: str) -> Any:
 
     Last come the optimal fiber length that the file implies, over the model's, and the change of the tendon's.
     """
-    table = plain_table(f"{name}: root mean square of what is wrong")
-    for column in ("muscle", "length, mm", "moment arm, mm", "force, Fmax", "fiber, x", "tendon, mm"):
+    table = plain_table(f"{name}: root mean square errors")
+    for column in ("muscle", "length, mm", "moment arm, mm", "force, Fmax", "fiber length, x", "slack length, mm"):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
     for muscle in sorted(found.muscles, key=lambda each: -each.worst_arm.rms):
         add_row(
