@@ -27,7 +27,7 @@ def simulate(
     integrator: options.Integrator = None,
     fixed_step: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Take the engine's own steps instead of controlling the error."),
+        typer.Option(metavar="SECONDS", help="Steps of this length (semi-implicit Euler), without error control."),
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
