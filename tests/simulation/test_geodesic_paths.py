@@ -140,6 +140,14 @@ def test_lengths_around_two_surfaces_do_not_jump(kinds):
         assert np.max(np.abs(np.diff(lengths))) < np.linalg.norm(way[:3]) + np.linalg.norm(way[3:])
 
 
+def test_surfaces_that_intersect():
+    """In the notch between them the path bends around the one with a side alone, and does not go straight on."""
+    held, other = surface("Sphere", [0.04], "y"), {**surface("Sphere", [0.03]), "translation": (0.04, 0.03, 0.0)}
+    for height in (-0.02, 0.0, 0.02, 0.04, 0.06):
+        ends = (-0.1, height, 0.0), (0.12, 0.0, 0.001)
+        assert length(around(held, other), *ends) == pytest.approx(length(around(held), *ends), rel=1e-12)
+
+
 def test_nothing_outside_of_a_path_is_touched(monkeypatch):
     monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
     setup = SETUPS["cylinder_sphere_ellipsoid"]
