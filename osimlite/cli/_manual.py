@@ -34,6 +34,7 @@ PAGES = {
     "osimlite.document": "docs/rules.md#text",
     "osimlite.document.data": "docs/yaml.md",
     "osimlite.document.plugins": "docs/plugin-classes.md",
+    "osimlite.files": "docs/errors.md#files",
     "osimlite.gait": "docs/gaits.md",
     "osimlite.lint": "docs/lint-in-ci.md",
     "osimlite.lint.config": "docs/lint-in-ci.md#settings",

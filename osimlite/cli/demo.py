@@ -107,7 +107,7 @@ class _Tour:
 def _check(tour: _Tour) -> None:
     """Build the walker of the exercise, validate it, and translate it."""
     from osimlite.document.printer import write
-    from osimlite.files import make_folder
+    from osimlite.files import make_folder, write_atomically
     from osimlite.lint import validate
     from osimlite.lint.reporters import render
     from osimlite.models.dynamic_walker import dynamic_walker
@@ -127,7 +127,7 @@ def _check(tour: _Tour) -> None:
         text = file.read_text(encoding="utf-8")
         assert text.count(MISSPELT[0]) == 1
         broken = file.with_name("misspelt.osim")
-        broken.write_text(text.replace(*MISSPELT), encoding="utf-8")
+        write_atomically(broken, text.replace(*MISSPELT))
         found = validate(broken)
         show(render(replace(found, findings=found.errors), "full"))
         tell("OpenSim reads such a file, and refuses to simulate it", broken)

@@ -33,7 +33,8 @@ def rule(
     found = [known for known in rules if code is None or known.matches(code)]
     if code is not None and not found:
         names = [word for known in rules for word in (known.code, known.name)]
-        raise OsimliteError(f"there is no rule '{code}'{did_you_mean(code, names)}; 'osimlite rule' lists all rules")
+        near = did_you_mean(code, names) or "; 'osimlite rule' lists all rules"
+        raise OsimliteError(f"there is no rule '{code}'{near}")
     if len(found) > 1:
         width = max(len(known.name) for known in found)
         for known in found:

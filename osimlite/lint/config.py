@@ -101,7 +101,6 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
             from osimlite.text import did_you_mean
 
             known = [name for rule in all_rules() for name in (rule.code, rule.name)]
-            raise OsimliteError(
-                f"no rule has the code or name '{word}'{did_you_mean(word, known)} `osimlite rule` lists all rules"
-            )
+            near = did_you_mean(word, known) or "; 'osimlite rule' lists all rules"
+            raise OsimliteError(f"no rule has the code or name '{word}'{near}")
     return cleaned

@@ -158,12 +158,10 @@ class Plan:
             "planted": self.is_planted,
             "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
-            **({"equilibrate": True} if self.equilibrate else {}),
-            **{
-                name: getattr(self, name)
-                for name, usual in (("interpolation", "linear"), ("integrator", MERSON), ("wrapping", OPENSIM))
-                if getattr(self, name) != usual
-            },
+            "equilibrate": self.equilibrate,
+            "interpolation": self.interpolation,
+            "integrator": self.integrator,
+            "wrapping": self.wrapping,
             "skip_unsupported": self.skip_unsupported,
         }
 

@@ -108,11 +108,15 @@ def paths(item: Paths) -> str:
 
 def muscle_curves(item: MuscleCurves) -> str:
     """What is least and greatest of each muscle."""
+    from osimlite.simulation.muscle_curves import QUANTITIES
+
     spans = (map(span, *item.bounds(name), [".4g"] * len(item.muscles)) for name in item.columns)
     cells = zip(map(escape, item.muscles), *spans, strict=True)
     over = f" over {escape(listed(item.coordinates))}" if item.coordinates else ""
     words = f"<div>{counted(len(item.muscles), 'muscle')} in {counted(len(item.poses), 'pose')}{over}</div>"
-    return words + _table(("muscle", *map(escape, item.columns)), cells, len(item.muscles))
+    units = ((name, QUANTITIES.get(name, "m")) for name in item.columns)
+    heads = [escape(f"{name} ({unit})" if unit else name) for name, unit in units]
+    return words + _table(("muscle", *heads), cells, len(item.muscles))
 
 
 def runs(item: Outcome) -> str:

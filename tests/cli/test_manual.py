@@ -57,6 +57,8 @@ def test_whatever_raises_errors_has_a_page():
         ("format damaged.osim", "docs/rules.md#text"),
         ("build nobody", "docs/errors.md#sources-of-models"),
         ("build dynamic-walker -p thigh=1 -o x.osim", "docs/errors.md#sources-of-models"),
+        ("build dynamic-walker -o nowhere/x.osim", "docs/errors.md#files"),
+        ("translate walker.osim -o damaged.osim", "docs/errors.md#files"),
         ("rule OSIM999", "docs/rules.md"),
         ("simulate walker.osim --set RHip=1", "docs/from-opensim.md#simulating"),
         ("simulate walker.osim --controls hip=1", "docs/controls.md#yours"),

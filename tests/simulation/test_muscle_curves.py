@@ -39,6 +39,7 @@ def test_tables_have_a_row_for_each_muscle_in_each_pose():
 def test_notebooks_show_what_is_least_and_greatest():
     html = CURVES._repr_html_()
     assert "2 muscles in 6 poses over knee and hip" in html and "<b>" not in html
+    assert ">length (m)</th>" in html and ">tendon_force (N)</th>" in html
     assert ">1 to 11<" in html and ">-<" in html and ">0 to 5<" in html
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,8 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
     other = plan(walker, VARY, measures=("distance", "largest_force"), to=0.4)
     with pytest.raises(SettingError, match=r"other settings: model and to \(0.3 before, 0.4 now\)"):
         sweep(other, chosen, path, resume=True)
+    with pytest.raises(SettingError, match=r"other settings: wrapping \(opensim before, geodesic now\)"):
+        sweep(replace(made, wrapping="geodesic"), chosen, path, resume=True)
     (tmp_path / "x.parquet.partial").write_text("something else")
     with pytest.raises(SettingError, match="no interrupted sweep"):
         sweep(made, chosen, tmp_path / "x.parquet", resume=True)
