@@ -117,7 +117,7 @@ def _check(tour: _Tour) -> None:
         model = dynamic_walker()
         file = make_folder(tour.folder / MOTIONS[0].model) / f"{model.name}.osim"
         write(model, file)
-        tell(f"{sum(1 for _ in model.components())} components, for OpenSim too", file)
+        tell(f"{sum(1 for _ in model.components())} components, as OpenSim counts", file)
 
     with tour.step("Validate the file") as tell:
         report = validate(file)

@@ -46,7 +46,7 @@ def info(
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
     if not isinstance(model, Model):
         rows = [(model.tag, model.name), ("file", size), ("document version", str(document.version))]
-        rows += [*_files(model, file.parent), ("remarks of the reader", str(len(document.notes)))]
+        rows += [*_files(model, file.parent), ("notes on reading", str(len(document.notes)))]
         Facts(rows=rows).show()
         _classes([*model.walk()], everything)
         return
@@ -65,7 +65,7 @@ def info(
         ("joints", str(len(model.joint_set.objects))),
         ("coordinates", str(sum(isinstance(component, Coordinate) for component in components))),
         ("muscles", str(len(muscles))),
-        ("forces besides", str(len(model.force_set.objects) - len(muscles))),
+        ("other forces", str(len(model.force_set.objects) - len(muscles))),
         ("wrap surfaces", f"{surfaces}, for {counted(len(wraps), 'wrap')}"),
         ("markers", str(len(model.marker_set.objects))),
         ("controllers", str(len(model.controller_set.objects))),
@@ -73,7 +73,7 @@ def info(
         ("contact surfaces", str(len(model.contact_geometry_set.objects))),
         ("constraints", str(len(model.constraint_set.objects))),
         ("components in all", str(len(components))),
-        ("remarks of the reader", str(len(document.notes))),
+        ("notes on reading", str(len(document.notes))),
         ("simulation", _simulation(model, file.parent)),
     ]).show()  # fmt: skip
 
@@ -215,4 +215,4 @@ def _simulation(model: Model, folder: Path) -> str:
         return f"not possible: {error}"
     if forces.skipped:
         return f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
-    return "possible, with all that moves and pushes"
+    return "possible, nothing is left out"

@@ -48,7 +48,12 @@ def read_data(path: str | Path) -> Model:
         text = read_file(place).decode()
     except UnicodeDecodeError as error:
         raise MissingFileError(f"cannot read the file: {error}", file=str(path)) from None
-    return from_data(_parsed_json(text, str(path)) if place.suffix == ".json" else _parsed_yaml(text, str(path)))
+    data = _parsed_json(text, str(path)) if place.suffix == ".json" else _parsed_yaml(text, str(path))
+    try:
+        return from_data(data)
+    except ModelError as error:
+        error.file = str(path)
+        raise
 
 
 def write_data(model: Model, path: str | Path) -> None:

@@ -96,7 +96,7 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     assert "    m0     546 N     0.1 m     0.2 m  2 points" in lines
     facts = dict(line.split("  ", 1) for line in lines if "  " in line.strip())
     assert facts["wrap surfaces"].strip() == "1, for 1 wrap"
-    assert facts["simulation"].strip() == "possible, with all that moves and pushes"
+    assert facts["simulation"].strip() == "possible, nothing is left out"
     model.find("/forceset/m1").ignore_tendon_compliance = True
     osimlite.write(model, tmp_path / "m.osim")
     assert "not possible: the ignore_tendon_compliance of '/forceset/m1'" in " ".join(

@@ -124,6 +124,13 @@ def test_what_is_wrong_is_told_with_its_place(data: Any, message: str) -> None:
         from_data(data)
 
 
+def test_data_that_are_no_model_are_told_with_their_file(tmp_path: Path) -> None:
+    path = tmp_path / "mistaken.json"
+    path.write_text('{"gravty": [0, 0, 0]}')
+    with pytest.raises(ModelError, match=r"mistaken\.json: model: a Model has no property 'gravty'"):
+        read_data(path)
+
+
 def test_a_text_that_is_neither(tmp_path: Path) -> None:
     broken = tmp_path / "broken.json"
     broken.write_text('{"name": "m",\n "gravity": }')

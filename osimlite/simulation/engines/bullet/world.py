@@ -40,7 +40,12 @@ def muted(descriptor: int = 2) -> Iterator[None]:
 
 
 with muted():
-    require("pybullet", extra="bullet", purpose="the PyBullet engine", instead="--engine compiled, which does without")
+    require(
+        "pybullet",
+        extra="bullet",
+        purpose="the PyBullet engine",
+        instead="--engine compiled, whose motions osimlite view shows",
+    )
     import pybullet as bullet
 
 NO_LIMIT = 1e9
