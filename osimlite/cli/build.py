@@ -33,7 +33,7 @@ def build(
     numbers: options.Numbers = "shortest",
     list_models: Annotated[bool, typer.Option("--list", help="Name the built-in models and stop.")] = False,
 ) -> None:
-    """Make a model in Python and write its .osim file.
+    """Make a built-in model, or one of yours in Python, YAML or JSON, and write its .osim file.
 
     The model is validated first: nothing is written if it has an error.
 

@@ -19,7 +19,7 @@ def rule(
         ),
     ] = None,
 ) -> None:
-    """Print what a rule finds, why that is bad, and an example with its mend.
+    """Print what a rule finds, why that is bad, and an example with its correction.
 
     Example: osimlite rule OSIM301
     """

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
     """Make the engine."""
     if settings.show:
-        raise SimulationError("the compiled engine shows no window; take --engine bullet for --gui")
+        raise SimulationError(
+            "the compiled engine shows no window; osimlite view plays its motions, or take --engine bullet for --gui"
+        )
     if settings.route not in ("auto", CompiledEngine.route):
         raise OsimliteError(f"the compiled engine has no route '{settings.route}'; there is {CompiledEngine.route}")
     return CompiledEngine(mechanism, forces)
