@@ -16,10 +16,10 @@ _INTRODUCTION = """\
 What `osimlite validate` looks for. `osimlite rule OSIM502` shows the page of a rule: what it finds, why that is bad, an
 example, and the same mended.
 
-An **error** is what OpenSim refuses, crashes on, makes NaN of, or reads otherwise than the text says. A **warning** is
-physically or numerically doubtful, an **info** tidiness or something worth knowing. A finding may be worse or better
-than its rule says here where the file shows it to be. A **safe** fix is made by `--fix`: OpenSim then reads the same
-model, or certainly the one that was meant. An **unsafe** one is a guess that `--unsafe-fixes` makes."""
+An **error** is what OpenSim refuses, crashes on, computes NaN from, or reads differently from what is written. A
+**warning** is physically or numerically doubtful; an **info** is untidy, or worth knowing. A finding may be more or
+less severe than its rule where the file shows the reason. `--fix` makes **safe** fixes: OpenSim then reads the same
+model, or the one that was certainly meant. An **unsafe** fix is a guess, which `--unsafe-fixes` makes."""
 _SHORT = {"": "", "safe": "safe", "unsafe": "unsafe", "both": "safe or unsafe"}
 
 

@@ -47,15 +47,15 @@ def tendon_force_length(name: str = "") -> SimmSpline:
 
 
 def active_force_length(name: str = "") -> SimmSpline:
-    """Active fibre force over fibre length."""
+    """Active fiber force over fiber length."""
     return _spline(_ACTIVE, name)
 
 
 def passive_force_length(name: str = "") -> SimmSpline:
-    """Passive force over length; muscle fibres and ligaments have the same."""
+    """Passive force over length; muscle fibers and ligaments have the same."""
     return _spline(_PASSIVE, name)
 
 
 def force_velocity(name: str = "") -> SimmSpline:
-    """Fibre force over fibre velocity."""
+    """Fiber force over fiber velocity."""
     return _spline(_VELOCITY, name)

@@ -31,11 +31,11 @@ class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
     name_reference = _NAME_OF_MUSCLE
 
     specific_tension: Annotated[float, real("Pa", "> 0")] = 250000.0
-    """Force per cross-section of the fibres; it gives the mass where none is provided."""
+    """Force per cross-section of the fibers; it gives the mass where none is provided."""
     density: Annotated[float, real("kg/m^3", "> 0")] = 1059.7
     """Mass per volume of the muscle; it gives the mass where none is provided."""
     ratio_slow_twitch_fibers: Annotated[float, real(domain="0 to 1")] = 0.5
-    """Part of the muscle that is slow-twitch fibres; the rest is fast-twitch."""
+    """Part of the muscle that is slow-twitch fibers; the rest is fast-twitch."""
     use_provided_muscle_mass: Flag = False
     """Whether the mass is the one given; otherwise density F_max l_opt / specific tension."""
     provided_muscle_mass: Annotated[float, real("kg", "> 0")] = math.nan
@@ -59,7 +59,7 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
     basal_rate_on: Flag = True
     """Whether the basal rate of the whole body counts."""
     mechanical_work_rate_on: Flag = True
-    """Whether the mechanical power of the fibres counts."""
+    """Whether the mechanical power of the fibers counts."""
     enforce_minimum_heat_rate_per_muscle: Flag = True
     """Whether the heat of a muscle is never below 1 W/kg. It needs all heat rates to be on."""
     aerobic_factor: Annotated[float, real(domain="> 0")] = 1.5
@@ -71,9 +71,9 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
     muscle_effort_scaling_factor: Number = 1.0
     """Factor of excitation, activation and active force, to make up for too much co-contraction."""
     use_Bhargava_recruitment_model: Flag = True
-    """Whether the share of slow fibres follows excitation as Bhargava has it, instead of the fixed ratio."""
+    """Whether the share of slow fibers follows excitation as Bhargava has it, instead of the fixed ratio."""
     include_negative_mechanical_work: Flag = True
-    """Whether lengthening fibres take up work; with it the heat of lengthening has a coefficient of 4, not 0.3."""
+    """Whether lengthening fibers take up work; with it the heat of lengthening has a coefficient of 4, not 0.3."""
     forbid_negative_total_power: Flag = True
     """Whether heat is added to a muscle where its power would be negative."""
     report_total_metabolics_only: Flag = True
@@ -90,23 +90,23 @@ class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
     name_reference = _NAME_OF_MUSCLE
 
     specific_tension: Annotated[float, real("Pa", "> 0")] = 250000.0
-    """Force per cross-section of the fibres; it gives the mass where none is provided."""
+    """Force per cross-section of the fibers; it gives the mass where none is provided."""
     density: Annotated[float, real("kg/m^3", "> 0")] = 1059.7
     """Mass per volume of the muscle; it gives the mass where none is provided."""
     ratio_slow_twitch_fibers: Annotated[float, real(domain="0 to 1")] = 0.5
-    """Part of the muscle that is slow-twitch fibres; the rest is fast-twitch."""
+    """Part of the muscle that is slow-twitch fibers; the rest is fast-twitch."""
     use_provided_muscle_mass: MaybeFlag = False
     """Whether the mass is the one given; otherwise density F_max l_opt / specific tension."""
     provided_muscle_mass: Annotated[float | None, maybe("kg", "> 0")] = math.nan
     """Mass of the muscle; only used where the switch above says so."""
     activation_constant_slow_twitch: Annotated[float, real("W/kg", ">= 0")] = 40.0
-    """Heat of activation per mass of fully excited slow-twitch fibres."""
+    """Heat of activation per mass of fully excited slow-twitch fibers."""
     activation_constant_fast_twitch: Annotated[float, real("W/kg", ">= 0")] = 133.0
-    """Heat of activation per mass of fully excited fast-twitch fibres."""
+    """Heat of activation per mass of fully excited fast-twitch fibers."""
     maintenance_constant_slow_twitch: Annotated[float, real("W/kg", ">= 0")] = 74.0
-    """Heat of maintenance per mass of fully excited slow-twitch fibres."""
+    """Heat of maintenance per mass of fully excited slow-twitch fibers."""
     maintenance_constant_fast_twitch: Annotated[float, real("W/kg", ">= 0")] = 111.0
-    """Heat of maintenance per mass of fully excited fast-twitch fibres."""
+    """Heat of maintenance per mass of fully excited fast-twitch fibers."""
 
 
 class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
@@ -128,7 +128,7 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     basal_rate_on: Flag = True
     """Whether the basal rate of the whole body counts."""
     mechanical_work_rate_on: Flag = True
-    """Whether the mechanical power of the fibres counts."""
+    """Whether the mechanical power of the fibers counts."""
     enforce_minimum_heat_rate_per_muscle: Flag = True
     """Whether the heat of a muscle is never below 1 W/kg. It needs all heat rates to be on."""
     normalized_fiber_length_dependence_on_maintenance_rate: Single[PiecewiseLinearFunction] = made(
@@ -137,9 +137,9 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
         x=(0.0, 0.5, 1.0, 1.5, 2.0),
         y=(0.5, 0.5, 1.0, 0.0, 0.0),
     )
-    """Factor of the heat of maintenance over normalised fibre length."""
+    """Factor of the heat of maintenance over normalised fiber length."""
     use_force_dependent_shortening_prop_constant: Flag = False
-    """Whether the heat of shortening depends on isometric force also; otherwise it is 0.25 fibre force times speed."""
+    """Whether the heat of shortening depends on isometric force also; otherwise it is 0.25 fiber force times speed."""
     basal_coefficient: Number = 1.2
     """Factor a of the basal rate a m^b (W), m being the mass (kg) of the whole model."""
     basal_exponent: Number = 1.0
@@ -147,7 +147,7 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     muscle_effort_scaling_factor: Number = 1.0
     """Factor of excitation, activation and active force, to make up for too much co-contraction."""
     include_negative_mechanical_work: Flag = True
-    """Whether lengthening fibres take up work, which then counts as negative power."""
+    """Whether lengthening fibers take up work, which then counts as negative power."""
     forbid_negative_total_power: Flag = True
     """Whether heat is added to a muscle where its power would be negative."""
     report_total_metabolics_only: Flag = True
@@ -164,23 +164,23 @@ class Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(Component):
     socket_muscle: MuscleSocket = ""
     """The muscle that the numbers are about."""
     specific_tension: Annotated[float, real("Pa", "> 0")] = 250000.0
-    """Force per cross-section of the fibres; it gives the mass where none is provided."""
+    """Force per cross-section of the fibers; it gives the mass where none is provided."""
     density: Annotated[float, real("kg/m^3", "> 0")] = 1059.7
     """Mass per volume of the muscle; it gives the mass where none is provided."""
     ratio_slow_twitch_fibers: Annotated[float, real(domain="0 to 1")] = 0.5
-    """Part of the muscle that is slow-twitch fibres; the rest is fast-twitch."""
+    """Part of the muscle that is slow-twitch fibers; the rest is fast-twitch."""
     use_provided_muscle_mass: MaybeFlag = False
     """Whether the mass is the one given; otherwise density F_max l_opt / specific tension."""
     provided_muscle_mass: Annotated[float | None, maybe("kg", "> 0")] = math.nan
     """Mass of the muscle; only used where the switch above says so."""
     activation_constant_slow_twitch: Annotated[float, real("W/kg", ">= 0")] = 40.0
-    """Heat of activation per mass of fully excited slow-twitch fibres."""
+    """Heat of activation per mass of fully excited slow-twitch fibers."""
     activation_constant_fast_twitch: Annotated[float, real("W/kg", ">= 0")] = 133.0
-    """Heat of activation per mass of fully excited fast-twitch fibres."""
+    """Heat of activation per mass of fully excited fast-twitch fibers."""
     maintenance_constant_slow_twitch: Annotated[float, real("W/kg", ">= 0")] = 74.0
-    """Heat of maintenance per mass of fully excited slow-twitch fibres."""
+    """Heat of maintenance per mass of fully excited slow-twitch fibers."""
     maintenance_constant_fast_twitch: Annotated[float, real("W/kg", ">= 0")] = 111.0
-    """Heat of maintenance per mass of fully excited fast-twitch fibres."""
+    """Heat of maintenance per mass of fully excited fast-twitch fibers."""
 
 
 class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
@@ -191,7 +191,7 @@ class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
     enforce_minimum_heat_rate_per_muscle: Flag = True
     """Whether the heat of a muscle is never below 1 W/kg."""
     use_force_dependent_shortening_prop_constant: Flag = False
-    """Whether the heat of shortening depends on isometric force also; otherwise it is 0.25 fibre force times speed."""
+    """Whether the heat of shortening depends on isometric force also; otherwise it is 0.25 fiber force times speed."""
     basal_coefficient: Number = 1.2
     """Factor a of the basal rate a m^b (W), m being the mass (kg) of the whole model."""
     basal_exponent: Number = 1.0
@@ -199,7 +199,7 @@ class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
     muscle_effort_scaling_factor: Number = 1.0
     """Factor of excitation, activation and active force, to make up for too much co-contraction."""
     include_negative_mechanical_work: Flag = True
-    """Whether lengthening fibres take up work, which then counts as negative power."""
+    """Whether lengthening fibers take up work, which then counts as negative power."""
     forbid_negative_total_power: Flag = True
     """Whether heat is added to a muscle where its power would be negative."""
     use_smoothing: MaybeFlag = False

@@ -10,7 +10,7 @@ from osimlite.schema.functions import Function
 
 
 class ActiveForceLengthCurve(Function):
-    """Active force of a fibre over its length."""
+    """Active force of a fiber over its length."""
 
     min_norm_active_fiber_length: Annotated[float, real(domain="> 0")] = 0.4441
     """Length below which the force keeps to `minimum_value`."""
@@ -21,16 +21,16 @@ class ActiveForceLengthCurve(Function):
     shallow_ascending_slope: Annotated[float, real(domain=">= 0")] = 0.8616
     """Slope of the shallow part of the rise, just before optimal length."""
     minimum_value: Annotated[float, real(domain=">= 0")] = 0.1
-    """Least force at any length; a muscle without fibre damping needs more than 0."""
+    """Least force at any length; a muscle without fiber damping needs more than 0."""
 
 
 class FiberForceLengthCurve(Function):
-    """Passive force of a fibre over its length."""
+    """Passive force of a fiber over its length."""
 
     strain_at_zero_force: Number = 0.0
-    """Strain up to which the fibre is slack."""
+    """Strain up to which the fiber is slack."""
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.7
-    """Strain at which the passive fibre bears `max_isometric_force`."""
+    """Strain at which the passive fiber bears `max_isometric_force`."""
     stiffness_at_low_force: Annotated[float | None, maybe(domain="> 0")] = None
     """Slope where the toe ends; to be given with the two below, or none of them."""
     stiffness_at_one_norm_force: Annotated[float | None, maybe(domain="> 0")] = None
@@ -40,7 +40,7 @@ class FiberForceLengthCurve(Function):
 
 
 class ForceVelocityCurve(Function):
-    """Force multiplier of a fibre over its velocity, both normalised."""
+    """Force multiplier of a fiber over its velocity, both normalised."""
 
     concentric_slope_at_vmax: Annotated[float, real(domain=">= 0")] = 0.0
     """Slope at the greatest shortening velocity, -1, where the force is 0."""
@@ -61,7 +61,7 @@ class ForceVelocityCurve(Function):
 
 
 class ForceVelocityInverseCurve(Function):
-    """Fibre velocity over force multiplier: the inverse of a ForceVelocityCurve with the same numbers."""
+    """Fiber velocity over force multiplier: the inverse of a ForceVelocityCurve with the same numbers."""
 
     concentric_slope_at_vmax: Annotated[float, real(domain="> 0")] = 0.1
     """Slope of the force at the greatest shortening velocity, -1; not 0, or there is no inverse."""
@@ -95,7 +95,7 @@ class TendonForceLengthCurve(Function):
 
 
 class FiberCompressiveForceLengthCurve(Function):
-    """A force that keeps a fibre from becoming too short."""
+    """A force that keeps a fiber from becoming too short."""
 
     norm_length_at_zero_force: Annotated[float, real(domain="> 0")] = 0.5
     """Length above which there is no such force."""
@@ -106,7 +106,7 @@ class FiberCompressiveForceLengthCurve(Function):
 
 
 class FiberCompressiveForceCosPennationCurve(Function):
-    """A force that keeps a fibre from standing across the tendon."""
+    """A force that keeps a fiber from standing across the tendon."""
 
     engagement_angle_in_degrees: Annotated[float, real("deg", "> 0")] = 85.0
     """Pennation angle below which there is no such force."""

@@ -21,11 +21,11 @@ class MuscleFirstOrderActivationDynamicModel(ModelComponent):
 
 
 class MuscleFixedWidthPennationModel(ModelComponent):
-    """Fibres that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
+    """Fibers that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
 
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 1.0
-    """Fibre length at which `pennation_angle_at_optimal` is measured."""
+    """Fiber length at which `pennation_angle_at_optimal` is measured."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
-    """Angle between fibres and tendon at optimal fibre length; 0 is parallel."""
+    """Angle between fibers and tendon at optimal fiber length; 0 is parallel."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibres do not go beyond; it bounds their length from below."""
+    """Angle that the fibers do not go beyond; it bounds their length from below."""

@@ -1,6 +1,6 @@
-"""Muscles of Hill's type: fibre and tendon in series, along a path.
+"""Muscles of Hill's type: fiber and tendon in series, along a path.
 
-Forces are normalised by `max_isometric_force`, fibre lengths by `optimal_fiber_length`, tendon lengths by
+Forces are normalised by `max_isometric_force`, fiber lengths by `optimal_fiber_length`, tendon lengths by
 `tendon_slack_length`.
 """
 
@@ -40,32 +40,32 @@ class Muscle(PathActuator, abstract=True):
         GeometryPath, name="path", appearance=lambda: Appearance.build({"color": (0.8, 0.1, 0.1)}, set())
     )
     max_isometric_force: Annotated[float, real("N", "> 0")] = 1000.0
-    """Force of fully active fibres at optimal length and rest; all forces are measured by it."""
+    """Force of fully active fibers at optimal length and rest; all forces are measured by it."""
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fibre length at which the active force is greatest; all fibre lengths are measured by it."""
+    """Fiber length at which the active force is greatest; all fiber lengths are measured by it."""
     tendon_slack_length: Annotated[float, real("m", "> 0")] = 0.2
     """Length up to which the tendon is slack; all tendon lengths are measured by it."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
-    """Angle between fibres and tendon at optimal fibre length; 0 is parallel."""
+    """Angle between fibers and tendon at optimal fiber length; 0 is parallel."""
     max_contraction_velocity: Annotated[float, real("optimal_fiber_length/s", "> 0")] = 10.0
-    """Shortening velocity at which fully active fibres bear no force."""
+    """Shortening velocity at which fully active fibers bear no force."""
     ignore_tendon_compliance: Flag = False
-    """Whether the tendon is rigid, always at its slack length, so that fibre length is no state."""
+    """Whether the tendon is rigid, always at its slack length, so that fiber length is no state."""
     ignore_activation_dynamics: Flag = False
     """Whether activation is the control at every moment, and no state."""
 
 
 class ActivationFiberLengthMuscle(Muscle, abstract=True):
-    """A muscle with two states: activation and fibre length."""
+    """A muscle with two states: activation and fiber length."""
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
     """Activation at the start of a simulation."""
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fibre length at the start, unless a tool brings fibre and tendon into equilibrium."""
+    """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
 
 
 class Thelen2003Muscle(ActivationFiberLengthMuscle):
-    """The muscle of Thelen (2003), with tendon and fibre strains at full force and shape factors of its curves."""
+    """The muscle of Thelen (2003), with tendon and fiber strains at full force and shape factors of its curves."""
 
     internal = (
         ("pennMdl", MuscleFixedWidthPennationModel),
@@ -76,19 +76,19 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     FmaxTendonStrain: Annotated[float, real(domain="> 0")] = 0.04
     """Strain at which the tendon bears `max_isometric_force`."""
     FmaxMuscleStrain: Annotated[float, real(domain="> 0")] = 0.6
-    """Strain at which the passive fibre bears `max_isometric_force`."""
+    """Strain at which the passive fiber bears `max_isometric_force`."""
     KshapeActive: Annotated[float, real(domain="> 0")] = 0.45
-    """Width of the active force over fibre length l, exp(-(l - 1)^2 / KshapeActive)."""
+    """Width of the active force over fiber length l, exp(-(l - 1)^2 / KshapeActive)."""
     KshapePassive: Annotated[float, real(domain="> 0")] = 5.0
     """Exponent of the passive force at full strain; more makes a softer toe."""
     Af: Annotated[float, real(domain="> 0")] = 0.25
     """Shape of force over velocity (Hill's a / F0); less is more curved."""
     Flen: Annotated[float, real(domain="> 1")] = 1.4
-    """Force that lengthening fibres approach, of the isometric one."""
+    """Force that lengthening fibers approach, of the isometric one."""
     fv_linear_extrap_threshold: Annotated[float, real(domain="> 0")] = 0.95
     """Part of `Flen` from which force over velocity goes on as a line; more than 1 / `Flen`."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibres do not go beyond; it bounds their length from below."""
+    """Angle that the fibers do not go beyond; it bounds their length from below."""
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
     """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.05
@@ -98,7 +98,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
 
 
 class Millard2012EquilibriumMuscle(Muscle):
-    """The muscle of Millard et al. (2013), tendon and fibre in equilibrium, with curves one can replace."""
+    """The muscle of Millard et al. (2013), tendon and fiber in equilibrium, with curves one can replace."""
 
     internal = (
         ("penMdl", MuscleFixedWidthPennationModel),
@@ -107,27 +107,27 @@ class Millard2012EquilibriumMuscle(Muscle):
 
     min_control: Number = 0.01
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.1
-    """Damping force of the fibre over `max_isometric_force`, per normalised velocity; none below 0.001."""
+    """Damping force of the fiber over `max_isometric_force`, per normalised velocity; none below 0.001."""
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
     """Activation at the start of a simulation."""
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fibre length at the start, unless a tool brings fibre and tendon into equilibrium."""
+    """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
     """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
     """Time constant of falling activation; high activation speeds it up."""
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
-    """Activation below which the muscle does not go; below 0.01 only with fibre damping or a rigid tendon."""
+    """Activation below which the muscle does not go; below 0.01 only with fiber damping or a rigid tendon."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibres do not go beyond; it bounds their length from below."""
+    """Angle that the fibers do not go beyond; it bounds their length from below."""
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve"
     )
-    """Active force over fibre length."""
+    """Active force over fiber length."""
     force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
-    """Factor of the active force over fibre velocity."""
+    """Factor of the active force over fiber velocity."""
     fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
-    """Passive force of the fibre over its length."""
+    """Passive force of the fiber over its length."""
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
@@ -135,14 +135,14 @@ class Millard2012EquilibriumMuscle(Muscle):
 
 
 class Millard2012AccelerationMuscle(Muscle):
-    """The muscle of Millard et al. (2013) with a mass between fibre and tendon, whose place and speed are states."""
+    """The muscle of Millard et al. (2013) with a mass between fiber and tendon, whose place and speed are states."""
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.0
     """Activation at the start of a simulation."""
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fibre length at the start, unless a tool brings fibre and tendon into equilibrium."""
+    """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
     default_fiber_velocity: Number = 0.0
-    """Fibre velocity at the start of a simulation; lengthening is positive."""
+    """Fiber velocity at the start of a simulation; lengthening is positive."""
     muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = made(
         MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
     )
@@ -150,11 +150,11 @@ class Millard2012AccelerationMuscle(Muscle):
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
     )
-    """Active force over fibre length."""
+    """Active force over fiber length."""
     force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
-    """Factor of the active force over fibre velocity."""
+    """Factor of the active force over fiber velocity."""
     fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
-    """Passive force of the fibre over its length."""
+    """Passive force of the fiber over its length."""
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
@@ -162,23 +162,23 @@ class Millard2012AccelerationMuscle(Muscle):
     fiber_compressive_force_length_curve: Unnamed[FiberCompressiveForceLengthCurve] = made(
         FiberCompressiveForceLengthCurve, name="default_FiberCompressiveForceLengthCurve"
     )
-    """Force along the fibre that keeps it from becoming too short."""
+    """Force along the fiber that keeps it from becoming too short."""
     fiber_compressive_force_cos_pennation_curve: Unnamed[FiberCompressiveForceCosPennationCurve] = made(
         FiberCompressiveForceCosPennationCurve, name="default_FiberCompressiveForceCosPennationCurve"
     )
-    """Force along the tendon that keeps fibres from standing across it."""
+    """Force along the tendon that keeps fibers from standing across it."""
     tendon_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.1
     """The c of 1 + c v, by which the normalised velocity v raises the tendon's force."""
     fiber_compressive_force_length_damping: Annotated[float, real(domain=">= 0")] = 1.0
-    """The c of 1 - c v, by which shortening raises the force against short fibres."""
+    """The c of 1 - c v, by which shortening raises the force against short fibers."""
     fiber_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.01
     """The c of 1 + c v, by which the normalised velocity v raises the passive force."""
     fiber_compressive_force_cos_pennation_damping: Annotated[float, real(domain=">= 0")] = 1.0
-    """The c of 1 - c v, by which shortening raises the force against steep fibres."""
+    """The c of 1 - c v, by which shortening raises the force against steep fibers."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.01
-    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
+    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     mass: Annotated[float, real(domain="> 0")] = 0.1
-    """Mass that moves between fibre and tendon."""
+    """Mass that moves between fiber and tendon."""
 
 
 class DeGrooteFregly2016Muscle(Muscle):
@@ -193,17 +193,17 @@ class DeGrooteFregly2016Muscle(Muscle):
     default_normalized_tendon_force: Annotated[float, real(domain=">= 0")] = 0.5
     """Tendon force over `max_isometric_force` at the start, at most 5; it is the state."""
     active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
-    """Factor of the width of the active force over fibre length."""
+    """Factor of the width of the active force over fiber length."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
-    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
+    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     passive_fiber_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.6
-    """Strain at which the passive fibre bears `max_isometric_force`."""
+    """Strain at which the passive fiber bears `max_isometric_force`."""
     tendon_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
     """Strain at which the tendon bears `max_isometric_force`."""
     ignore_passive_fiber_force: Flag = False
-    """Whether passive fibres bear no force."""
+    """Whether passive fibers bear no force."""
     tendon_compliance_dynamics_mode: Annotated[str, word("explicit", "implicit")] = "explicit"
-    """Form of the equilibrium of fibre and tendon; implicit is for direct collocation only."""
+    """Form of the equilibrium of fiber and tendon; implicit is for direct collocation only."""
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
     """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
@@ -218,11 +218,11 @@ class MeyerFregly2016Muscle(Muscle):
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.5
     """Activation at the start of a simulation."""
     active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
-    """Factor of the width of the active force over fibre length."""
+    """Factor of the width of the active force over fiber length."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
-    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
+    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     ignore_passive_fiber_force: Flag = False
-    """Whether passive fibres bear no force."""
+    """Whether passive fibers bear no force."""
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
     """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
@@ -233,10 +233,10 @@ class RigidTendonMuscle(Muscle):
     active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")
     )
-    """Active force over fibre length, both normalised."""
+    """Active force over fiber length, both normalised."""
     passive_force_length_curve: Single[Function] = Field(
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
-    """Passive force over fibre length, both normalised; kept between 0 and 10."""
+    """Passive force over fiber length, both normalised; kept between 0 and 10."""
     force_velocity_curve: Single[Function] = Field(default_factory=partial(force_velocity, "force_velocity_curve"))
-    """Factor of the active force over fibre velocity, normalised."""
+    """Factor of the active force over fiber velocity, normalised."""

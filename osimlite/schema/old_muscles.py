@@ -17,7 +17,7 @@ from osimlite.schema.muscles import Muscle
 
 
 class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
-    """A muscle with two states: activation and fibre length."""
+    """A muscle with two states: activation and fiber length."""
 
 
 class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
@@ -28,15 +28,15 @@ class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     deactivation_time_constant: Annotated[float, real(domain="> 0")] = 0.04
     """Time constant (s) of falling activation."""
     Vmax: Annotated[float, real("fiber_length/s", "> 0")] = 10.0
-    """Shortening velocity at which fully active fibres bear no force."""
+    """Shortening velocity at which fully active fibers bear no force."""
     Vmax0: Annotated[float, real("fiber_length/s", "> 0")] = 5.0
     """The same velocity at activation 0; between them it grows in proportion."""
     FmaxTendonStrain: Annotated[float, real(domain="> 0")] = 0.033
     """Strain at which the tendon bears `max_isometric_force`."""
     FmaxMuscleStrain: Annotated[float, real(domain="> 0")] = 0.6
-    """Strain at which the passive fibre bears `max_isometric_force`."""
+    """Strain at which the passive fiber bears `max_isometric_force`."""
     KshapeActive: Annotated[float, real(domain="> 0")] = 0.5
-    """Width of the active force over fibre length l, exp(-(l - 1)^2 / KshapeActive)."""
+    """Width of the active force over fiber length l, exp(-(l - 1)^2 / KshapeActive)."""
     KshapePassive: Annotated[float, real(domain="> 0")] = 4.0
     """Exponent of the passive force at full strain; more makes a softer toe."""
     damping: Annotated[float, real(domain=">= 0")] = 0.05
@@ -44,20 +44,20 @@ class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     Af: Annotated[float, real(domain="> 0")] = 0.3
     """Shape of force over velocity (Hill's a / F0); less is more curved."""
     Flen: Annotated[float, real(domain="> 1")] = 1.8
-    """Force that lengthening fibres approach, of the isometric one."""
+    """Force that lengthening fibers approach, of the isometric one."""
 
 
 class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """The muscle of Schutte et al. (1993)."""
 
     time_scale: Annotated[float, real(domain="> 0")] = 0.1
-    """Time (s) that the rates of activation and fibre length are divided by."""
+    """Time (s) that the rates of activation and fiber length are divided by."""
     activation1: Number = 7.667
     """How much excitation u speeds up the rise: (activation1 u + activation2) per time scale."""
     activation2: Number = 1.459854
     """Rate of falling activation, per time scale; also part of the rise."""
     damping: Annotated[float, real(domain=">= 0")] = 0.1
-    """Damping force of the fibre over `max_isometric_force`, per normalised velocity."""
+    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     tendon_force_length_curve: Single[Function] = Field(
         default_factory=partial(tendon_force_length, "tendon_force_length_curve")
     )
@@ -65,15 +65,15 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")
     )
-    """Active force over fibre length, both normalised."""
+    """Active force over fiber length, both normalised."""
     passive_force_length_curve: Single[Function] = Field(
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
-    """Passive force over fibre length, both normalised."""
+    """Passive force over fiber length, both normalised."""
 
 
 class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
-    """The muscle of Delp et al. (1990), with a mass between fibre and tendon."""
+    """The muscle of Delp et al. (1990), with a mass between fiber and tendon."""
 
     time_scale: Annotated[float, real(domain="> 0", legacy=True)] = 0.1
     """Time (s) that the rates of the states are divided by."""
@@ -82,12 +82,12 @@ class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     activation2: Annotated[float, real(legacy=True)] = 1.459854
     """Rate of falling activation, per time scale; also part of the rise."""
     mass: Annotated[float, real(domain="> 0", legacy=True)] = 0.00287
-    """Mass between fibre and tendon, normalised by force, time scale and optimal fibre length."""
+    """Mass between fiber and tendon, normalised by force, time scale and optimal fiber length."""
     tendon_force_length_curve: LegacyOptional[Function] = Field(default_factory=tendon_force_length)
     """Force of the tendon over its strain."""
     active_force_length_curve: LegacyOptional[Function] = Field(default_factory=active_force_length)
-    """Active force over fibre length, both normalised."""
+    """Active force over fiber length, both normalised."""
     passive_force_length_curve: LegacyOptional[Function] = Field(default_factory=passive_force_length)
-    """Passive force over fibre length, both normalised."""
+    """Passive force over fiber length, both normalised."""
     force_velocity_curve: LegacyOptional[Function] = Field(default_factory=force_velocity)
-    """Factor of the active force over fibre velocity, normalised."""
+    """Factor of the active force over fiber velocity, normalised."""

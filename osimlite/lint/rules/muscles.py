@@ -13,19 +13,19 @@ from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 
-PENNATION = Threshold("largest-pennation", math.pi / 2, "rad", "fibres that turn as far pull on nothing")
-SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fibre starts shorter")
-LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fibre starts longer")
+PENNATION = Threshold("largest-pennation", math.pi / 2, "rad", "fibers that turn as far pull on nothing")
+SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fiber starts shorter")
+LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber starts longer")
 
 
 @rule("OSIM621", "doubtful-muscle", severity=WARNING, thresholds=(PENNATION, SHORTEST, LONGEST))
 def doubtful_muscle(subject: Subject, found: Found) -> None:
-    """A muscle has fibres that no muscle has.
+    """The fibers of a muscle have an implausible length or angle.
 
-    Reports a pennation angle of a quarter turn or more, and a default fibre length, given in the file, that is less
+    Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the file, that is less
     than 0.2 or more than 2 optimal lengths. Numbers that OpenSim refuses are reported as impossible values.
 
-    Fibres across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the optimal length a
+    Fibers across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the optimal length a
     muscle is torn, and below a fifth it has no force; the search for equilibrium then starts far from any, and often
     the numbers belong to two different muscles.
 
@@ -54,7 +54,7 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
             ratio = length / optimal
             if not shortest <= ratio <= longest:
                 found(
-                    f"the default fibre length of {called(muscle)}, {quantity(length, 'm')}, is {ratio:.3g} times its "
+                    f"the default fiber length of {called(muscle)}, {quantity(length, 'm')}, is {ratio:.3g} times its "
                     "optimal length",
                     muscle,
                     tag="default_fiber_length",
@@ -89,13 +89,13 @@ def control_below_activation(subject: Subject, found: Found) -> None:
 
 @rule("OSIM623", "out-of-reach", severity=WARNING, thresholds=(LONGEST,))
 def out_of_reach(subject: Subject, found: Found) -> None:
-    """The path of a muscle leaves its fibres no length that they could have.
+    """The path of a muscle leaves its fibers no length that they could have.
 
     Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer than it by more than 2
-    optimal fibre lengths. Paths that wrap around surfaces count as if they were straight, which is the least they can
+    optimal fiber lengths. Paths that wrap around surfaces count as if they were straight, which is the least they can
     be; those through moving points, or points whose place cannot be told without a simulation, are not looked at.
 
-    A slack muscle bears no force, and fibres are torn at twice their optimal length. OpenSim finds no equilibrium of
+    A slack muscle bears no force, and fibers are torn at twice their optimal length. OpenSim finds no equilibrium of
     such muscles, or computes NaN; where it computes on, the forces are those of no muscle. Often the lengths are those
     of another muscle, or were not scaled with the bones.
 
@@ -118,7 +118,7 @@ def out_of_reach(subject: Subject, found: Found) -> None:
             found(f"{tells}, less than its tendon_slack_length, {slack:.4g} m", muscle, tag="tendon_slack_length")
         elif (ratio := (length - slack) / optimal) > longest:
             found(
-                f"{tells}, which leaves its fibres {ratio:.3g} optimal lengths beyond the slack tendon",
+                f"{tells}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack tendon",
                 muscle,
                 tag="optimal_fiber_length",
             )

@@ -21,7 +21,7 @@ _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT"
 
 @rule("OSIM855", "scale-factor", severity=WARNING, about="document")
 def scale_factor(setup: Setup, found: Found) -> None:
-    """A body would be scaled beyond belief.
+    """A body would be scaled by an implausible factor.
 
     Looks for factors given by hand, and for measurements, that make a body less than half or more than twice as large.
     A measurement is the distance of its markers in the data over that in the model, in its default pose.

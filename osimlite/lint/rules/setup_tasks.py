@@ -60,7 +60,7 @@ def task_weight(setup: Setup, found: Found) -> None:
 
 @rule("OSIM854", "unreachable-task", severity=WARNING, about="document")
 def unreachable_task(setup: Setup, found: Found) -> None:
-    """A coordinate that is to be fitted cannot move, or not there.
+    """A coordinate that is to be fitted cannot move, or cannot reach its value.
 
     Looks for tasks of locked coordinates, for values of which most are outside the range of a clamped coordinate, and
     for locked coordinates that move in the file of values.
