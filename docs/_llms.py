@@ -45,7 +45,7 @@ def listed(nav: Navigation, config: MkDocsConfig) -> str:
     lines += ["", "## Start", "", *(_entry(page, config) for page in alone)]
     for item in nav.items:
         if isinstance(item, Section):
-            pages = [page for page in item.children if isinstance(page, Page)]
+            pages = [page for page in nav.pages if item in page.ancestors]
             lines += ["", f"## {item.title}", "", *(_entry(page, config) for page in pages)]
     return "\n".join(lines) + "\n"
 

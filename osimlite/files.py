@@ -144,7 +144,8 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
 
         handle, name = mkstemp(dir=target.parent, prefix=".osimlite-")
     except OSError as error:
-        raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
+        reason = "the folder does not exist" if isinstance(error, FileNotFoundError) else error.strerror
+        raise OsimliteError(f"cannot write here: {reason}", file=str(target)) from None
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream

@@ -294,7 +294,7 @@ def _locked(path: Path) -> Any:
     filelock = require("filelock", extra="sweep", purpose="a table of results")
     if not path.parent.is_dir():
         # The lock would make the folder.
-        raise OsimliteError("cannot write the file: its folder does not exist", file=str(path))
+        raise OsimliteError("cannot write here: the folder does not exist", file=str(path))
     lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), thread_local=False)
     try:
         lock.acquire(blocking=False)

@@ -30,5 +30,7 @@ def test_every_page_is_listed_with_its_first_sentence() -> None:
     found = [match for part in parts for match in map(entry.fullmatch, part.splitlines()[2:]) if match]
     assert len(found) == sum(line.startswith("- ") for line in text.splitlines()) == len(nav.pages) > 30
     assert {match[2] for match in found} == {page.file.src_uri for page in nav.pages}
-    assert "- [When something fails](errors.md): A command that cannot go on says so in one sentence" in text
+    assert "- [Rules](rules.md): What `osimlite validate` looks for.\n" in text
     assert not [match[0] for match in found if len(match[3]) > 400 or "](" in match[3]]
+    # A page begins with a sentence about itself, and not with what follows an example or a table.
+    assert not [match[0] for match in found if not re.fullmatch(r"([A-Z`]|osimlite ).*[.?]", match[3])]

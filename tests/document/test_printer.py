@@ -111,7 +111,7 @@ def test_writing_is_whole_or_not_at_all(tmp_path: Path) -> None:
         osimlite.write(model, target)
     assert target.read_text() == "before"
     assert [path.name for path in tmp_path.iterdir()] == ["m.osim"]
-    with pytest.raises(OsimliteError, match="cannot write here"):
+    with pytest.raises(OsimliteError, match="cannot write here: the folder does not exist"):
         osimlite.write(Model(name="m"), tmp_path / "no" / "m.osim")
 
 
