@@ -83,7 +83,7 @@ PAGES = {
 }
 """Pages and their headings, by the class of an error, or else by the module or package that could not go on.
 
-What has no page, such as the reading of numbers, fails for the sake of whoever called it.
+A module without a page, such as one that reads numbers, is passed over for the one that called it.
 """
 
 

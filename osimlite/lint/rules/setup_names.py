@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+from osimlite.lint.checked import Where
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.words import called, nearest_name
@@ -88,7 +89,7 @@ def unknown_name(setup: Setup, found: Found) -> None:
         is_lost = kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
         fate, severity = _FATES["left out" if is_lost else kind.fate]
         more = "; it is written in small letters" if text.lower() in kind.words else ""
-        where: Any = {"tag": use.spec.tag, "word": text}
+        where: Where = {"tag": use.spec.tag, "word": text}
         if use.spec.tag == "@name":
             where = {"attribute": "name"}
             names = names.difference(other.name for other in setup.by_class[type(item)])
