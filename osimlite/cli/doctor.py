@@ -29,7 +29,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "inverse-dynamics": ("numpy", "scipy"),
     "view": ("numpy",),
     "gait": ("numpy",),
-    "machine code for forces and motions, many times as fast": ("numba",),
+    "simulate --engine compiled": ("numpy", "numba"),
     "simulate --engine bullet": ("numpy", "pybullet"),
     "simulate --gui": ("numpy", "pybullet"),
     "simulate --plot": ("numpy", "matplotlib"),
