@@ -22,7 +22,7 @@ from osimlite.schema.fields import Held, Value
 from osimlite.schema.registry import class_for, tags
 from osimlite.schema.specs import FieldSpec
 
-WIDTH = 84
+WIDTH = 80
 """Columns of the help texts."""
 
 
