@@ -151,7 +151,9 @@ def main(name: str, clone: str) -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "--read":
+    if sys.argv[1:2] == ["--read"]:
         print(json.dumps(read(sys.argv[2])))
+    elif len(sys.argv) != 3:
+        sys.exit(__doc__)
     else:
         sys.exit(main(*sys.argv[1:]))

@@ -82,7 +82,7 @@ def __getattr__(name: str) -> Any:
         if not name.startswith("_"):
             from importlib.util import find_spec
 
-            if find_spec(f"{__name__}.{name}"):
+            if name.isidentifier() and find_spec(f"{__name__}.{name}"):
                 return import_module(f"{__name__}.{name}")
             from osimlite.schema.registry import MODULES
             from osimlite.text import did_you_mean

@@ -241,7 +241,7 @@ MOTIONS = (
         "It jumps",
         _jumps,
         "Muscles are blue at rest and red when active; click on one for its length and its moment arms.",
-        "osimlite muscles {}/jumper/Jumper.osim --coordinate knee_angle_r",
+        'osimlite muscles "{}/jumper/Jumper.osim" --coordinate knee_angle_r',
     ),
 )
 

@@ -159,6 +159,7 @@ def test_a_path_in_place_of_a_model_is_told_to_be_read(function: str) -> None:
 def test_a_class_that_is_not_there_is_answered_with_the_nearest() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'PinJont'; did you mean 'PinJoint'"):
         osimlite.PinJont  # noqa: B018
+    assert not hasattr(osimlite, "joints.PinJoint")
 
 
 def test_parts_of_the_package_are_there_without_being_imported(monkeypatch: pytest.MonkeyPatch) -> None:
