@@ -184,6 +184,22 @@ def wrapped(draw):
     return model
 
 
+@pytest.mark.parametrize("quadrant", ["all", "-x"])
+def test_two_points_at_one_place_beside_a_torus(quadrant, tmp_path):
+    model = Model(name="nowhere")
+    torus = WrapTorus(name="torus", quadrant=quadrant, inner_radius=0.02, outer_radius=0.06)
+    spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+    for name in ("p0", "p1"):
+        point = at(GROUND, 0.0, -0.1, -0.02)
+        point.name = name
+        spring.geometry_path.path_point_set.objects.append(point)
+    model.ground.wrap_object_set.objects.append(torus)
+    spring.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="torus"))
+    model.add(spring)
+    osimlite.write(model, tmp_path / "model.osim")
+    compare_paths(tmp_path / "model.osim", poses=1)
+
+
 @settings(max_examples=40)
 @given(wrapped())
 def test_around_surfaces(tmp_path_factory, model):

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import osimlite
@@ -107,6 +107,8 @@ def test_any_number_gets_one_verdict(data):
     text = to_text(with_force(FORCES[name]))
     leaf = data.draw(st.sampled_from(list(NUMBERS.finditer(text))))
     words, extreme = leaf[2].split(), data.draw(st.sampled_from(EXTREMES))
+    # Next to the inertia about a joint at 1e16 m, that of the body is rounding, and so is whether the sum is positive.
+    assume(not (extreme == "1e16" and leaf[0].startswith("<mass_center>")))
     places = data.draw(st.sampled_from([[place] for place in range(len(words))] + [list(range(len(words)))]))
     for place in places:
         words[place] = extreme

@@ -101,7 +101,7 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
     dx, dy, dz = minus(second, first)
     distance = norm((dx, dy, dz))
     if not distance > 0.0:
-        return first
+        return nan, nan, nan
     x, y, _ = first
     dx, dy, _ = way = dx / distance, dy / distance, dz / distance
     start, flat_start, flat, square = dot(first, way), x * dx + y * dy, dx * dx + dy * dy, x * x + y * y
