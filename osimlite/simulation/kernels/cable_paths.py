@@ -70,7 +70,6 @@ FIRST = 3
 
 PLACE, PULLED = 0, 3
 """Numbers of a point: the station that the cable runs through, and the one that it pulls at."""
-POINT_NUMBERS = 6
 BEFORE, AFTER = 3, 6
 """Its part of the record, after the place in ground: directions of the cable before and after it."""
 POINT_WORK = 9
