@@ -4,6 +4,10 @@ The kernels know of no compiler. An entry is compiled with the functions that it
 arrays and numbers, holds no reference to any Python object, and runs without Python's lock. Numba would make machine
 code of every function that it meets, and optimise each once more within each that calls it; here it only translates
 them, and what an entry needs is optimised once, as a whole.
+
+No other module knows what numba is like inside. These parts of it are promised to nobody: `TESTED` of
+:mod:`osimlite.simulation.engines.object_code` says in which versions they were found so, and the tests of this module
+fail where one of them has moved.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from types import FunctionType
 from typing import Any
 
 from osimlite._require import require
+from osimlite.simulation.engines.object_code import machine
 from osimlite.simulation.kernels import pointers
 
 numba = require("numba", extra="sim", purpose="the compiled engine")
@@ -136,8 +141,7 @@ def compiled(function: Any) -> tuple[str, str]:
     for part in whole.functions:
         if not part.is_declaration and part.name != entry.native_name:
             part.linkage = "internal"
-    machine = entry._library.codegen._tm
-    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+    builder = llvm.create_pass_builder(machine(), llvm.create_pipeline_tuning_options(speed_level=3))
     builder.getModulePassManager().run(whole, builder)
     return str(whole), entry.native_name
 

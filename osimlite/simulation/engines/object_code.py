@@ -7,7 +7,6 @@ write there: what others can change is not run.
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import json
 import logging
@@ -31,8 +30,8 @@ _log = logging.getLogger(__name__)
 FOLDER = "NUMBA_CACHE_DIR"
 """Environment variable that may name the only folder for the files; numba uses it likewise."""
 
-HELPER = re.compile(rb"numba_[a-z_]+")
-"""What the compiler's own functions are called, which code that raises nothing names but never calls."""
+TESTED = ">=0.62,<0.69"
+"""The versions of numba with whose internals `compiler.py` was tried; pyproject.toml asks for one of them."""
 
 _kept: list[Any] = []
 """Machine code stays where it is as long as this does."""
@@ -61,8 +60,19 @@ def _parsed(head: bytes) -> object:
 
 
 def translated(text: str) -> bytes:
-    """Code in the object format of the system from the intermediate language of LLVM."""
-    return _machine().emit_object(llvm.parse_assembly(text))
+    """Code in the object format of the system from the intermediate language of LLVM.
+
+    Code that raises nothing names functions of numba's runtime, but never calls them: in their place it gets some that
+    end the process. So what is in a file needs nothing of numba.
+    """
+    module = llvm.parse_assembly(text)
+    for name in [part.name for part in module.functions if part.is_declaration and part.name.startswith("numba_")]:
+        module.link_in(llvm.parse_assembly(NEVER_CALLED.format(name)))
+        module.get_function(name).linkage = "internal"
+    return machine().emit_object(module)
+
+
+NEVER_CALLED = "declare void @llvm.trap() define void @{}() {{ call void @llvm.trap() unreachable }}"
 
 
 def keep(name: str, digest: str, code: bytes, symbol: str) -> int:
@@ -94,18 +104,14 @@ def _tell_once(sentence: str) -> None:
 
 def _link(code: bytes, symbol: str) -> int:
     """Make code ready to run; returns the address of a symbol in it."""
-    nowhere = ctypes.cast(ctypes.pythonapi.Py_FatalError, ctypes.c_void_p).value
-    for helper in {word.decode() for word in HELPER.findall(code)}:
-        if llvm.address_of_symbol(helper) is None:
-            llvm.add_symbol(helper, nowhere)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     _kept.append(engine)
     return engine.get_function_address(symbol)
 
 
-def _machine() -> Any:
+def machine() -> Any:
     """This processor."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()

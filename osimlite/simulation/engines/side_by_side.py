@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 
+from osimlite.errors import OsimliteError
 from osimlite.simulation.engines.sources import digest_of, functions_within
 from osimlite.simulation.kernels.table import law_function
 
@@ -53,12 +54,21 @@ def cores() -> int:
 
 
 def made(name: str) -> Made:
-    """Compile a law here."""
-    from osimlite.simulation.engines.compiler import compiled
-    from osimlite.simulation.engines.object_code import translated
+    """Compile a law here.
+
+    Raises:
+        OsimliteError: numba is of a version whose internals are others.
+    """
+    from osimlite.simulation.engines.object_code import TESTED, numba_version, translated
 
     function = law_function(name)
-    text, symbol = compiled(function)
+    try:
+        from osimlite.simulation.engines.compiler import compiled
+
+        text, symbol = compiled(function)
+    except (AttributeError, ImportError, NotImplementedError, TypeError) as error:
+        told = f"numba {numba_version()} cannot compile osimlite's kernels ({error}); pip install 'numba{TESTED}'"
+        raise OsimliteError(told) from error
     return Made(name, digest_of(function), translated(text), symbol)
 
 
