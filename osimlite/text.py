@@ -12,6 +12,8 @@ _UNSAFE = r"[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2
 # Workflow commands: GitHub obeys `::name::` at the start of a line; it, Azure and TeamCity obey `##name[` anywhere.
 _COMMAND = r"(?:(?<=\n)|\A)[ \t\xa0\u1680\u2000-\u200a\u202f\u205f\u3000]*:(?=:)|#(?=#\w*\[)"
 _OBEYED = re.compile(f"{_COLOUR}|{_UNSAFE}|{_COMMAND}")
+# What is escaped in JSON: a character of two halves, a half without the other, anything else.
+_HALF = re.compile(r"\\(?:ud[89ab]..\\ud[c-f]..|u(d[89a-f]..)|.)")
 
 
 def visible(text: str) -> str:
@@ -23,11 +25,17 @@ def visible(text: str) -> str:
 
 
 def json_lines(data: object) -> str:
-    """JSON as programs read it from a log or a pipe: ASCII, so that it passes everywhere, and nothing in it is lost."""
+    r"""JSON as programs read it from a log or a pipe: ASCII, so that it passes everywhere, and of whole characters.
+
+    A byte of a file name that is no UTF-8 is written as ``\xe9``, as :func:`visible` does: no string of JSON holds it.
+    """
     from json import dumps
 
+    text = dumps(data, indent=2)
+    if "\\ud" in text:
+        text = _HALF.sub(lambda found: f"\\{_escape(chr(int(found[1], 16)))}" if found[1] else found[0], text)
     # Where it goes through the log of a CI job, a string must not be taken for a command; `#` stands in strings only.
-    return dumps(data, indent=2).replace("##", "#\\u0023").replace("\x7f", "\\u007f") + "\n"
+    return text.replace("##", "#\\u0023").replace("\x7f", "\\u007f") + "\n"
 
 
 def harmless(text: str, *, starts_line: bool = True) -> str:

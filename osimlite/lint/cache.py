@@ -14,6 +14,7 @@ from functools import cache
 from hashlib import blake2b
 from pathlib import Path
 from time import time_ns
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
@@ -54,6 +55,7 @@ class Cache:
                     stamps = dict(map(_outside, outside))
                     if kept != key or any(self._stamp(path) != stamp for path, stamp in stamps.items()):
                         return None
+                    why_not = _of(why_not, *[_TEXT] * len(why_not))
                     known = Report([_finding(file, values) for values in findings], unmeasured=why_not)
                     now = time_ns()
                     if rest.get("file") != _own_stamp(file):
@@ -165,14 +167,26 @@ def _code() -> str:
     return f"{__version__} {max(times)} {len(times)}"
 
 
+def _of(values: Any, *kinds: tuple[type, ...]) -> Any:
+    """A list with one item of each of these kinds; TypeError for anything else. True and False are no numbers."""
+    if type(values) is not list or len(values) != len(kinds):
+        raise TypeError
+    if not all(type(value) in kind for value, kind in zip(values, kinds, strict=True)):
+        raise TypeError
+    return values
+
+
+_TEXT, _NUMBER, _LIST, _FLAG = (str,), (int,), (list,), (bool,)
+_MAYBE_TEXT, _MAYBE_NUMBER, _MAYBE_LIST = (str, NoneType), (int, NoneType), (list, NoneType)
+_FINDING = (
+    _TEXT, _TEXT, _TEXT, _TEXT, _MAYBE_NUMBER, _MAYBE_NUMBER, _NUMBER, _TEXT, _MAYBE_TEXT, _MAYBE_LIST,
+)  # fmt: skip
+
+
 def _outside(values: Any) -> tuple[str, Stamp]:
     """A path and its stamp as an entry has them; TypeError for anything else."""
-    match values:
-        case [str(path), None]:
-            return path, None
-        case [str(path), [int(time), int(size)]]:
-            return path, (time, size)
-    raise TypeError
+    path, stamp = _of(values, _TEXT, _MAYBE_LIST)
+    return path, None if stamp is None else tuple(_of(stamp, _NUMBER, _NUMBER))
 
 
 def _values(finding: Finding) -> list[object]:
@@ -186,27 +200,16 @@ def _values(finding: Finding) -> list[object]:
 
 def _finding(file: str, values: Any) -> Finding:
     """The finding that `_values` made a list of; TypeError for anything else."""
-    match values:
-        case [
-            str(code), str(name), str(severity), str(message), int() | None as line, int() | None as column,
-            int(length), str(component), str() | None as suggestion, fix,
-        ]:  # fmt: skip
-            mend, level = _fix(fix), Severity(severity)
-            return Finding(code, name, level, message, file, line, column, length, component, suggestion, mend)
-    raise TypeError
+    code, name, severity, message, line, column, length, component, suggestion, fix = _of(values, *_FINDING)
+    place = [number for number in (line, column) if number is not None]
+    if len(place) == 1 or min(*place, length, length) < 1:
+        raise TypeError
+    level = Severity(severity)
+    return Finding(code, name, level, message, file, line, column, length, component, suggestion, _fix(fix))
 
 
 def _fix(values: Any) -> Fix | None:
-    match values:
-        case None:
-            return None
-        case [bool(safe), [*edits]]:
-            return Fix(tuple(map(_edit, edits)), safe)
-    raise TypeError
-
-
-def _edit(values: Any) -> Edit:
-    match values:
-        case [int(start), int(end), str(text)]:
-            return Edit(start, end, text)
-    raise TypeError
+    if values is None:
+        return None
+    safe, edits = _of(values, _FLAG, _LIST)
+    return Fix(tuple(Edit(*_of(edit, _NUMBER, _NUMBER, _TEXT)) for edit in edits), safe)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +19,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import sto_text
 from osimlite.simulation.tabular import Tabular
+from osimlite.text import json_lines
 
 
 class Trajectory(Tabular):
@@ -197,7 +197,7 @@ class Trajectory(Tabular):
             "states.sto": self.states_text(),
             "forces.sto": self.forces_text(),
             **({"probes.sto": text} if (text := self.probes_text()) else {}),
-            "summary.json": json.dumps(self.summary, indent=2) + "\n",
+            "summary.json": json_lines(self.summary),
         }
         make_folder(base)
         for name, text in texts.items():

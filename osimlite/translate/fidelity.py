@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
@@ -10,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from osimlite.multibody.spatial import Array
+from osimlite.text import json_lines
 
 LEFT_OUT = "left out"
 """What `Record.done` starts with where nothing of the component is in the target."""
@@ -159,4 +159,4 @@ class Fidelity:
             for record in self.records
         ]
         content = {"model": self.model, "target": self.target, "records": records, "translated": self.translated}
-        return json.dumps(content, indent=2) + "\n"
+        return json_lines(content)

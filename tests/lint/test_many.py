@@ -185,6 +185,33 @@ def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked):
     assert check_files([str(project / "m.osim")], Config()).findings == first.findings
 
 
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"unmeasured": [5]},
+        {"unmeasured": ["x", None]},
+        {"unmeasured": [["x"]]},
+        {"findings": [[]]},
+        {"findings": [{"code": "OSIM101"}]},
+        {"findings": [["OSIM101", "unknown-tag", "error", "x", True, 1, 1, "", None, None]]},
+        {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, None, 1, "", None, None]]},
+        {"findings": [["OSIM101", "unknown-tag", "error", "x", 0, 1, 1, "", None, None]]},
+        {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, 1, -1, "", None, None]]},
+        {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, 1, 1, "", None, [1, []]]]},
+        {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, 1, 1, "", None, [True, [[0, True, "x"]]]]]},
+        {"outside": [["x", [1, True]]]},
+    ],
+    ids=str,
+)
+def test_an_entry_is_read_by_its_schema_or_not_at_all(project, checked, damage):
+    first = check_files([str(project / "m.osim")], Config())
+    (entry,) = (project / NAME).rglob("*.json")
+    entry.write_text(json.dumps(json.loads(entry.read_text()) | damage))
+    again = check_files([str(project / "m.osim")], Config())
+    assert (again.findings, again.unmeasured) == (first.findings, first.unmeasured)
+    assert len(checked) == 2
+
+
 def test_a_cache_that_cannot_be_written_is_done_without(project, checked):
     (project / NAME).write_text("a file stands in its place")
     assert codes(project) == codes(project)

@@ -6,7 +6,6 @@ joints are where the coordinates are, and those that follow others by an equalit
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from osimlite.robot.names import dotted
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.paths import Paths
+from osimlite.text import json_lines
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.isometric import isometric_tension
 from osimlite.translate.mjcf.muscles import Curves
@@ -75,7 +75,7 @@ class Check:
 
     def to_json(self) -> str:
         """All numbers as JSON text."""
-        return json.dumps(_plain(asdict(self)), indent=2) + "\n"
+        return json_lines(_plain(asdict(self)))
 
 
 def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7) -> Check:
