@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,6 +25,7 @@ from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame, TwoFrameLinker
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use
@@ -51,6 +53,15 @@ _ENDLESS = 1.0
 """How long a contact cylinder is drawn, which has no ends, m."""
 
 _MARKER_RADIUS = 0.008
+
+STRESS = 6e5
+"""Greatest stress of a muscle's fibers, Pa: 60 N/cm² gives the cross-section that its greatest force takes."""
+
+SLENDER = 0.4
+"""How much of that cross-section's radius is drawn: pennate fibers lie beside each other, and bones are to be seen."""
+
+THICKEST = 0.025
+"""No fibers are drawn with a greater radius, m."""
 
 
 def build_scene(
@@ -227,7 +238,8 @@ class _Collector:
         if isinstance(path, GeometryPath):
             found = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
         wraps = tuple(self.tree.path_of(surface) or "" for surface in found if surface is not None)
-        self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps))
+        belly, tendon = _fibers(owner) if isinstance(owner, Muscle) else (0.0, 0.0)
+        self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon))
 
     def _force(self, force: Force, path: str) -> None:
         """The line of a force between two points, and where the force of a contact is shown."""
@@ -334,6 +346,13 @@ class _Collector:
                 matrix[:3, 3] += 0.002 * width * matrix[:3, 0]
                 matrix[:3, :3] *= width
         return scene
+
+
+def _fibers(muscle: Muscle) -> tuple[float, float]:
+    """How thick the fibers are drawn in their middle, and the slack length of the tendon, m."""
+    force, tendon = abs(float(muscle.max_isometric_force)), abs(float(muscle.tendon_slack_length))
+    radius = SLENDER * math.sqrt(force / (math.pi * STRESS)) if math.isfinite(force) else THICKEST
+    return min(max(radius, 0.0035), THICKEST), tendon if math.isfinite(tendon) else 0.0
 
 
 def _stretched(size: Any, where: Any = (0.0, 0.0, 0.0)) -> Array:

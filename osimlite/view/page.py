@@ -29,7 +29,7 @@ from osimlite.view.pushes import Pushes
 from osimlite.view.routes import kernels_text, routes_data, text_of
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
 
-SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "stage.js", "panels.js", "curves.js", "viewer.js")
+SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "tubes.js", "stage.js", "panels.js", "curves.js", "viewer.js")
 """The parts of the page's own program, in their order."""
 
 TRAVELS = 0.5

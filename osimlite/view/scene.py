@@ -78,6 +78,8 @@ class Line:
         radius: how thick to draw it, m.
         visible: whether the model wants it shown.
         wraps: paths of the wrap objects that it may bend around.
+        fibers: how thick the fibers of a muscle are in their middle, m; 0 where there are none.
+        tendon: slack length of its tendon, m: half of it is at each end.
     """
 
     path: str
@@ -87,6 +89,8 @@ class Line:
     radius: float = 0.004
     visible: bool = True
     wraps: tuple[str, ...] = ()
+    fibers: float = 0.0
+    tendon: float = 0.0
 
     @property
     def start(self) -> LinePoint:

@@ -180,12 +180,38 @@ def test_muscles_have_the_colour_of_their_activation(file_of, open_page, tmp_pat
     page = open_page(shown(file_of(GAIT), motion).write_page(tmp_path / "page.html"))
     page.run("v.setTime(1.0)")
     color = """x.map((name) => {
-      const group = v.stage.rods.find((g) => g.parent.name === 'paths'), [mesh] = group.children;
-      const k = v.data.lines.findIndex((line) => line.path === name), i = group.userData.owners.indexOf(k);
-      const light = [...mesh.instanceColor.array.slice(3 * i, 3 * i + 3)];
+      const tubes = v.stage.tubed.find((tubes) => tubes.mesh.parent.name === 'paths');
+      const light = tubes.colorOf(v.data.lines.findIndex((line) => line.path === name));
       return light.map((l) => l < 0.0031308 ? 12.92 * l : 1.055 * l ** (1 / 2.4) - 0.055);
     })"""
     assert np.array(page.run(color, names)) == pytest.approx(np.array([(0, 0, 1), (0.4, 0, 0.6), (1, 0, 0)]), abs=2e-3)
+
+
+def test_fibers_are_as_thick_as_the_muscle_is_strong_between_thin_tendons(shared, open_page, tmp_path):
+    view = shown(rajagopal(shared))
+    page = open_page(view.write_page(tmp_path / "page.html"))
+    strong, weak = (
+        next(line for line in view.scene.lines if line.path == f"/forceset/{name}") for name in ("soleus_r", "tfl_r")
+    )
+    assert strong.fibers == pytest.approx(0.4 * np.sqrt(view.model[strong.path].max_isometric_force / (np.pi * 6e5)))
+    widths = """x.map((name) => {
+      const tubes = v.stage.tubed.find((tubes) => tubes.mesh.parent.name === 'paths');
+      const place = v.data.lines.findIndex((line) => line.path === name);
+      const p = tubes.mesh.geometry.attributes.position.array;
+      const wide = (ring) => Math.hypot(...[0, 1, 2].map((k) => p[30 * ring + k] - p[30 * ring + 15 + k])) / 2;
+      const found = [[], []];
+      tubes.owners.forEach((owner, ring) => {
+        if (owner === place) found[tubes.fibers[ring]].push(wide(ring));
+      });
+      return found.map((radii) => Math.max(...radii));
+    })"""
+    for line, (tendon, fibers) in zip((strong, weak), page.run(widths, [strong.path, weak.path]), strict=True):
+        assert tendon == pytest.approx(line.radius, rel=1e-4) and fibers == pytest.approx(line.fibers, rel=0.02)
+    assert strong.fibers > 1.5 * weak.fibers
+    # Each triangle of the surface leads to its line.
+    last = page.run("20 * (v.stage.tubed[0].rings[0] - 1) - 1")
+    first, same, second = page.run("x.map((k) => v.stage.tubed[0].owner(k))", [0, last, last + 1])
+    assert first == same != second
 
 
 def test_dependent_coordinates_follow_in_the_page_alone(shared, open_page, tmp_path):

@@ -1,9 +1,9 @@
 "use strict";
 // The three-dimensional picture: surfaces on bodies, lines, frames, arrows, ground, light, camera.
 (() => {
-  const { bytes, point } = window.osimlite;
+  const { bytes, point, Tubes } = window.osimlite;
   const T = window.THREE;
-  const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
+  const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, TENDON = 0xe3c88c, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
 
   const floats = (text) => new Float32Array(bytes(text).buffer);
   const toned = ([r, g, b]) => new T.Color().setRGB(r, g, b, T.SRGBColorSpace);
@@ -19,7 +19,7 @@
       this.renderer = new T.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
       this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
       this.scene = new T.Scene();
-      this.scene.background = new T.Color(0xf6f8fb);
+      this.scene.background = new T.Color(0xe4e9f0);
       this.up = vector(data.up);
       this.camera = new T.PerspectiveCamera(32, 1, 0.001, 1000);
       this.camera.up.copy(this.up);
@@ -123,26 +123,14 @@
       }
     }
 
-    // All lines of a layer as cylinders and balls of two instanced meshes, one of each for every corner.
+    // All lines of a layer as one surface.
     tubes(layer) {
       const lines = [...this.data.lines.entries()].filter(([, line]) => line.layer === layer && line.visible);
       if (!lines.length) return;
-      const room = lines.reduce((sum, [, line]) => sum + (line.points ? line.points.length : line.most), 0);
-      const rod = new T.CylinderGeometry(1, 1, 1, 10, 1, true), ball = new T.SphereGeometry(1, 10, 8);
-      const material = new T.MeshStandardMaterial({ roughness: 0.6 });
-      const group = new T.Group();
-      // Which line each of the instances belongs to.
-      group.userData = { lines, owners: [] };
-      for (const geometry of [rod, ball]) {
-        const mesh = new T.InstancedMesh(geometry, material, room);
-        mesh.count = 0;
-        mesh.frustumCulled = false;
-        mesh.userData = { owners: group.userData.owners };
-        group.add(mesh);
-      }
-      this.layers[layer].add(group);
+      const tubes = new Tubes(lines);
+      this.layers[layer].add(tubes.mesh);
       if (layer === "geometry") this.scene.add(this.layers.geometry);
-      (this.rods ||= []).push(group);
+      (this.tubed ||= []).push(tubes);
     }
 
     pushes() {
@@ -175,7 +163,7 @@
       }
       const grid = new T.GridHelper();
       grid.geometry = new T.BufferGeometry().setFromPoints(ends);
-      grid.material = new T.LineBasicMaterial({ color: 0xcbd3dc, depthTest: false, depthWrite: false });
+      grid.material = new T.LineBasicMaterial({ color: 0xa9b5c3, depthTest: false, depthWrite: false });
       grid.matrixAutoUpdate = false;
       matrix4(floor.matrix, grid.matrix);
       grid.userData = { visible: true };
@@ -213,52 +201,26 @@
         group.matrixWorldNeedsUpdate = true;
       });
       this.row = row;
-      (this.rods || []).forEach((group) => this.lay(group));
+      (this.tubed || []).forEach((tubes) => this.lay(tubes));
       this.push(row);
       this.wanted();
     }
 
-    // Put the rods and balls of lines where their corners are.
-    lay(group) {
-      const [rods, balls] = group.children, { lines, owners } = group.userData;
-      const start = new T.Vector3(), end = new T.Vector3(), up = new T.Vector3(0, 1, 0);
-      const turn = new T.Quaternion(), middle = new T.Vector3(), size = new T.Vector3(), m = new T.Matrix4();
-      let i = 0;
-      for (const [k, line] of lines) {
-        const corners = this.mechanism.corners(k, this.q, this.poses);
-        const r = (this.glow(line.path)[0] === SELECTED ? 1.8 : 1) * line.radius;
-        corners.forEach((corner, s) => {
-          start.set(...corner);
-          balls.setMatrixAt(i, m.makeScale(r, r, r).setPosition(start));
-          end.set(...(corners[s + 1] || corner));
-          const way = middle.copy(end).sub(start), length = way.length();
-          turn.setFromUnitVectors(up, length > 0 ? way.divideScalar(length) : up);
-          rods.setMatrixAt(i, m.compose(start.add(end).multiplyScalar(0.5), turn, size.set(r, length, r)));
-          owners[i++] = k;
-        });
-      }
-      for (const mesh of group.children) {
-        mesh.count = i;
-        mesh.instanceMatrix.needsUpdate = true;
-        mesh.boundingSphere = null;
-      }
-      this.color(group);
+    lay(tubes) {
+      tubes.lay((place) => this.mechanism.corners(place, this.q, this.poses), (line) => this.glow(line.path)[0] === SELECTED ? 1.4 : 1);
+      this.color(tubes);
     }
 
     // Colour lines: what is selected, what something was found at, muscles by their activation, as OpenSim does.
-    color(group) {
-      const { lines, owners } = group.userData, colors = {};
-      for (const [k, line] of lines) {
+    color(tubes) {
+      const tendon = new T.Color(TENDON);
+      tubes.color(Object.fromEntries(tubes.lines.map(([place, line]) => {
         const [glow, strength] = this.glow(line.path), levels = this.data.motion?.activations[line.path];
+        if (glow === SELECTED) return [place, [new T.Color(CHOSEN), tendon]];
         // Blue is what rests.
-        if (glow === SELECTED) colors[k] = new T.Color(CHOSEN);
-        else if (levels && this.row >= 0) colors[k] = toned([levels[this.row] / 255, 0, 1 - levels[this.row] / 255]);
-        else colors[k] = strength ? new T.Color(glow) : toned(line.color);
-      }
-      for (const mesh of group.children) {
-        for (let i = 0; i < mesh.count; i++) mesh.setColorAt(i, colors[owners[i]]);
-        if (mesh.count) mesh.instanceColor.needsUpdate = true;
-      }
+        if (levels && this.row >= 0) return [place, [toned([levels[this.row] / 255, 0, 1 - levels[this.row] / 255]), tendon]];
+        return [place, [strength ? new T.Color(glow) : toned(line.color), strength ? new T.Color(glow) : tendon]];
+      })));
     }
 
     push(row) {
@@ -277,7 +239,7 @@
         const near = vector(point(pose, record.near));
         arrow.position.copy(on).addScaledVector(force, near.sub(on).dot(force) / (size * size));
         arrow.quaternion.setFromUnitVectors(up, force.divideScalar(size));
-        const length = 0.5 * this.data.size * size / motion.largest, thick = 0.009 * this.data.size;
+        const length = 0.5 * this.data.size * size / motion.largest, thick = Math.min(0.013 * this.data.size, 0.2 * length);
         const head = Math.min(length, 5 * thick);
         arrow.children[0].scale.set(thick, Math.max(length - head, 1e-6), thick);
         arrow.children[1].position.y = length - head;
@@ -312,14 +274,14 @@
         mesh.material.emissive.setHex(color);
         mesh.material.emissiveIntensity = strength;
       }
-      (this.rods || []).forEach((group) => this.color(group));
+      (this.tubed || []).forEach((tubes) => this.color(tubes));
       this.wanted();
     }
 
     select(path) {
       this.selected = path;
       this.paint();
-      (this.rods || []).forEach((group) => this.lay(group));
+      (this.tubed || []).forEach((tubes) => this.lay(tubes));
       this.showWraps();
     }
 
@@ -384,12 +346,13 @@
       ray.params.Line.threshold = 0.004 * this.data.size;
       const at = new T.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height);
       ray.setFromCamera(at, this.camera);
-      const lines = (this.rods || []).filter((group) => group.parent.visible).flatMap((group) => group.children);
+      const lines = (this.tubed || []).map((tubes) => tubes.mesh).filter((mesh) => mesh.parent.visible);
       const hits = ray.intersectObjects([...this.shapes.filter((mesh) => mesh.visible), ...lines], false);
       // What shines through gives way to what is behind it.
       const hit = hits.find((h) => !(h.object.material.opacity < 0.45)) || hits[0];
       if (!hit) return null;
-      return hit.instanceId === undefined ? hit.object.userData.path : this.data.lines[hit.object.userData.owners[hit.instanceId]].path;
+      const { tubes, path } = hit.object.userData;
+      return tubes ? this.data.lines[tubes.owner(hit.faceIndex)].path : path;
     }
 
     // Where a point of a body is on the page, or null behind the camera.

@@ -197,7 +197,7 @@
           waiting = false;
           const path = this.stage.pick(event.clientX, event.clientY), box = canvas.getBoundingClientRect();
           hover.style.display = path ? "block" : "none";
-          hover.textContent = path || "";
+          hover.replaceChildren(...this.said(path || ""));
           hover.style.left = `${event.clientX - box.left + 14}px`;
           hover.style.top = `${event.clientY - box.top + 12}px`;
         }, 60);
@@ -206,6 +206,12 @@
       for (const button of document.querySelectorAll("[data-look]")) {
         button.addEventListener("click", () => this.stage.look(this.data.directions[button.dataset.look]));
       }
+    }
+
+    // What is said of a component under the pointer: its name, and its class.
+    said(path) {
+      const node = this.data.tree.find((item) => item.path === path);
+      return node ? [make("strong", { textContent: node.name }), node.kind] : [path];
     }
 
     layers() {
