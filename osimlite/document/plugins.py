@@ -15,6 +15,7 @@ from osimlite.document.lexical import Unclean, converter
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file, stamped
 from osimlite.schema.base import Component, Object, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Held, Kind, Reference, Tag, Value
 from osimlite.schema.registry import MODULES, further_classes, let_count
 from osimlite.schema.resolution import RULES
@@ -142,8 +143,8 @@ class _Declarations:
         inside: dict[str, Any] = {
             "__module__": __name__,
             "__doc__": f"A class of a plug-in, as declared in {self.path}.",
-            "__annotations__": {"declared_outputs": ClassVar[str]},
-            "declared_outputs": " ".join(map(self.output, self.rows(entry, "outputs", name))),
+            "__annotations__": {"facts": ClassVar[Facts]},
+            "facts": Facts(outputs=" ".join(map(self.output, self.rows(entry, "outputs", name)))),
         }
         known = base.field_specs()
         sockets = {row["tag"] for row in self.sockets(entry, name)}
@@ -261,7 +262,7 @@ class _Declarations:
         return rows
 
     def output(self, row: Any) -> str:
-        """An output as a word of :mod:`osimlite.schema.outputs`."""
+        """An output as a word of :mod:`osimlite.schema.facts`."""
         self.mapping(row, _OF_AN_OUTPUT, "an output", "outputs")
         kind = row.get("type", "double")
         return f"{row.get('name')}{'[]' if row.get('list') else ''}{'' if kind == 'double' else f':{kind}'}"

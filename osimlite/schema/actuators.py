@@ -3,6 +3,7 @@
 import math
 from typing import Annotated, ClassVar
 
+from osimlite.schema.facts import IDLE, STOPS, Facts
 from osimlite.schema.fields import Flag, Number, Vec3, real, vec3
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.references import BodySocket, MaybeBodyName, MaybeCoordinateName, MaybeFrameName
@@ -11,11 +12,15 @@ from osimlite.schema.references import BodySocket, MaybeBodyName, MaybeCoordinat
 class Actuator(ForceProducer, abstract=True):
     """A force with one or several controls."""
 
+    facts = Facts(outputs="power")
+
     control_count: ClassVar[int] = 1
 
 
 class ScalarActuator(Actuator, abstract=True):
     """A force with one control, kept between two limits."""
+
+    facts = Facts(outputs="actuation speed")
 
     min_control: Number = -math.inf
     """Least control that tools choose when they solve for controls; a simulation does not clip to it."""
@@ -26,6 +31,8 @@ class ScalarActuator(Actuator, abstract=True):
 class CoordinateActuator(ScalarActuator):
     """Pushes one coordinate with `optimal_force` times the control."""
 
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+
     coordinate: MaybeCoordinateName = None
     """Name of the coordinate that is pushed."""
     optimal_force: Annotated[float, real("N | N*m")] = 1.0
@@ -35,6 +42,14 @@ class CoordinateActuator(ScalarActuator):
 class ActivationCoordinateActuator(CoordinateActuator):
     """A coordinate actuator whose activation follows the control with a delay of first order."""
 
+    facts = Facts(
+        states="activation",
+        outputs="statebounds_activation:Vec2",
+        domains={"optimal_force": "!= 0"},
+        zero={STOPS: "activation_time_constant"},
+        doubts={"optimal_force": IDLE},
+    )
+
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
     """Time constant with which the activation follows the control."""
     default_activation: Number = 0.5
@@ -43,6 +58,8 @@ class ActivationCoordinateActuator(CoordinateActuator):
 
 class PointActuator(ScalarActuator):
     """Pushes one point of a body along a fixed direction."""
+
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
 
     body: MaybeBodyName = None
     """Name of the body that is pushed."""
@@ -61,6 +78,8 @@ class PointActuator(ScalarActuator):
 class PointToPointActuator(ScalarActuator):
     """Pushes two points apart along the line between them."""
 
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+
     bodyA: MaybeBodyName = None
     """Name of the first body, which a positive force pushes away from B."""
     bodyB: MaybeBodyName = None
@@ -77,6 +96,8 @@ class PointToPointActuator(ScalarActuator):
 
 class TorqueActuator(ScalarActuator):
     """Turns body A about an axis, and body B the other way."""
+
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
 
     bodyA: MaybeFrameName = None
     """The frame that a positive torque turns about the axis."""

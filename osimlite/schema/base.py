@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.complaints import explained, misspelt, unnamed
 from osimlite.schema.equality import same
+from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
 from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, reference_specs
@@ -78,8 +79,8 @@ class Object(BaseModel, metaclass=ObjectType):
     """Whether objects of the class have a place, and so a path, in the component tree."""
     since: ClassVar[str] = ""
     """The version of OpenSim that has the class first, where 4.6 has it not."""
-    declared_outputs: ClassVar[str] = ""
-    """The outputs that a class of a plug-in adds, as words of :mod:`osimlite.schema.outputs`."""
+    facts: ClassVar[Facts] = Facts()
+    """What OpenSim does with objects of this class, besides what its base and its properties say."""
     name_reference: ClassVar[Reference | None] = None
     """The rule by which the object's own name names a component, for the few classes where it does."""
 
@@ -155,6 +156,10 @@ class Object(BaseModel, metaclass=ObjectType):
             elif value is not None:
                 held.append((spec, value))
         return held
+
+    def contradictions(self) -> Iterable[Contradiction]:
+        """What OpenSim refuses of properties that each have a sound value."""
+        return ()
 
     def walk(self) -> Iterator[Object]:
         """Yield this object and everything below it, parents first."""

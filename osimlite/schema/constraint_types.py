@@ -4,6 +4,7 @@ import math
 from typing import Annotated
 
 from osimlite.schema.constraints import Constraint
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number, Optional, Vec3, real, vec3
 from osimlite.schema.frames import TwoFrameLinker
 from osimlite.schema.functions import Function
@@ -12,6 +13,8 @@ from osimlite.schema.references import CoordinateName, CoordinateNames, Physical
 
 class ConstantDistanceConstraint(Constraint):
     """Keeps a point of one frame at a distance from a point of another, as a rod with ball joints would."""
+
+    facts = Facts(refused="constant_distance")
 
     socket_body_1: PhysicalFrameSocket = ""
     """The frame of the first point."""

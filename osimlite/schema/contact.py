@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import LegacyMany, Unnamed, Vec3, real, vec3
 from osimlite.schema.geometry import Appearance, SurfaceProperties
 from osimlite.schema.references import FileName, PhysicalFrameSocket
@@ -32,6 +33,8 @@ class ContactHalfSpace(ContactGeometry):
 
 class ContactSphere(ContactGeometry):
     """A ball."""
+
+    facts = Facts(doubts={"radius": "it touches nothing"})
 
     radius: Annotated[float, real("m", "> 0")] = 0.0
     """Distance of the surface from the middle."""

@@ -3,6 +3,7 @@
 from typing import Annotated, ClassVar
 
 from osimlite.schema.base import Object, made, none
+from osimlite.schema.facts import NAN, TOUCHING, Facts
 from osimlite.schema.fields import LegacyMany, Single, Value, Vec3, Vec6, maybe, real, vec3
 from osimlite.schema.forces import Force, ForceProducer
 from osimlite.schema.markers import Station
@@ -20,6 +21,8 @@ class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::Co
 
     Only the meshes of a contact need parameters.
     """
+
+    facts = Facts(outside={TOUCHING: "stiffness"})
 
     geometry: ContactGeometryNames = ()
     """Contact surfaces of this material; a mesh carries the springs, others are rigid."""
@@ -58,6 +61,10 @@ class ElasticFoundationForce(Force):
 
 class SmoothSphereHalfSpaceForce(Force):
     """Contact of one ball with one half-space by the Hunt-Crossley law, made smooth for optimisation."""
+
+    facts = Facts(
+        outputs="half_space_force:SpatialVec sphere_force:SpatialVec", outside={NAN: "stiffness constant_contact_force"}
+    )
 
     socket_sphere: ContactSphereSocket = ""
     """The ball that touches the plane."""
@@ -117,6 +124,8 @@ class ExponentialContactForce(Force):
 
 class MeyerFregly2016Force(ForceProducer):
     """Contact of one station with the plane y = 0 of ground: a damped spring with smooth onset (Meyer et al. 2016)."""
+
+    facts = Facts(outputs="force_on_station:Vec3")
 
     socket_station: StationSocket = ""
     """The point of a body that touches ground."""

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, Object, made, none
 from osimlite.schema.controllers import Controller
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Many, Single, Value, Vector, real
 from osimlite.schema.functions import FunctionSet
 from osimlite.schema.references import MaybeFileName, NumberInputs, reads
@@ -67,3 +68,5 @@ class SynergyController(InputController):
 
 class ControlDistributor(ModelComponent):
     """Hands a vector of controls out as single outputs."""
+
+    facts = Facts(outputs="controls[]")

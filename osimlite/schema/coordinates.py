@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Optional, real, reals
 from osimlite.schema.functions import Function
 from osimlite.schema.sets import Set
@@ -10,6 +11,8 @@ from osimlite.schema.sets import Set
 
 class Coordinate(ModelComponent):
     """One generalized coordinate of a joint; values of rotational coordinates are in radians."""
+
+    facts = Facts(states="value speed", outputs="acceleration speed value")
 
     default_value: Annotated[float, real("rad | m")] = 0.0
     """Value at the start of a simulation, before assembly satisfies the constraints."""

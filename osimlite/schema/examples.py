@@ -2,6 +2,7 @@
 
 from osimlite.schema.base import ModelComponent
 from osimlite.schema.controllers import Controller
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number
 from osimlite.schema.references import NumberInput, PathActuatorPath, ScalarActuatorSocket
 
@@ -9,12 +10,16 @@ from osimlite.schema.references import NumberInput, PathActuatorPath, ScalarActu
 class HopperDevice(ModelComponent):
     """A device with a cable, for a jumping leg."""
 
+    facts = Facts(outputs="com_height height length power speed tension")
+
     actuator_name: PathActuatorPath = "cableAtoB"
     """Path, from the device, of the actuator that its outputs speak of."""
 
 
 class ToyPropMyoController(Controller):
     """Drives an actuator in proportion to an activation."""
+
+    facts = Facts(outputs="myo_control")
 
     socket_actuator: ScalarActuatorSocket = ""
     """The actuator that is controlled."""

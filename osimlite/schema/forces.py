@@ -3,6 +3,7 @@
 from typing import Annotated, ClassVar
 
 from osimlite.schema.base import ModelComponent, Object, made, none
+from osimlite.schema.facts import NAN, REFUSED, TOUCHING, Facts
 from osimlite.schema.fields import Flag, LegacyMany, Single, real
 from osimlite.schema.references import ContactGeometryNames, CoordinateName
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup, Set
@@ -10,6 +11,8 @@ from osimlite.schema.sets import ModelComponentSet, ObjectGroup, Set
 
 class Force(ModelComponent, abstract=True):
     """Anything that pushes bodies or coordinates."""
+
+    facts = Facts(outputs="potential_energy")
 
     appliesForce: Flag = True
     """Whether the force acts; one that does not stays in the tree and reports zeros."""
@@ -21,6 +24,8 @@ class ForceProducer(Force, abstract=True):
 
 class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParameters"):
     """The material of some contact surfaces."""
+
+    facts = Facts(outside={TOUCHING: "stiffness"}, doubts={"dissipation": "each impact adds energy"})
 
     geometry: ContactGeometryNames = ()
     """Contact surfaces of this material; all surfaces of one force touch each other."""
@@ -46,6 +51,8 @@ class HuntCrossleyContactParametersSet(Set, tag="HuntCrossleyForce::ContactParam
 class HuntCrossleyForce(Force):
     """Contact between all surfaces it lists: Hertz stiffness, Hunt-Crossley dissipation, Stribeck friction."""
 
+    facts = Facts(doubts={"transition_velocity": "friction no longer passes from rest to sliding"})
+
     ContactParameters: ClassVar = HuntCrossleyContactParameters
     ContactParametersSet: ClassVar = HuntCrossleyContactParametersSet
 
@@ -62,6 +69,12 @@ class CoordinateLimitForce(ForceProducer):
 
     For a rotational coordinate everything is in degrees.
     """
+
+    facts = Facts(
+        states="dissipatedEnergy",
+        zero={REFUSED: "transition", NAN: "upper_stiffness lower_stiffness"},
+        doubts={"damping": "the limit adds energy"},
+    )
 
     coordinate: CoordinateName = "UNASSIGNED"
     """Name of the coordinate that is limited; its own `range` has no part in it."""

@@ -4,6 +4,7 @@ import math
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3, word
 from osimlite.schema.geometry import FrameGeometry, Geometry
 from osimlite.schema.references import PhysicalFrameSocket, StationSocket
@@ -13,6 +14,11 @@ from osimlite.schema.wrapping import WrapObjectSet
 
 class Frame(ModelComponent, abstract=True):
     """An orthogonal set of axes with an origin."""
+
+    facts = Facts(
+        outputs="acceleration:SpatialVec angular_acceleration:Vec3 angular_velocity:Vec3 linear_acceleration:Vec3 "
+        "linear_velocity:Vec3 position:Vec3 rotation:Rotation transform:Transform velocity:SpatialVec"
+    )
 
     frame_geometry: Single[FrameGeometry] = made(FrameGeometry, name="frame_geometry")
     """How the frame's own axes are drawn, where a viewer shows frames."""
@@ -40,6 +46,13 @@ class Ground(PhysicalFrame):
 
 class Body(PhysicalFrame):
     """A rigid body: mass, mass centre and inertia, in its own frame."""
+
+    facts = Facts(
+        outputs="angular_momentum_about_mass_center:Vec3 angular_momentum_about_origin:Vec3 "
+        "linear_momentum_about_mass_center:Vec3 linear_momentum_about_origin:Vec3 "
+        "momentum_about_mass_center:SpatialVec momentum_about_origin:SpatialVec",
+        refused="mass",
+    )
 
     mass: Annotated[float, real("kg", ">= 0")] = math.nan
     """Mass of the whole body; OpenSim does not simulate a body without one."""

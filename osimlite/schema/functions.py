@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     LegacyMany,
     LegacyOptional,
@@ -43,6 +44,8 @@ class PolynomialFunction(Function):
 
 class MultivariatePolynomialFunction(Function):
     """A polynomial of `dimension` variables with every product of powers up to `order`."""
+
+    facts = Facts(refused="dimension order")
 
     coefficients: Vector = ()
     """In ascending powers, those of the last argument first: for x, y to order 2: 1, y, y^2, x, x y, x^2."""

@@ -11,6 +11,7 @@ from pydantic import Field
 from osimlite.errors import ModelError
 from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.facts import FLAT, NAN, Facts
 from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
 from osimlite.schema.geometry import Appearance
@@ -24,6 +25,8 @@ _ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 
 class Joint(ModelComponent, abstract=True):
     """Connects a child frame to a parent frame."""
+
+    facts = Facts(outputs="power reaction_on_child:SpatialVec reaction_on_parent:SpatialVec")
 
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
     """The motion of each coordinate in order, or None if the joint's own properties decide it."""
@@ -154,6 +157,8 @@ class FreeJoint(Joint):
 class EllipsoidJoint(Joint):
     """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
 
+    facts = Facts(missing={NAN: "radii_x_y_z"}, doubts={"radii_x_y_z": FLAT})
+
     motion_types = ("rotational", "rotational", "rotational")
     speeds_are_rates = False
 
@@ -166,6 +171,8 @@ class EllipsoidJoint(Joint):
 
 class ScapulothoracicJoint(Joint):
     """A shoulder blade that glides on an ellipsoid: abduction, elevation, upward rotation, winging."""
+
+    facts = Facts(missing={NAN: "thoracic_ellipsoid_radii_x_y_z"}, doubts={"thoracic_ellipsoid_radii_x_y_z": FLAT})
 
     motion_types = ("rotational", "rotational", "rotational", "rotational")
     speeds_are_rates = False

@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Vec3, vec3
 from osimlite.schema.references import PhysicalFrameSocket
 from osimlite.schema.sets import ModelComponentSet
@@ -14,6 +15,8 @@ class Point(ModelComponent, abstract=True):
 
 class Station(Point):
     """A point fixed in a physical frame, `location` given in that frame."""
+
+    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3")
 
     socket_parent_frame: PhysicalFrameSocket = ""
     """The frame that the point is fixed in."""
@@ -37,6 +40,8 @@ class MarkerSet(ModelComponentSet):
 
 class IMU(ModelComponent):
     """An inertial measurement unit at the origin of a frame."""
+
+    facts = Facts(outputs="accelerometer_signal:Vec3 gyroscope_signal:Vec3 orientation_as_quaternion:Quaternion")
 
     socket_frame: PhysicalFrameSocket = ""
     """The frame that the sensor is fixed in, at its origin and along its axes."""

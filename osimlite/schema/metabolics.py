@@ -4,6 +4,7 @@ import math
 from typing import Annotated
 
 from osimlite.schema.base import Component, ModelComponent, Object, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     Flag,
     LegacyMany,
@@ -185,6 +186,11 @@ class Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(Component):
 
 class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
     """The model of Bhargava et al. (2004) as a component with outputs, made smooth for optimisation."""
+
+    facts = Facts(
+        outputs="muscle_metabolic_rate[] total_activation_rate total_maintenance_rate total_mechanical_work_rate "
+        "total_metabolic_rate total_shortening_rate"
+    )
 
     muscle_parameters: Many[Bhargava2004SmoothedMuscleMetabolics_MuscleParameters] = none()
     """The muscles that count, and what must be known of them."""

@@ -12,6 +12,7 @@ from osimlite.schema.base import Component, ModelComponent, made
 from osimlite.schema.constraints import ConstraintSet
 from osimlite.schema.contact import ContactGeometrySet
 from osimlite.schema.controllers import ControllerSet
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, Text, Unnamed, Vec3, real, vec3
 from osimlite.schema.forces import ForceSet
 from osimlite.schema.frames import BodySet, Ground
@@ -33,6 +34,11 @@ CURRENT_VERSION = 40600
 
 class Model(ModelComponent):
     """A musculoskeletal or mechanical model."""
+
+    facts = Facts(
+        outputs="angular_momentum:Vec3 com_acceleration:Vec3 com_position:Vec3 com_velocity:Vec3 kinetic_energy "
+        "linear_momentum:Vec3 momentum:SpatialVec potential_energy"
+    )
 
     __slots__ = ("_tree",)
 

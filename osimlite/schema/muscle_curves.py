@@ -5,12 +5,19 @@ A `curviness` lies between 0 (straight pieces) and 1 (as round as it gets). Numb
 
 from typing import Annotated
 
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number, maybe, real
 from osimlite.schema.functions import Function
 
 
 class ActiveForceLengthCurve(Function):
     """Active force of a fiber over its length."""
+
+    facts = Facts(
+        refused="min_norm_active_fiber_length transition_norm_fiber_length max_norm_active_fiber_length "
+        "shallow_ascending_slope minimum_value",
+        zero={"": "min_norm_active_fiber_length"},
+    )
 
     min_norm_active_fiber_length: Annotated[float, real(domain="> 0")] = 0.4441
     """Length below which the force keeps to `minimum_value`."""
@@ -27,6 +34,8 @@ class ActiveForceLengthCurve(Function):
 class FiberForceLengthCurve(Function):
     """Passive force of a fiber over its length."""
 
+    facts = Facts(refused="strain_at_one_norm_force stiffness_at_low_force stiffness_at_one_norm_force curviness")
+
     strain_at_zero_force: Number = 0.0
     """Strain up to which the fiber is slack."""
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.7
@@ -41,6 +50,13 @@ class FiberForceLengthCurve(Function):
 
 class ForceVelocityCurve(Function):
     """Force multiplier of a fiber over its velocity, both normalised."""
+
+    facts = Facts(
+        domains={"concentric_slope_near_vmax": "> 1.49e-8", "eccentric_slope_near_vmax": "> 1.49e-8"},
+        refused="concentric_slope_at_vmax concentric_slope_near_vmax isometric_slope eccentric_slope_at_vmax "
+        "eccentric_slope_near_vmax max_eccentric_velocity_force_multiplier concentric_curviness "
+        "eccentric_curviness",
+    )
 
     concentric_slope_at_vmax: Annotated[float, real(domain=">= 0")] = 0.0
     """Slope at the greatest shortening velocity, -1, where the force is 0."""
@@ -83,6 +99,8 @@ class ForceVelocityInverseCurve(Function):
 
 class TendonForceLengthCurve(Function):
     """Force of a tendon over its length, both normalised."""
+
+    facts = Facts(refused="strain_at_one_norm_force stiffness_at_one_norm_force norm_force_at_toe_end curviness")
 
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
     """Strain at which the tendon bears `max_isometric_force`."""

@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent
+from osimlite.schema.facts import BELOW_QUARTER_TURN, UP_TO_QUARTER_TURN, Facts
 from osimlite.schema.fields import real
 
 MAXIMUM_PENNATION = 1.4706289056333368
@@ -22,6 +23,11 @@ class MuscleFirstOrderActivationDynamicModel(ModelComponent):
 
 class MuscleFixedWidthPennationModel(ModelComponent):
     """Fibers that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
+
+    facts = Facts(
+        domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN, "maximum_pennation_angle": UP_TO_QUARTER_TURN},
+        refused="optimal_fiber_length pennation_angle_at_optimal maximum_pennation_angle",
+    )
 
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 1.0
     """Fiber length at which `pennation_angle_at_optimal` is measured."""

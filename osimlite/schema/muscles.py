@@ -4,6 +4,7 @@ Forces are normalised by `max_isometric_force`, fiber lengths by `optimal_fiber_
 `tendon_slack_length`.
 """
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Annotated
 
@@ -11,6 +12,15 @@ from pydantic import Field
 
 from osimlite.schema.base import made
 from osimlite.schema.default_curves import active_force_length, force_velocity, passive_force_length
+from osimlite.schema.facts import (
+    BELOW_QUARTER_TURN,
+    NAN,
+    NO_EQUILIBRIUM,
+    STUCK,
+    UP_TO_QUARTER_TURN,
+    Contradiction,
+    Facts,
+)
 from osimlite.schema.fields import Flag, Number, Single, Tag, Unnamed, real, word
 from osimlite.schema.functions import Function
 from osimlite.schema.geometry import Appearance
@@ -34,6 +44,20 @@ from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 class Muscle(PathActuator, abstract=True):
     """What every muscle has: its strength, its lengths, and what of it may be left out of the computation."""
 
+    facts = Facts(
+        outputs="activation active_fiber_force active_fiber_force_along_tendon active_force_length_multiplier "
+        "cos_pennation_angle excitation fiber_active_power fiber_force fiber_force_along_tendon fiber_length "
+        "fiber_length_along_tendon fiber_passive_power fiber_stiffness fiber_stiffness_along_tendon "
+        "fiber_velocity fiber_velocity_along_tendon force_velocity_multiplier muscle_power muscle_stiffness "
+        "normalized_fiber_length normalized_fiber_velocity passive_fiber_force passive_fiber_force_along_tendon "
+        "passive_force_multiplier pennation_angle pennation_angular_velocity tendon_force tendon_length "
+        "tendon_power tendon_stiffness tendon_strain tendon_velocity",
+        mujoco={
+            "vmax": "max_contraction_velocity",
+            "fvmax": "force_velocity_curve.max_eccentric_velocity_force_multiplier",
+        },
+    )
+
     min_control: Number = 0.0
     max_control: Number = 1.0
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
@@ -54,9 +78,16 @@ class Muscle(PathActuator, abstract=True):
     ignore_activation_dynamics: Flag = False
     """Whether activation is the control at every moment, and no state."""
 
+    @property
+    def overwritten(self) -> dict[str, float]:
+        """Properties of its curves that OpenSim computes with other numbers."""
+        return {}
+
 
 class ActivationFiberLengthMuscle(Muscle, abstract=True):
     """A muscle with two states: activation and fiber length."""
+
+    facts = Facts(states="activation fiber_length")
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
     """Activation at the start of a simulation."""
@@ -66,6 +97,20 @@ class ActivationFiberLengthMuscle(Muscle, abstract=True):
 
 class Thelen2003Muscle(ActivationFiberLengthMuscle):
     """The muscle of Thelen (2003), with tendon and fiber strains at full force and shape factors of its curves."""
+
+    facts = Facts(
+        domains={
+            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
+            "maximum_pennation_angle": UP_TO_QUARTER_TURN,
+            "minimum_activation": "0.01 to 1",
+        },
+        refused="optimal_fiber_length pennation_angle_at_optimal FmaxTendonStrain FmaxMuscleStrain KshapeActive "
+        "KshapePassive Af Flen fv_linear_extrap_threshold maximum_pennation_angle activation_time_constant "
+        "deactivation_time_constant minimum_activation",
+        zero={NAN: "tendon_slack_length"},
+        doubts={"tendon_slack_length": NO_EQUILIBRIUM},
+        mujoco={"fvmax": "Flen"},
+    )
 
     internal = (
         ("pennMdl", MuscleFixedWidthPennationModel),
@@ -96,9 +141,29 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
     """Activation below which the muscle does not go; `min_control` must not be less."""
 
+    def contradictions(self) -> Iterator[Contradiction]:
+        """Its tendon is elastic, its activation never at once, and force over velocity a line near its end only."""
+        for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
+            if getattr(self, flag):
+                yield flag, f"{flag} is true, which this class does not have"
+        if self.fv_linear_extrap_threshold <= (least := 1 / self.Flen):
+            yield "fv_linear_extrap_threshold", f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}"
+        yield from _full_activation(self.minimum_activation)
+
 
 class Millard2012EquilibriumMuscle(Muscle):
     """The muscle of Millard et al. (2013), tendon and fiber in equilibrium, with curves one can replace."""
+
+    facts = Facts(
+        states="activation fiber_length",
+        outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
+        "passive_fiber_elastic_force_along_tendon",
+        domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN, "maximum_pennation_angle": UP_TO_QUARTER_TURN},
+        refused="optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
+        "deactivation_time_constant minimum_activation maximum_pennation_angle",
+        zero={STUCK: "tendon_slack_length"},
+        doubts={"tendon_slack_length": NO_EQUILIBRIUM},
+    )
 
     internal = (
         ("penMdl", MuscleFixedWidthPennationModel),
@@ -133,9 +198,40 @@ class Millard2012EquilibriumMuscle(Muscle):
     )
     """Force of the tendon over its length."""
 
+    @property
+    def is_classic(self) -> bool:
+        """Whether it has an elastic tendon and no damping: its equations are singular where no force is left."""
+        return not self.ignore_tendon_compliance and self.fiber_damping < 0.001
+
+    @property
+    def overwritten(self) -> dict[str, float]:
+        """What of its curves would make its equations singular, or would keep them from that."""
+        if self.is_classic:
+            return {"minimum_value": max(self.active_force_length_curve.minimum_value, 0.1)}
+        return dict.fromkeys(("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0)
+
+    def contradictions(self) -> Iterator[Contradiction]:
+        """Its equations need some activation where they are singular, and a curve that can be inverted."""
+        if self.is_classic and self.minimum_activation < 0.01:
+            yield (
+                "minimum_activation",
+                f"its minimum_activation, {self.minimum_activation:.6g}, is below 0.01, which an elastic tendon "
+                "without fiber damping needs",
+            )
+        if self.force_velocity_curve.concentric_slope_near_vmax == 1:
+            yield None, "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1"
+        yield from _full_activation(self.minimum_activation)
+
+
+def _full_activation(least: float) -> Iterator[Contradiction]:
+    if least == 1:
+        yield "minimum_activation", "its minimum_activation is not less than 1"
+
 
 class Millard2012AccelerationMuscle(Muscle):
     """The muscle of Millard et al. (2013) with a mass between fiber and tendon, whose place and speed are states."""
+
+    facts = Facts(states="activation fiber_length fiber_velocity")
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.0
     """Activation at the start of a simulation."""
@@ -184,6 +280,22 @@ class Millard2012AccelerationMuscle(Muscle):
 class DeGrooteFregly2016Muscle(Muscle):
     """The muscle of De Groote et al. (2016), smooth everywhere, made for direct collocation."""
 
+    facts = Facts(
+        states="activation normalized_tendon_force",
+        outputs="implicitenabled_normalized_tendon_force:bool implicitresidual_normalized_tendon_force "
+        "passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
+        "passive_fiber_elastic_force_along_tendon statebounds_normalized_tendon_force:Vec2",
+        domains={
+            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
+            "default_activation": "> 0",
+            "default_normalized_tendon_force": "0 to 5",
+        },
+        refused="pennation_angle_at_optimal activation_time_constant deactivation_time_constant default_activation "
+        "default_normalized_tendon_force fiber_damping passive_fiber_strain_at_one_norm_force "
+        "tendon_strain_at_one_norm_force activation_dynamics_smoothing active_force_width_scale",
+        zero={NAN: "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity"},
+    )
+
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
     """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.06
@@ -207,9 +319,22 @@ class DeGrooteFregly2016Muscle(Muscle):
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
     """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
+    def contradictions(self) -> Iterator[Contradiction]:
+        """Its strength has one name only."""
+        if "optimal_force" in self.model_fields_set:
+            yield "optimal_force", "optimal_force may not be given, only max_isometric_force"
+
 
 class MeyerFregly2016Muscle(Muscle):
     """A rigid-tendon muscle with the curves of Meyer et al. (2016)."""
+
+    facts = Facts(
+        states="activation",
+        outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
+        "passive_fiber_elastic_force_along_tendon",
+        domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN},
+        refused="pennation_angle_at_optimal",
+    )
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
     """Time constant of rising activation; high activation slows it down."""
@@ -226,9 +351,13 @@ class MeyerFregly2016Muscle(Muscle):
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
     """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
+    contradictions = DeGrooteFregly2016Muscle.contradictions
+
 
 class RigidTendonMuscle(Muscle):
     """A muscle whose tendon keeps its slack length, with splines as curves."""
+
+    facts = Facts(zero={NAN: "optimal_fiber_length max_contraction_velocity"})
 
     active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")

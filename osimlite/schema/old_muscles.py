@@ -11,6 +11,7 @@ from osimlite.schema.default_curves import (
     passive_force_length,
     tendon_force_length,
 )
+from osimlite.schema.facts import NAN, Facts
 from osimlite.schema.fields import LegacyOptional, Number, Single, real
 from osimlite.schema.functions import Function
 from osimlite.schema.muscles import Muscle
@@ -19,9 +20,13 @@ from osimlite.schema.muscles import Muscle
 class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
     """A muscle with two states: activation and fiber length."""
 
+    facts = Facts(states="activation fiber_length")
+
 
 class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """The first form of the muscle of Thelen (2003)."""
+
+    facts = Facts(mujoco={"vmax": "Vmax", "fvmax": "Flen"})
 
     activation_time_constant: Annotated[float, real(domain="> 0")] = 0.01
     """Time constant (s) of rising activation."""
@@ -50,6 +55,8 @@ class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
 class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """The muscle of Schutte et al. (1993)."""
 
+    facts = Facts(zero={NAN: "optimal_fiber_length tendon_slack_length"})
+
     time_scale: Annotated[float, real(domain="> 0")] = 0.1
     """Time (s) that the rates of activation and fiber length are divided by."""
     activation1: Number = 7.667
@@ -74,6 +81,8 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
 
 class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """The muscle of Delp et al. (1990), with a mass between fiber and tendon."""
+
+    facts = Facts(states="activation fiber_length fiber_velocity")
 
     time_scale: Annotated[float, real(domain="> 0", legacy=True)] = 0.1
     """Time (s) that the rates of the states are divided by."""

@@ -5,12 +5,15 @@ from typing import Annotated
 
 from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.base import made
+from osimlite.schema.facts import IDLE, STOPS, Facts
 from osimlite.schema.fields import Number, Single, Tag, real
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 
 
 class PathActuator(ScalarActuator):
     """Pulls along its path with `optimal_force` times the control."""
+
+    facts = Facts(outputs="tension", domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
     """The line along which the actuator pulls."""
@@ -20,6 +23,13 @@ class PathActuator(ScalarActuator):
 
 class ClutchedPathSpring(PathActuator):
     """A spring along a path that its control engages, with the length it has then as rest length."""
+
+    facts = Facts(
+        states="stretch",
+        domains={"initial_stretch": ">= 0"},
+        refused="stiffness dissipation relaxation_time_constant initial_stretch",
+        zero={STOPS: "relaxation_time_constant"},
+    )
 
     min_control: Number = 0.0
     max_control: Number = 1.0

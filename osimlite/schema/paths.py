@@ -7,6 +7,7 @@ a component stands in the tree; the word ``path`` is understood when a component
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import LegacyMany, Many, Optional, Unnamed, Value, Vec3, reals, vec3, word
 from osimlite.schema.functions import Constant, Function
 from osimlite.schema.geometry import Appearance
@@ -30,6 +31,8 @@ class AbstractPathPoint(Point, abstract=True):
 class PathPoint(AbstractPathPoint):
     """A point fixed in a frame."""
 
+    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3")
+
     internal = (("station", Station),)
 
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
@@ -47,6 +50,8 @@ class ConditionalPathPoint(PathPoint):
 
 class MovingPathPoint(AbstractPathPoint):
     """A point whose place in its frame follows a coordinate; the three sockets must name the same one."""
+
+    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3")
 
     socket_x_coordinate: CoordinateSocket = ""
     """The argument of `x_location`."""
@@ -95,6 +100,8 @@ class PathWrapSet(Set):
 
 class AbstractGeometryPath(ModelComponent, abstract=True):
     """A path, and what it looks like."""
+
+    facts = Facts(outputs="length lengthening_speed")
 
     appearance: Unnamed[Appearance] = made(Appearance, color=(0.5, 0.5, 0.5))
     """How the path is drawn."""

@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Single
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.functions import FunctionSet
@@ -12,6 +13,8 @@ from osimlite.schema.sets import ModelComponentSet
 
 class PrescribedForce(ForceProducer):
     """A force and a torque on a frame as functions of time: none, or three functions each for force, point, torque."""
+
+    facts = Facts(outputs="force_applied:Vec3 point_of_application:Vec3 torque_applied:Vec3")
 
     socket_frame: PhysicalFrameSocket = ""
     """The frame that is pushed."""

@@ -3,12 +3,15 @@
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Number, Reals, reals, word
 from osimlite.schema.sets import ModelComponentSet
 
 
 class Probe(ModelComponent, abstract=True):
     """Something measured along a simulation, possibly integrated or differentiated, times `gain`."""
+
+    facts = Facts(outputs="probe_outputs:Vector")
 
     enabled: Flag = True
     """Whether the probe is computed and reported."""

@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import Component, made
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, real
 from osimlite.schema.functions import Constant, Function
 from osimlite.schema.references import ColumnName, FileName, NumberInputs, Vec3Inputs, VectorInputs
@@ -72,13 +73,19 @@ class TableSource(Component, abstract=True):
 class TableSource__double_(TableSource):
     """A table of numbers."""
 
+    facts = Facts(outputs="all_columns:Vector column[]")
+
 
 class TableSource__Vec3_(TableSource):
     """A table of points or directions."""
 
+    facts = Facts(outputs="all_columns:Vector_<Vec3> column[]:Vec3")
+
 
 class SignalGenerator(Component):
     """Gives a function of time as an output."""
+
+    facts = Facts(outputs="signal")
 
     function: Single[Function] = made(Constant, name="function")
     """The output as a function of time."""

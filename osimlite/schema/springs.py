@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import made
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number, Optional, Text, Vec3, maybe, real, vec3
 from osimlite.schema.forces import Force, ForceProducer
 from osimlite.schema.frames import TwoFrameLinker
@@ -48,6 +49,8 @@ class SpringGeneralizedForce(ForceProducer):
 class ExpressionBasedCoordinateForce(ForceProducer):
     """A force on one coordinate by a formula in its value `q` and its speed `qdot`."""
 
+    facts = Facts(outputs="force_magnitude")
+
     coordinate: CoordinateName = "UNASSIGNED"
     """Name of the coordinate that the force acts on."""
     expression: Text = "0.0"
@@ -56,6 +59,8 @@ class ExpressionBasedCoordinateForce(ForceProducer):
 
 class ExpressionBasedPointToPointForce(ForceProducer):
     """A force along the line between two points by a formula in their distance `d` and its rate `ddot`."""
+
+    facts = Facts(outputs="force_magnitude")
 
     body1: MaybeFrameName = None
     """The frame of the first point."""
@@ -75,6 +80,18 @@ class BushingForce(TwoFrameLinker, Force):
     The rotations are body-fixed X-Y-Z angles.
     """
 
+    facts = Facts(
+        states="dissipated_energy",
+        outputs="statebounds_dissipated_energy:Vec2",
+        domains={
+            "rotational_stiffness": ">= 0",
+            "rotational_damping": ">= 0",
+            "translational_stiffness": ">= 0",
+            "translational_damping": ">= 0",
+        },
+        refused="rotational_stiffness translational_stiffness rotational_damping translational_damping",
+    )
+
     rotational_stiffness: Annotated[Vec3, vec3("N*m/rad", ">= 0")] = (0.0, 0.0, 0.0)
     """Moment against each of the three angles."""
     translational_stiffness: Annotated[Vec3, vec3("N/m", ">= 0")] = (0.0, 0.0, 0.0)
@@ -87,6 +104,8 @@ class BushingForce(TwoFrameLinker, Force):
 
 class ExpressionBasedBushingForce(TwoFrameLinker, ForceProducer):
     """A bushing whose moments and forces are formulas in `theta_x` ... `delta_z`; damping stays linear."""
+
+    facts = Facts(outputs="bushing_force:Vec6")
 
     Mx_expression: Text = "0.0"
     """Formula of the moment against the first angle, positive where it drives `theta_x` down."""

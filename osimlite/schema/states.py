@@ -12,21 +12,6 @@ if TYPE_CHECKING:
     from osimlite.schema.joints import Joint, MotionType
     from osimlite.schema.tree import Tree
 
-_STATES: Final = {
-    "ActivationCoordinateActuator": "activation",
-    "ActivationFiberLengthMuscle": "activation fiber_length",
-    "ActivationFiberLengthMuscle_Deprecated": "activation fiber_length",
-    "BushingForce": "dissipated_energy",
-    "ClutchedPathSpring": "stretch",
-    "Coordinate": "value speed",
-    "CoordinateLimitForce": "dissipatedEnergy",
-    "DeGrooteFregly2016Muscle": "activation normalized_tendon_force",
-    "Delp1990Muscle_Deprecated": "activation fiber_length fiber_velocity",
-    "MeyerFregly2016Muscle": "activation",
-    "Millard2012AccelerationMuscle": "activation fiber_length fiber_velocity",
-    "Millard2012EquilibriumMuscle": "activation fiber_length",
-}
-"""The states that OpenSim 4.6 gives the components of a class."""
 _WITHOUT: Final = {
     "ignore_activation_dynamics": ("activation",),
     "ignore_tendon_compliance": ("fiber_length", "normalized_tendon_force"),
@@ -36,7 +21,8 @@ _WITHOUT: Final = {
 
 def states_of(component: Component) -> list[str]:
     """The names of the state variables of one component, in OpenSim's order."""
-    own = next((_STATES[name] for name in lineage(type(component)) if name in _STATES), "").split()
+    known = (base.__dict__["facts"].states for base in type(component).__mro__ if "facts" in base.__dict__)
+    own = next(filter(None, known), "").split()
     if getattr(component, "compute_dissipation_energy", True) is False:
         return []
     gone = {name for flag, names in _WITHOUT.items() if getattr(component, flag, False) for name in names}

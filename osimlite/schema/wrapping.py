@@ -1,8 +1,11 @@
 """Surfaces that paths of muscles and springs wrap around."""
 
+from collections.abc import Iterator
+from math import inf
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Flag, LegacyMany, Unnamed, Vec3, real, vec3, word
 from osimlite.schema.geometry import Appearance
 from osimlite.schema.sets import ModelComponentSet
@@ -28,6 +31,8 @@ class WrapObject(ModelComponent, abstract=True):
 class WrapCylinder(WrapObject):
     """A cylinder along its own Z axis."""
 
+    facts = Facts(refused="radius length", zero={"": "radius length"})
+
     radius: Annotated[float, real("m", "> 0")] = 1.0
     """Distance of the surface from the Z axis."""
     length: Annotated[float, real("m", "> 0")] = 1.0
@@ -37,12 +42,16 @@ class WrapCylinder(WrapObject):
 class WrapEllipsoid(WrapObject):
     """An ellipsoid with half axes `dimensions`."""
 
+    facts = Facts(refused="dimensions")
+
     dimensions: Annotated[Vec3, vec3("m", "> 0")] = (0.05, 0.05, 0.05)
     """Half axes along X, Y and Z of the surface."""
 
 
 class WrapSphere(WrapObject):
     """A ball."""
+
+    facts = Facts(refused="radius", zero={"": "radius"})
 
     radius: Annotated[float, real("m", "> 0")] = 0.05
     """Distance of the surface from the middle."""
@@ -51,10 +60,18 @@ class WrapSphere(WrapObject):
 class WrapTorus(WrapObject):
     """A ring about its own Z axis; paths run through its hole."""
 
+    facts = Facts(refused="inner_radius outer_radius")
+
     inner_radius: Annotated[float, real("m", "> 0")] = 0.01
     """Radius of the tube itself; must be less than the outer one."""
     outer_radius: Annotated[float, real("m", "> 0")] = 0.05
     """Radius of the circle in the middle of the tube."""
+
+    def contradictions(self) -> Iterator[Contradiction]:
+        """Without a hole it is no torus."""
+        inner, outer = self.inner_radius, self.outer_radius
+        if outer <= inner < inf:
+            yield "outer_radius", f"outer_radius, {outer:.6g} m, should be more than inner_radius, {inner:.6g} m"
 
 
 class WrapObjectSet(ModelComponentSet):

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.lint import consequences
-from osimlite.lint.consequences import NAN, REFUSED, consequence
+from osimlite.lint.consequences import consequence
+from osimlite.schema.facts import NAN, REFUSED, Facts
 from osimlite.schema.fields import Value
 from osimlite.schema.registry import MODULES, class_for
 from osimlite.schema.specs import field_specs
 
-ENTRIES = [
-    (cls, name) for _, _, table in consequences._FAILURES for cls, words in table.items() for name in words.split()
-]
-ENTRIES += [*consequences._DOUBTS, *consequences.STRICTER]
+
+def entries():
+    for cls in MODULES:
+        facts = known_class(cls).__dict__.get("facts", Facts())
+        for fates in (facts.outside, facts.zero, facts.missing):
+            yield from ((cls, name) for words in fates.values() for name in words.split())
+        yield from ((cls, name) for name in (*facts.refused.split(), *facts.doubts, *facts.domains))
 
 
 def known_class(name):
@@ -22,10 +25,10 @@ def known_class(name):
     return getattr(import_module(MODULES[name]), name)
 
 
-@pytest.mark.parametrize(("cls", "name"), ENTRIES)
+@pytest.mark.parametrize(("cls", "name"), [*entries()])
 def test_an_entry_is_a_property_with_a_domain(cls, name):
     spec = next(spec for spec in field_specs(known_class(cls)).values() if spec.name == name)
-    assert isinstance(spec.kind, Value) and (spec.kind.domain or (cls, name) in consequences.STRICTER)
+    assert isinstance(spec.kind, Value) and (spec.kind.domain or name in known_class(cls).facts.domains)
 
 
 def test_a_derived_class_inherits_and_zero_differs_from_less():

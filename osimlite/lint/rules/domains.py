@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
-from osimlite.lint.consequences import REFUSED, STRICTER, consequence
+from osimlite.lint.consequences import consequence
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import quantity, shown
 from osimlite.schema.base import Object
+from osimlite.schema.facts import REFUSED
 from osimlite.schema.fields import Value
 from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.text import listed, nearest
@@ -192,7 +193,7 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                     fate, fails = REFUSED, True
                 else:
                     fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=_is_rigid(item))
-                domain = STRICTER.get((cls.__name__, spec.name), spec.kind.domain)
+                domain = _domain(cls, spec)
                 yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
 
 
@@ -218,13 +219,19 @@ def _report_domain(subject: Subject, found: Found, item: Object, spec: FieldSpec
     )
 
 
+def _domain(cls: type[Object], spec: FieldSpec) -> str:
+    """The numbers that a property of a class may have; what a base has stricter is not so for it."""
+    assert isinstance(spec.kind, Value)
+    return cls.facts.domains.get(spec.name, spec.kind.domain) if "facts" in cls.__dict__ else spec.kind.domain
+
+
 @cache
 def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool]], ...]:
     """The properties of a class that have a domain, with the test for it."""
     found = []
     for spec in value_specs(cls):
         assert isinstance(spec.kind, Value)
-        domain = STRICTER.get((cls.__name__, spec.name), spec.kind.domain)
+        domain = _domain(cls, spec)
         if domain and spec.kind.scalar in ("double", "int"):
             found.append((spec, _test(domain)))
     return tuple(found)

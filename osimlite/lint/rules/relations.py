@@ -14,11 +14,12 @@ from osimlite.forces.muscle_curves import (
     force_velocity,
     tendon_force_length,
 )
-from osimlite.lint.consequences import REFUSED
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
 from osimlite.lint.rules.domains import outside
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
+from osimlite.schema.base import Object
+from osimlite.schema.facts import REFUSED, Contradiction
 from osimlite.schema.functions import (
     Constant,
     ExpressionBasedFunction,
@@ -33,7 +34,7 @@ from osimlite.schema.functions import (
     Sine,
     StepFunction,
 )
-from osimlite.schema.tree import is_a
+from osimlite.schema.muscles import Muscle
 from osimlite.text import counted
 
 
@@ -58,10 +59,11 @@ def contradicting_values(subject: Subject, found: Found) -> None:
     """
     strange = {id(item) for item, *_ in outside(subject)}
     for cls, items in subject.by_class.items():
-        for relation in [_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS]:
+        relation = next((_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS), None)
+        if relation is not None or cls.contradictions is not Object.contradictions:
             for item in [item for item in items if id(item) not in strange]:
                 owner = subject.owner(item)
-                for tag, message in relation(item, owner):
+                for tag, message in relation(item, owner) if relation is not None else item.contradictions():
                     of = "" if item.name and item is owner else f" of {called(owner)}"
                     found(f"{called(item)}{of}: {message}: {REFUSED}", item, tag=tag)
 
@@ -94,30 +96,19 @@ def controls_swapped(subject: Subject, found: Found) -> None:
             )
 
 
-_Contradiction = tuple[str | None, str]
-"""The property that is best changed, and what is wrong."""
-_Relation = Callable[[Any, Any], Iterator[_Contradiction]]
+_Relation = Callable[[Any, Any], Iterator[Contradiction]]
 """Gives the contradictions of an object, from it and the component that it belongs to."""
-
-
-def _is_classic(muscle: Any) -> bool:
-    """Whether it is an equilibrium muscle without damping, whose equations are singular where no force is left."""
-    return not muscle.ignore_tendon_compliance and muscle.fiber_damping < 0.001
 
 
 def _curve(make: Callable[..., object]) -> _Relation:
     """The contradiction of a curve of a muscle; `make` takes the properties of the curve and raises what is wrong."""
 
-    def contradiction(curve: Any, owner: Any) -> Iterator[_Contradiction]:
+    def contradiction(curve: Any, owner: Any) -> Iterator[Contradiction]:
         used = {name: getattr(curve, name) for name in type(curve).__annotations__}
         if not all(value is None or math.isfinite(value) for value in used.values()):
             return
-        if is_a(owner, "Millard2012EquilibriumMuscle"):
-            # OpenSim overwrites what would make its equations singular, or would keep them from that.
-            overwritten = dict.fromkeys(("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0)
-            if _is_classic(owner):
-                overwritten = {"minimum_value": max(used.get("minimum_value", 0.0), 0.1)}
-            used |= {name: overwritten[name] for name in used.keys() & overwritten.keys()}
+        overwritten = owner.overwritten if isinstance(owner, Muscle) else {}
+        used |= {name: overwritten[name] for name in used.keys() & overwritten.keys()}
         try:
             make(*used.values())
         except ValueError as error:
@@ -127,47 +118,7 @@ def _curve(make: Callable[..., object]) -> _Relation:
     return contradiction
 
 
-def _thelen(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
-    for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
-        if getattr(muscle, flag):
-            yield flag, f"{flag} is true, which this class does not have"
-    if muscle.fv_linear_extrap_threshold <= (least := 1 / muscle.Flen):
-        yield "fv_linear_extrap_threshold", f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}"
-    yield from _activation(muscle, owner)
-
-
-def _millard(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
-    if _is_classic(muscle) and muscle.minimum_activation < 0.01:
-        yield (
-            "minimum_activation",
-            f"its minimum_activation, {quantity(muscle.minimum_activation)}, is below 0.01, which an elastic tendon "
-            "without fiber damping needs",
-        )
-    if muscle.force_velocity_curve.concentric_slope_near_vmax == 1:
-        yield None, "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1"
-    yield from _activation(muscle, owner)
-
-
-def _activation(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
-    if muscle.minimum_activation == 1:
-        yield "minimum_activation", "its minimum_activation is not less than 1"
-
-
-def _torus(torus: Any, owner: Any) -> Iterator[_Contradiction]:
-    inner, outer = torus.inner_radius, torus.outer_radius
-    if outer <= inner < math.inf:
-        yield (
-            "outer_radius",
-            f"outer_radius, {quantity(outer, 'm')}, should be more than inner_radius, {quantity(inner, 'm')}",
-        )
-
-
-def _no_optimal_force(muscle: Any, owner: Any) -> Iterator[_Contradiction]:
-    if "optimal_force" in muscle.model_fields_set:
-        yield "optimal_force", "optimal_force may not be given, only max_isometric_force"
-
-
-def _function_based_path(path: Any, owner: Any) -> Iterator[_Contradiction]:
+def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
     coordinates = path.coordinate_paths
     if not coordinates:
         yield None, "coordinate_paths is empty"
@@ -211,16 +162,11 @@ _OF_ONE = (
 
 _RELATIONS: Final[dict[str, _Relation]] = {
     "ActiveForceLengthCurve": _curve(active_force_length),
-    "DeGrooteFregly2016Muscle": _no_optimal_force,
     "FiberCompressiveForceCosPennationCurve": _curve(fiber_compressive_force_cos_pennation),
     "FiberCompressiveForceLengthCurve": _curve(fiber_compressive_force_length),
     "FiberForceLengthCurve": _curve(fiber_force_length),
     "ForceVelocityCurve": _curve(force_velocity),
     "FunctionBasedPath": _function_based_path,
-    "MeyerFregly2016Muscle": _no_optimal_force,
-    "Millard2012EquilibriumMuscle": _millard,
     "TendonForceLengthCurve": _curve(tendon_force_length),
-    "Thelen2003Muscle": _thelen,
-    "WrapTorus": _torus,
 }
-"""What OpenSim 4.6 refuses, measured like the consequences of single numbers."""
+"""What OpenSim 4.6 refuses of classes whose arithmetic is not in their declaration."""

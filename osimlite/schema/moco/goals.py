@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     Flag,
     Integer,
@@ -94,6 +95,8 @@ class MocoInitialVelocityEquilibriumDGFGoal(MocoGoal):
 
 class MocoControlGoal(MocoGoal):
     """Controls, each to a power, over the motion."""
+
+    facts = Facts(refused="exponent")
 
     control_weights: ControlWeights = made(MocoWeightSet, name="control_weights")
     """Weights by paths of controls."""

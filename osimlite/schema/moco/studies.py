@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, made, none
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     Flag,
     Integer,
@@ -96,6 +97,10 @@ class MocoSolver(Object, abstract=True):
 
 class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     """Makes a problem of many variables of a motion, by values at the nodes of a mesh."""
+
+    facts = Facts(
+        refused="num_mesh_intervals optim_max_iterations optim_convergence_tolerance optim_constraint_tolerance"
+    )
 
     num_mesh_intervals: Annotated[int, Value("int", domain="> 0")] = 100
     """Number of equal intervals of the mesh."""

@@ -7,12 +7,14 @@ from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.schema.forces import Force
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf import coordinate_forces as on_coordinates
 from osimlite.translate.mjcf import frame_forces as on_frames
 from osimlite.translate.mjcf import path_forces as on_paths
 from osimlite.translate.mjcf.draft import Draft, Unsayable
-from osimlite.translate.mjcf.muscles import MUSCLES, muscle
+from osimlite.translate.mjcf.muscles import muscle
 
 MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
     "CoordinateActuator": on_coordinates.actuator,
@@ -29,19 +31,21 @@ MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
     "PathSpring": on_paths.spring,
     "Ligament": on_paths.ligament,
     "Blankevoort1991Ligament": on_paths.ligament,
-    **{kind.__name__: muscle for kind in MUSCLES},
 }
-"""By class, what adds a force to a draft and tells what it became; it raises `Unsayable` where that cannot be."""
+"""By class, but for muscles, what adds a force to a draft and tells what it became; it raises `Unsayable` where that
+cannot be."""
 
 
 def add_forces(draft: Draft) -> None:
-    """Add every force of a class in `MAKERS` that acts."""
+    """Add every force that acts and that MuJoCo has the law of."""
     for force, path in draft.components(Force):
         what = type(force).__name__
         try:
             if not force.appliesForce:
                 raise Unsayable("its appliesForce is false")
-            if what in MAKERS:
+            if isinstance(force, Muscle) and kind_of_class(type(force)):
+                draft.fidelity.translated[path] = muscle(draft, force, path)
+            elif what in MAKERS:
                 draft.fidelity.translated[path] = MAKERS[what](draft, force, path)
         except (ModelError, Unsayable) as error:
             draft.fidelity.add("force", path, f"a {what}", f"{LEFT_OUT}: {error}")

@@ -11,6 +11,8 @@ Source: MuJoCo's manual (Modeling, Muscles) and the public code of `mju_muscleGa
 from __future__ import annotations
 
 import math
+from collections import ChainMap
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -19,35 +21,11 @@ from numpy.typing import NDArray
 from osimlite._require import require
 from osimlite.errors import OsimliteError
 from osimlite.multibody.spatial import Array
-from osimlite.schema.muscles import (
-    DeGrooteFregly2016Muscle,
-    MeyerFregly2016Muscle,
-    Millard2012AccelerationMuscle,
-    Millard2012EquilibriumMuscle,
-    Muscle,
-    RigidTendonMuscle,
-    Thelen2003Muscle,
-)
-from osimlite.schema.old_muscles import (
-    Delp1990Muscle_Deprecated,
-    Schutte1993Muscle_Deprecated,
-    Thelen2003Muscle_Deprecated,
-)
+from osimlite.schema.muscles import Muscle
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Unsayable, add, tidy
 from osimlite.translate.mjcf.isometric import isometric_tension
 
-MUSCLES = (
-    Thelen2003Muscle,
-    Millard2012EquilibriumMuscle,
-    Millard2012AccelerationMuscle,
-    DeGrooteFregly2016Muscle,
-    MeyerFregly2016Muscle,
-    RigidTendonMuscle,
-    Thelen2003Muscle_Deprecated,
-    Schutte1993Muscle_Deprecated,
-    Delp1990Muscle_Deprecated,
-)
 ACTIVATIONS = (0.01, 0.5, 1.0)
 """At which isometric tensions are compared."""
 LENGTHS = 24
@@ -60,6 +38,8 @@ CLOSE = 1e-5
 """Relative change of the curves' error, or of their numbers, at which the search for them ends."""
 SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
+FVMAX = 1.4
+"""Force of lengthening fibers, as a part of the isometric one, of a muscle that does not say."""
 FREE = 0.25
 """Parts by which a fit to forces may change tendon, fibers and strength, and by which it may move the passive curve."""
 
@@ -177,9 +157,15 @@ def _counts(tensions: Array, own: Curves) -> NDArray[np.bool_]:
 
 def _rates(force: Muscle, cos: float) -> tuple[float, float]:
     """MuJoCo's vmax, which is measured along the tendon, and fvmax."""
-    curve = getattr(force, "force_velocity_curve", None)
-    strongest = getattr(curve, "max_eccentric_velocity_force_multiplier", getattr(force, "Flen", 1.4))
-    return getattr(force, "Vmax", force.max_contraction_velocity) / cos**2, strongest
+    named = ChainMap(*(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__))
+    return attrgetter(named["vmax"])(force) / cos**2, _strongest(force, named["fvmax"])
+
+
+def _strongest(force: Muscle, name: str) -> float:
+    try:
+        return float(attrgetter(name)(force))
+    except AttributeError:
+        return FVMAX
 
 
 def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:

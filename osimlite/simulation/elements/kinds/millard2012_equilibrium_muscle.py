@@ -32,11 +32,6 @@ LEAST_DAMPING = 0.001
 """Less counts as none."""
 
 
-def _is_classic(force: Any) -> bool:
-    """Whether it is Hill's muscle, whose equations are singular where no force is left."""
-    return not force.ignore_tendon_compliance and force.fiber_damping < LEAST_DAMPING
-
-
 def _least_activation(force: Any) -> float:
     # Without dynamics of activation, OpenSim's part for them never hears of the property.
     owner = MuscleFirstOrderActivationDynamicModel() if force.ignore_activation_dynamics else force
@@ -59,13 +54,13 @@ def _others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
 
 def _active(force: Any) -> dict[str, float]:
     least = force.active_force_length_curve.minimum_value
-    return {"minimum_value": max(least, 0.1) if _is_classic(force) else min(least, 0.0)}
+    return {"minimum_value": max(least, 0.1) if force.is_classic else min(least, 0.0)}
 
 
 def _velocity(force: Any) -> dict[str, float]:
     own = force.force_velocity_curve
     ends = own.concentric_slope_at_vmax, own.eccentric_slope_at_vmax
-    if _is_classic(force):
+    if force.is_classic:
         return _ends(*map(max, ends, _inverse(force).values()))
     return _ends(*(min(end, 0.0) for end in ends))
 
@@ -80,7 +75,7 @@ def _ends(concentric: float, eccentric: float) -> dict[str, float]:
 
 
 def _check(builder: ElementBuilder, force: Any) -> None:
-    least = 0.01 if _is_classic(force) else 0.0
+    least = 0.01 if force.is_classic else 0.0
     slack = Number("tendon_slack_length", lambda x: x >= 0.0, "is negative")
     require(
         builder,

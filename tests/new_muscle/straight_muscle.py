@@ -1,0 +1,79 @@
+"""A muscle that OpenSim has not, all of it in one file: its class, its facts, its law, its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from osimlite.schema.facts import NAN, Contradiction, Facts
+from osimlite.schema.fields import real
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.elements.kind import State
+from osimlite.simulation.elements.muscle import muscle
+from osimlite.simulation.elements.parameters import Number, positive
+
+
+class StraightMuscle(Muscle):
+    """A muscle with a rigid tendon in line with fibers whose force falls in straight lines from their best length."""
+
+    facts = Facts(
+        states="activation",
+        outputs="spare_force",
+        domains={"pennation_angle_at_optimal": "0 to 0"},
+        refused="width",
+        zero={NAN: "rise_time"},
+        doubts={"grip": "lengthening fibers bear less than at rest"},
+        mujoco={"fvmax": "grip", "vmax": "fastest"},
+    )
+
+    default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
+    """Activation at the start of a simulation."""
+    rise_time: Annotated[float, real("s", "> 0")] = 0.02
+    """Time constant of the activation."""
+    width: Annotated[float, real(domain="> 0")] = 0.5
+    """Strain at which fibers have no active force."""
+    fastest: Annotated[float, real("fiber_length/s", "> 0")] = 10.0
+    """Shortening velocity without force."""
+    grip: Annotated[float, real(domain=">= 1")] = 1.5
+    """Most force of lengthening fibers, of the isometric one."""
+
+    def contradictions(self) -> Iterator[Contradiction]:
+        """It lengthens by friction only."""
+        if self.grip > 1.0 + self.width:
+            yield "grip", "its grip is above 1 + width"
+
+
+def straight(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    strength: float,
+    optimal: float,
+    slack: float,
+    fastest: float,
+    width: float,
+    grip: float,
+    rise: float,
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """Tension (N), what else is recorded of muscles, rate of the activation (1/s), fiber velocity (m/s)."""
+    fibers = length - slack
+    active = max(1.0 - abs(fibers / optimal - 1.0) / width, 0.0)
+    factor = min(max(1.0 + rate / (optimal * fastest), 0.0), grip)
+    force = strength * activation * active * factor
+    return force, activation, fibers, 1.0, active, factor, force, 0.0, (excitation - activation) / rise, rate
+
+
+KIND = muscle(
+    StraightMuscle,
+    straight,
+    ("activation_rate", "fiber_velocity"),
+    Number("max_isometric_force"),
+    positive("optimal_fiber_length"),
+    Number("tendon_slack_length"),
+    positive("fastest"),
+    positive("width"),
+    Number("grip"),
+    positive("rise_time"),
+    states=(State("activation", lambda force: force.default_activation),),
+)
