@@ -162,8 +162,10 @@ def _stamp_since(file: str, moment: int) -> list[int] | None:
 def _code() -> str:
     """Which code this is. In a working copy the version stays the same while rules change: the files then tell."""
     package = Path(__file__).parents[1]
-    files = (os.path.join(folder, file) for folder, _, names in os.walk(package) for file in names)
-    times = [os.stat(file).st_mtime_ns for file in files if file.endswith(".py")]
+    times = []
+    for folder, folders, names in os.walk(package):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        times += [os.stat(f"{folder}/{name}").st_mtime_ns for name in names if name.endswith(".py")]
     return f"{__version__} {max(times)} {len(times)}"
 
 
