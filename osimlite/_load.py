@@ -17,7 +17,8 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from osimlite.errors import MissingFileError, OsimliteError
+from osimlite.errors import OsimliteError
+from osimlite.files import no_such
 
 
 def module_of_file(path: Path) -> ModuleType:
@@ -28,7 +29,7 @@ def module_of_file(path: Path) -> ModuleType:
         OsimliteError: it fails; with the line.
     """
     if not path.is_file():
-        raise MissingFileError("cannot read the file: no such file", file=str(path))
+        raise no_such(path)
     # A name of our own, so that a model in json.py does not take the place of a module that others import.
     name = f"_osimlite_source_{path.stem}"
     place = str(path.absolute())

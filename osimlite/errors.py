@@ -43,11 +43,17 @@ class UnitWarning(DoubtfulWarning):
 
 
 class DocumentError(OsimliteError):
-    """A file cannot be read as what it should be."""
+    """A file cannot be read as what it should be. `meant` is the tag that would be right there, if that is known."""
+
+    meant: str | None = None
 
 
 class MissingFileError(DocumentError):
     """A file is not there or may not be read."""
+
+
+class MissingFolderError(MissingFileError):
+    """A folder is not there."""
 
 
 class SpecialFileError(MissingFileError):

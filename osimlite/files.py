@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from osimlite.errors import MissingFileError, OsimliteError, SpecialFileError
+from osimlite.errors import MissingFileError, MissingFolderError, OsimliteError, SpecialFileError
 from osimlite.project import LARGEST_FILE, largest_file
 
 GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
@@ -47,8 +47,18 @@ def open_file(path: str | Path) -> BinaryIO:
         _expect_ordinary(os.stat(path).st_mode, path)
         return open(path, "rb", opener=_without_waiting)
     except (OSError, ValueError) as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or error
+        if isinstance(error, FileNotFoundError):
+            raise no_such(path) from None
+        reason = getattr(error, "strerror", None) or error
         raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
+
+
+def no_such(path: str | Path, *, may_be_folder: bool = False) -> MissingFileError:
+    """The error that nothing is there: no folder, if the path ends as those do, else no file."""
+    written = str(path)
+    if written.endswith(("/", os.sep)) or (may_be_folder and not os.path.splitext(written)[1]):
+        return MissingFolderError("there is no such folder", file=written)
+    return MissingFileError("cannot read the file: no such file", file=written)
 
 
 def read_file(path: str | Path) -> bytes:
@@ -144,8 +154,9 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
 
         handle, name = mkstemp(dir=target.parent, prefix=".osimlite-")
     except OSError as error:
-        reason = "the folder does not exist" if isinstance(error, FileNotFoundError) else error.strerror
-        raise OsimliteError(f"cannot write here: {reason}", file=str(target)) from None
+        if isinstance(error, FileNotFoundError):
+            raise MissingFolderError("cannot write here: the folder does not exist", file=str(target)) from None
+        raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream

@@ -8,6 +8,7 @@ from traceback import walk_tb
 PAGES = {
     "osimlite.errors.MissingDependency": "README.md#what-to-install",
     "osimlite.errors.MissingFileError": "docs/errors.md#files",
+    "osimlite.errors.MissingFolderError": "docs/errors.md#folders",
     "osimlite.errors.NotWellFormedError": "docs/rules.md#text",
     "osimlite.errors.VersionError": "docs/errors.md#versions",
     "osimlite.cli._validating": "docs/lint-in-ci.md",

@@ -191,13 +191,13 @@ def named_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
     """The folders of ``--geometry``.
 
     Raises:
-        MissingFileError: one is not there.
+        MissingFolderError: one is not there.
     """
-    from osimlite.errors import MissingFileError
+    from osimlite.errors import MissingFolderError
 
     for place in geometry or ():
         if not place.is_dir():
-            raise MissingFileError("--geometry names a folder that is not there", file=str(place))
+            raise MissingFolderError("--geometry names a folder that is not there", file=str(place))
     return geometry or ()
 
 
@@ -205,7 +205,7 @@ def mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
     """Where mesh files of a model are looked for after its own folder: those of ``--geometry``, then of the settings.
 
     Raises:
-        MissingFileError: a folder that is named on the command line is not there.
+        MissingFolderError: a folder that is named on the command line is not there.
         OsimliteError: the settings cannot be read.
     """
     from osimlite.lint.settings import settings_for

@@ -63,7 +63,8 @@ def run(
         # It is what this file would be, were it written now.
         unsaved[os.path.realpath(stdin_filename)] = read_standard_input()
         paths = [stdin_filename if path == "-" else path for path in paths]
-    files = project_files(paths, only_ours=only_ours)
+    passed: list[str] = []
+    files = project_files(paths, only_ours=only_ours, passed=passed)
     failed = False
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
@@ -75,6 +76,7 @@ def run(
         say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=cached, progress=progress)
+    report.passed = passed
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write
 
@@ -86,7 +88,7 @@ def run(
 
         report = without_baseline(baseline, report)
     if statistics:
-        show(_statistics(report))
+        show(_statistics(report, everything))
     else:
         width = min(max(_width(), 40), 120)
         text = render(report, format, colour=wants_colour(), width=width, everything=everything)
@@ -191,10 +193,10 @@ def _width() -> int:
     return shutil.get_terminal_size((80, 24)).columns if sys.stdout.isatty() else 80
 
 
-def _statistics(report: Report) -> str:
+def _statistics(report: Report, everything: bool) -> str:
     from osimlite.lint.engine import all_rules
-    from osimlite.lint.reporters.style import summary, unmeasured
+    from osimlite.lint.reporters.style import passed, summary, unmeasured
 
     known = {rule.code: rule for rule in all_rules()}
     rows = [f"{count:6d}  {code}  {known[code].name}" for code, count in report.codes.most_common()]
-    return "\n".join([*rows, summary(report), *filter(None, [unmeasured(report)])]) + "\n"
+    return "\n".join([*rows, summary(report), *filter(None, [passed(report, everything), unmeasured(report)])]) + "\n"

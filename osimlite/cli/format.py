@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,7 +11,7 @@ from osimlite.cli import _options as options
 
 def format(
     paths: Annotated[
-        list[Path], typer.Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False)
+        list[str], typer.Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False)
     ],
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
     show_diff: Annotated[bool, typer.Option("--diff", help="Change nothing; print what would change.")] = False,

@@ -27,11 +27,13 @@ from osimlite.schema.base import Object
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import class_for, tags
-from osimlite.text import did_you_mean
+from osimlite.text import nearest
 
 if TYPE_CHECKING:
     from osimlite.document.plugins import Paths
     from osimlite.document.upgrade import Change, Refusal, Upgraded
+
+ROOT = "OpenSimDocument"
 
 OLDEST = 10500
 """The version of documents from before documents said their version."""
@@ -301,19 +303,19 @@ def version_of(source: Source, root: etree._Element) -> int:
     # OpenSim reads an int of 32 bits, and nothing may follow it but blanks.
     digits = None if text is None else re.fullmatch(r"[ \t\r\n]*\+?0*([0-9]{1,10})[ \t\r\n]*", text)
     number = int(digits[1]) if digits is not None and int(digits[1]) < 2**31 else None
-    if root.tag == "OpenSimDocument" and number is not None and number >= OLDEST:
+    if root.tag == ROOT and number is not None and number >= OLDEST:
         return number
-    if text is None and root.tag != "OpenSimDocument":
+    if text is None and root.tag != ROOT:
         from osimlite.document.upgrade.v40600_class_names import RENAMED
 
         if _class_of(root) is not None or root.tag in RENAMED:
             return OLDEST
     # Places cost a pass over the text, so they are computed for errors only.
     place = source.of_tag(0)
-    if root.tag != "OpenSimDocument":
+    if root.tag != ROOT:
         tag = as_written(root.tag)
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
-        raise source.fault(DocumentError, message, place)
+        raise _meaning(source.fault(DocumentError, message, place), _root_meant(tag, root))
     if number is None:
         found = "has no Version" if text is None else f'has Version="{text[:40]}", which is not a whole number'
         raise source.fault(VersionError, f'<OpenSimDocument> {found}; write Version="{CURRENT_VERSION}"', place)
@@ -322,6 +324,22 @@ def version_of(source: Source, root: etree._Element) -> int:
         f'write Version="{CURRENT_VERSION}" if the model is in the current format'
     )
     raise _unreadable(source, number, message)
+
+
+def _meaning(fault: DocumentError, meant: str | None) -> DocumentError:
+    """A fault with the tag that was meant, if that is known."""
+    if meant is not None:
+        fault.meant = meant
+        fault.message += f"; did you mean '{meant}'?"
+    return fault
+
+
+def _root_meant(tag: str, root: etree._Element) -> str | None:
+    """What a root should be called: as that of a document, or as the class of a setup of old releases."""
+    name = tag.rpartition(":")[2]
+    first = _first(root)
+    held = first is not None and nearest(as_written(first.tag), tags(), cutoff=85) is not None
+    return ROOT if held or nearest(name, [ROOT], cutoff=85) is not None else nearest(name, tags(), cutoff=85)
 
 
 def _first(root: etree._Element) -> etree._Element | None:
@@ -338,14 +356,18 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
     first = _first(root)
     cls = _class_of(first)
     if first is None or cls is None or not issubclass(cls, of):
+        tag = ""
         if first is None:
             what = "no object" if of is Object else f"no <{of.tag}>"
         elif of is Object:
             tag = as_written(first.tag)
-            what = f"a <{tag}>, which is no class of OpenSim 4.6{did_you_mean(tag, tags())}"
+            what = f"a <{tag}>, which is no class of OpenSim 4.6"
         else:
-            what = f"a <{as_written(first.tag)}>, not a <{of.tag}>"
-        raise source.fault(DocumentError, f"the document holds {what}", source.of_tag(0 if first is None else 1))
+            tag = as_written(first.tag)
+            what = f"a <{tag}>, not a <{of.tag}>"
+        at = source.of_tag(0 if first is None else 1)
+        meant = None if first is None or cls is not None else nearest(tag, tags() if of is Object else [of.tag])
+        raise _meaning(source.fault(DocumentError, f"the document holds {what}", at), meant)
     reader.count = 1
     top = reader.top(first, cls)
     for second in first.itersiblings(etree.Element):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from osimlite.document.names import as_written
-from osimlite.document.reader import Document, document_of, parse, read_document, version_of
+from osimlite.document.reader import ROOT, Document, document_of, parse, read_document, version_of
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.schema.base import Object
@@ -47,7 +47,12 @@ def survey(source: Source, *, of: type[Object] = Model) -> Survey:
         except NotWellFormedError:
             return Survey(source, None, [fault])
     except DocumentError as fault:
-        return Survey(source, None, [fault])
+        found = Survey(source, None, [fault])
+        if fault.meant != ROOT:
+            return found
+        root = parse(source)
+        root.tag = ROOT
+        return _assembled(found, root, of)
 
 
 def _recovered(source: Source, fault: NotWellFormedError, of: type[Object]) -> Survey:
@@ -63,7 +68,7 @@ def _recovered(source: Source, fault: NotWellFormedError, of: type[Object]) -> S
         root = parse(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:
         return found
-    if root.tag != "OpenSimDocument" or not _same_elements(source, root, found.sure_until):
+    if root.tag != ROOT or not _same_elements(source, root, found.sure_until):
         return found
     return _assembled(found, root, of)
 

@@ -61,7 +61,10 @@ def validate(
             from osimlite.lint.many import check_files
 
             # Processes that are not forked would run the caller's script anew.
-            return check_files(project_files([model]), config, cached=False, processes=1)
+            passed: list[str] = []
+            report = check_files(project_files([model], passed=passed), config, cached=False, processes=1)
+            report.passed = passed
+            return report
         return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
 
 

@@ -108,7 +108,7 @@ class Report:
 
     `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the files,
     `known` what a baseline has left out. `unmeasured` has, of each file whose paths and muscles could not be measured,
-    its name and why.
+    its name and why. `passed` names the files of a folder that are none of OpenSim's.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -116,6 +116,7 @@ class Report:
     checked: int = 1
     known: int = 0
     unmeasured: list[str] = field(default_factory=list)
+    passed: list[str] = field(default_factory=list)
 
     _repr_html_ = shown_in_notebooks("findings")
 

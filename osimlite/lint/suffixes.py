@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from osimlite.errors import MissingFileError, OsimliteError
+from osimlite.errors import OsimliteError
 from osimlite.files import TABLES as TABLES
-from osimlite.files import unsaved
+from osimlite.files import no_such, unsaved
+from osimlite.lint.ours import BEGINNING, is_ours
 
 DOCUMENTS = (".xml", ".omoco")
 """Setups of tools and what they consist of."""
 PROJECT = (".osim", *DOCUMENTS, *TABLES)
 """Everything that belongs to a project."""
-
-_OURS = re.compile(
-    rb"<OpenSimDocument\b|"
-    rb"\A[^<]*+(?:(?:<!--.*?-->|<(?:\?|!(?!--))[^>]*+>)[^<]*+)*+"
-    rb"<\w*(?:Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet)\b",
-    re.DOTALL,
-)
 
 
 def is_table(file: str | None) -> bool:
@@ -35,31 +28,41 @@ def is_document(file: str | None) -> bool:
 
 
 def project_files(
-    paths: Iterable[str | Path], suffixes: tuple[str, ...] = PROJECT, *, only_ours: bool = False
+    paths: Iterable[str | Path],
+    suffixes: tuple[str, ...] = PROJECT,
+    *,
+    only_ours: bool = False,
+    passed: list[str] | None = None,
 ) -> list[str]:
     """The files that are named, and OpenSim's files with some suffixes below the folders that are named, each once.
 
-    With `only_ours`, XML of other programs is passed over even where it is named.
+    With `only_ours`, XML of other programs is passed over even where it is named. What is passed over is added to
+    `passed`.
 
     Raises:
-        MissingFileError: a path is not there.
+        MissingFileError: a path is not there; MissingFolderError of one that ends as those of folders do.
         OsimliteError: there is none in a folder.
     """
     found: list[str] = []
+    others: list[str] = [] if passed is None else passed
     for path in paths:
         if os.path.isdir(path):
             named = (file for file in Path(path).rglob("*.*") if file.suffix.lower() in suffixes)
-            below = sorted(file for file in named if not file.is_dir() and begins_as_ours(str(file)))
+            inside = sorted(str(file) for file in named if not file.is_dir())
+            below = [file for file in inside if begins_as_ours(file)]
             if not below:
                 raise OsimliteError(
                     f"there is no file of OpenSim in this folder: no {', '.join(suffixes[:-1])} or {suffixes[-1]}",
                     file=str(path),
                 )
-            found += map(str, below)
+            found += below
+            others += sorted({*inside}.difference(below))
         elif str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved:
-            raise MissingFileError("cannot read the file: no such file", file=str(path))
+            raise no_such(path, may_be_folder=True)
         elif not only_ours or begins_as_ours(str(path)):
             found.append(str(path))
+        else:
+            others.append(str(path))
     return list({os.path.abspath(file): file for file in reversed(found)}.values())[::-1]
 
 
@@ -69,11 +72,6 @@ def begins_as_ours(file: str) -> bool:
         return True
     try:
         with open(file, "rb") as stream:
-            return is_ours(stream.read(4000))
+            return is_ours(stream.read(BEGINNING))
     except OSError:
         return True
-
-
-def is_ours(beginning: bytes) -> bool:
-    """Whether XML that begins so is OpenSim's."""
-    return _OURS.search(beginning) is not None

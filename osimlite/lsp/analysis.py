@@ -16,7 +16,8 @@ from osimlite.lint.engine import run, subject_in, use_classes
 from osimlite.lint.settings import settings_for
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
-from osimlite.lint.suffixes import is_ours, is_table
+from osimlite.lint.ours import BEGINNING, is_ours
+from osimlite.lint.suffixes import is_table
 from osimlite.lsp.cursor import Cursor, cursor_at
 from osimlite.lsp.text import Text
 from osimlite.schema.base import Component, Object
@@ -56,7 +57,8 @@ class Analysis:
         self.text = text
         self.file = file
         self.is_table = is_table(file)
-        self.is_foreign = file.lower().endswith(".xml") and not is_ours(text.content[:4000].encode("utf-8", "replace"))
+        beginning = text.content[:BEGINNING].encode("utf-8", "replace")
+        self.is_foreign = file.lower().endswith(".xml") and not is_ours(beginning)
 
     @cached_property
     def source(self) -> Source:

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite._require import require
-from osimlite.errors import MissingFileError, OsimliteError, SettingError
-from osimlite.files import put_in_place
+from osimlite.errors import MissingFolderError, OsimliteError, SettingError
+from osimlite.files import no_such, put_in_place
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.text import counted, listed
 
@@ -58,7 +58,7 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     """
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     if not Path(path).exists():
-        raise MissingFileError("cannot read the file: no such file", file=str(path))
+        raise no_such(path)
     try:
         # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and that all is UTF-8.
         with open(path, "rb") as stream:
@@ -294,7 +294,7 @@ def _locked(path: Path) -> Any:
     filelock = require("filelock", extra="sweep", purpose="a table of results")
     if not path.parent.is_dir():
         # The lock would make the folder.
-        raise OsimliteError("cannot write here: the folder does not exist", file=str(path))
+        raise MissingFolderError("cannot write here: the folder does not exist", file=str(path))
     lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), thread_local=False)
     try:
         lock.acquire(blocking=False)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from osimlite.lint.diagnostic import Report
 from osimlite.lint.reporters.fold import Fold, folded, told
-from osimlite.lint.reporters.style import painted, summary, unmeasured
+from osimlite.lint.reporters.style import painted, passed, summary, unmeasured
 from osimlite.text import visible
 
 
 def render(report: Report, *, colour: bool = False, everything: bool = False) -> str:
     """``file:line:column: severity code message`` for each finding, and a closing line."""
     folds = folded(report.findings, everything=everything)
-    closing = " ".join(filter(None, (summary(report, colour), told(folds), unmeasured(report))))
+    closing = " ".join(
+        filter(None, (summary(report, colour), told(folds), passed(report, everything), unmeasured(report)))
+    )
     return "\n".join([*(_line(fold, colour) for fold in folds), closing]) + "\n"
 
 

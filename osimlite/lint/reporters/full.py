@@ -8,7 +8,7 @@ from itertools import groupby
 
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.reporters.fold import Fold, folded, told
-from osimlite.lint.reporters.style import painted, summary, unmeasured
+from osimlite.lint.reporters.style import painted, passed, summary, unmeasured
 from osimlite.text import visible
 
 _ELLIPSIS = "..."
@@ -23,7 +23,7 @@ def render(report: Report, *, colour: bool = False, width: int = 80, everything:
         lines = _lines(report, file, max(fold.first.line or 0 for fold in folds))
         blocks += [_block(fold, lines, colour, width) for fold in folds]
     closing, length = summary(report, colour), len(summary(report))
-    for more in filter(None, (_fixes(report), told(every), unmeasured(report))):
+    for more in filter(None, (_fixes(report), told(every), passed(report, everything), unmeasured(report))):
         fits = length + 1 + len(more) <= width
         closing, length = f"{closing}{' ' if fits else chr(10)}{more}", (length + 1 if fits else 0) + len(more)
     return "\n\n".join([*blocks, closing]) + "\n"

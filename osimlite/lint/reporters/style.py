@@ -46,5 +46,15 @@ def unmeasured(report: Report) -> str:
     return visible(f"Paths and muscles (OSIM63) were not measured: {report.unmeasured[0]}{more}.")
 
 
+def passed(report: Report, everything: bool) -> str:
+    """How many files of folders are none of OpenSim's, or which those are; nothing if all are."""
+    if not report.passed:
+        return ""
+    if everything:
+        return visible(f"Not OpenSim's: {', '.join(report.passed)}.")
+    count = len(report.passed)
+    return f"{count} {_plural('file', count)} {'is' if count == 1 else 'are'} none of OpenSim's."
+
+
 def _plural(noun: str, count: int) -> str:
     return noun if count == 1 or noun == "info" else f"{noun}s"

@@ -8,6 +8,7 @@ from typing import Final
 from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.fixes import renamed
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -119,12 +120,13 @@ def encoding(subject: Subject, found: Found) -> None:
         found(f"the encoding '{name}' is not known; the text is read as {source.encoding}", at=source.position(0))
 
 
-@rule("OSIM003", "not-a-model", severity=ERROR)
+@rule("OSIM003", "not-a-model", severity=ERROR, mends="unsafe")
 def not_a_model(subject: Subject, found: Found) -> None:
     """The document is XML, but no OpenSim model.
 
-    Reports a root element other than `<OpenSimDocument>`, and a document that holds something else than a `<Model>`. So
-    it does of what is no ordinary file (a pipe, a device), and of a file of more than 100 MB, or what the setting
+    Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is known, and a document
+    that holds something else than a `<Model>`. In a folder, XML is OpenSim's if its root is nearly so called, or if it
+    holds classes of OpenSim with their properties; other XML is passed over and counted. So it does of what is no ordinary file (a pipe, a device), and of a file of more than 100 MB, or what the setting
     `largest-file` allows: neither is read.
 
     OpenSim fails with a message about a missing node, or makes an empty model without a word.
@@ -140,8 +142,16 @@ def not_a_model(subject: Subject, found: Found) -> None:
     if subject.source is None:
         return
     for fault in subject.faults:
-        if not isinstance(fault, (NotWellFormedError, VersionError)):
-            _found_at(subject.source, found, fault.message, fault.line, fault.column)
+        if isinstance(fault, (NotWellFormedError, VersionError)):
+            continue
+        message = fault.message.removesuffix(f"; did you mean '{fault.meant}'?")
+        if fault.meant is None or not subject.source.well_formed:
+            _found_at(subject.source, found, message, fault.line, fault.column)
+            continue
+        root = subject.source.of_tag(0)
+        number = int((root.line, root.column) != (fault.line, fault.column))
+        fix = renamed(subject.source, number, fault.meant, safe=False)
+        found(message, at=subject.source.of_tag(number), suggestion=fault.meant, fix=fix)
 
 
 @rule("OSIM004", "document-version", severity=ERROR)

@@ -1,0 +1,87 @@
+"""Whose XML it is: OpenSim's own, whatever its root is called, or that of another program."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import cache
+
+BEGINNING = 1 << 16
+"""Bytes of a file that tell whose it is."""
+
+_ROOT = re.compile(r"<(?:[\w.-]+:)?OpenSimDocument\b")
+_TAGS = re.compile(r"<(?:!--.*?-->|!\[CDATA\[.*?\]\]>|[?!][^>]*+>|(/?)([A-Za-z_][\w:.-]*)[^<>]*?(/?)>)", re.DOTALL)
+_TOP = re.compile(r"\w*(?:Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet)", re.IGNORECASE)
+# A name of several words, or of letters and digits, is hardly another program's.
+_COMPOUND = re.compile(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
+
+
+def is_ours(beginning: bytes) -> bool:
+    """Whether XML that begins so is OpenSim's: by its root, also if that is misspelt, or by what it holds.
+
+    What it holds is OpenSim's if two elements at least are properties of the class that they stand in.
+    """
+    # A file in UTF-16 is read as well, and reported.
+    text = beginning.replace(b"\0", b"").decode("latin-1")
+    if _ROOT.search(text):
+        return True
+    open_tags: list[str] = []
+    evidence: set[tuple[str, str]] = set()
+    for number, (closing, name, empty) in enumerate(found for found in _TAGS.findall(text) if found[1]):
+        tag = name.rpartition(":")[2]
+        if closing:
+            while open_tags and open_tags.pop() != tag:
+                pass
+            continue
+        if number == 0 and is_root(tag):
+            return True
+        if open_tags and _is_property(open_tags[-1], tag):
+            evidence.add((open_tags[-1], tag))
+            if len(evidence) > 1:
+                return True
+        if not empty:
+            open_tags.append(tag)
+    return False
+
+
+def misspelt(word: str, known: Iterable[str]) -> str | None:
+    """The known name that a word is but for letter case and two letters, None if there is none."""
+    from rapidfuzz.distance import OSA
+    from rapidfuzz.process import extractOne
+
+    if len(word) < 8:
+        return next((name for name in known if name.lower() == word.lower()), None)
+    found = extractOne(word, list(known), scorer=OSA.distance, processor=str.lower, score_cutoff=2)
+    return found[0] if found else None
+
+
+def is_root(tag: str) -> bool:
+    """Whether a root is OpenSim's: of a document, or of a setup as old releases wrote them."""
+    if misspelt(tag, ["OpenSimDocument"]) is not None:
+        return True
+    name = _class_name(tag)
+    return name is not None and _TOP.fullmatch(name) is not None
+
+
+@cache
+def _class_name(tag: str) -> str | None:
+    """The class that a tag means, although it may be misspelt or an old name."""
+    from osimlite.document.upgrade.v40600_class_names import RENAMED
+    from osimlite.schema.registry import MODULES
+
+    known = {**{name: name for name in MODULES}, **RENAMED}
+    found = tag if tag in known else misspelt(tag, known)
+    return None if found is None else known[found]
+
+
+@cache
+def _is_property(owner: str, tag: str) -> bool:
+    """Whether an element is a property of what it stands in, and both could hardly be another program's."""
+    name = _class_name(owner)
+    if name is None or not (_COMPOUND.search(name) or _COMPOUND.search(tag)):
+        return False
+    from osimlite.schema.registry import class_for
+    from osimlite.schema.specs import field_specs
+
+    cls = class_for(name)
+    return cls is not None and tag in field_specs(cls)
