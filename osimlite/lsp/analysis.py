@@ -13,10 +13,10 @@ from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
 from osimlite.lint.engine import run, subject_in, use_classes
+from osimlite.lint.ours import BEGINNING, is_ours
 from osimlite.lint.settings import settings_for
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
-from osimlite.lint.ours import BEGINNING, is_ours
 from osimlite.lint.suffixes import is_table
 from osimlite.lsp.cursor import Cursor, cursor_at
 from osimlite.lsp.text import Text

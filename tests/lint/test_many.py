@@ -15,7 +15,7 @@ from osimlite.lint import Config, validate
 from osimlite.lint import many as module
 from osimlite.lint.cache import NAME, _code, folder_for
 from osimlite.lint.many import Texts, check_files, settings_of
-from osimlite.lint.suffixes import is_ours
+from osimlite.lint.ours import is_ours
 
 MESH = """\
 <OpenSimDocument Version="40600">

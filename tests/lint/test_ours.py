@@ -27,7 +27,7 @@ OTHERS = {
     "doxygen": '<doxygen><compounddef kind="class"><compoundname>OpenSim::InverseKinematicsTool</compoundname>'
     "<listofallmembers><member/></listofallmembers></compounddef></doxygen>",
     "sdf": "<sdf><world><model name='m'><link><inertial><mass>1</mass></inertial></link></model></world></sdf>",
-    "words": "<Model><Body><mass>1</mass><inertia>1 1 1</inertia></Body><Marker><location>0</location></Marker></Model>",
+    "words": "<Model><Body><mass>1</mass><inertia>1 1 1</inertia></Body><Marker><fixed>0</fixed></Marker></Model>",
     "plugin": "<MyPluginTool><my_model>a</my_model></MyPluginTool>",
     "markers": "<MotoNMS><Markers><Marker>LASI</Marker></Markers><OpenSim>yes</OpenSim></MotoNMS>",
     "hidden": "<a><!-- <ScaleTool><mass>1</mass><height>2</height></ScaleTool> --><b/></a>",

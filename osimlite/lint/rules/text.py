@@ -125,9 +125,10 @@ def not_a_model(subject: Subject, found: Found) -> None:
     """The document is XML, but no OpenSim model.
 
     Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is known, and a document
-    that holds something else than a `<Model>`. In a folder, XML is OpenSim's if its root is nearly so called, or if it
-    holds classes of OpenSim with their properties; other XML is passed over and counted. So it does of what is no ordinary file (a pipe, a device), and of a file of more than 100 MB, or what the setting
-    `largest-file` allows: neither is read.
+    that holds something else than a `<Model>`. In a folder, XML is OpenSim's if its root is nearly called so, or if it
+    holds a class of OpenSim with its properties; other XML is passed over and counted. What is no ordinary file (a
+    pipe, a device) is reported, too, and a file of more than 100 MB, or what the setting `largest-file` allows: neither
+    is read.
 
     OpenSim fails with a message about a missing node, or makes an empty model without a word.
 
