@@ -25,24 +25,27 @@ def rule(
     """
     from osimlite.cli._console import show
     from osimlite.errors import OsimliteError
-    from osimlite.lint.engine import all_rules
+    from osimlite.lint.engine import all_rules, groups
     from osimlite.text import did_you_mean
 
     rules = all_rules()
     columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80
     found = [known for known in rules if code is None or known.matches(code)]
     if code is not None and not found:
-        names = [word for known in rules for word in (known.code, known.name)]
+        names = [word for known in (*rules, *groups()) for word in (known.code, known.name)]
         near = did_you_mean(code, names) or "; 'osimlite rule' lists all rules"
         raise OsimliteError(f"there is no rule '{code}'{near}")
+    from osimlite.lint.pages import group_page, page_of
+
+    for group in groups():
+        if code is not None and (code == group.name or code.upper() == group.code):
+            show(_wrapped(group_page(group), columns) + "\n\n")
     if len(found) > 1:
         width = max(len(known.name) for known in found)
         for known in found:
             head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
             show(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)) + "\n")
         return
-    from osimlite.lint.pages import page_of
-
     show(_wrapped(page_of(found[0]), columns) + "\n")
 
 

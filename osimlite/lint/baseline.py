@@ -37,8 +37,11 @@ def without_baseline(path: str | Path, report: Report) -> Report:
         raise OsimliteError("this is no baseline; write one with --write-baseline", file=str(path)) from None
     kept = []
     for finding in report.findings:
-        if counts[_key(finding)] > 0:
-            counts[_key(finding)] -= 1
+        key = _key(finding)
+        # An older baseline has the code of the group.
+        known = next((code for code in (key[0], key[0][:7]) if counts[(code, *key[1:])] > 0), None)
+        if known is not None:
+            counts[(known, *key[1:])] -= 1
         else:
             kept.append(finding)
     return replace(report, findings=kept, known=len(report.findings) - len(kept))

@@ -94,13 +94,13 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
     cleaned = tuple(word.strip() for word in given if word.strip())
     if not cleaned:
         return ()
-    from osimlite.lint.engine import all_rules
+    from osimlite.lint.engine import all_rules, groups
 
     for word in cleaned:
         if not any(rule.matches(word) for rule in all_rules()):
             from osimlite.text import did_you_mean
 
-            known = [name for rule in all_rules() for name in (rule.code, rule.name)]
+            known = [name for rule in (*all_rules(), *groups()) for name in (rule.code, rule.name)]
             near = did_you_mean(word, known) or "; 'osimlite rule' lists all rules"
             raise OsimliteError(f"no rule has the code or name '{word}'{near}")
     return cleaned

@@ -5,8 +5,8 @@ A rule is a function of the subject and of `found`, which it calls once per find
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from inspect import cleandoc
@@ -21,6 +21,7 @@ from osimlite.lint import rules
 from osimlite.lint.checked import Checked, Where
 from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
+from osimlite.lint.faults import Fault, faults_in
 from osimlite.lint.measures import MEASURES
 from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_document, is_table
@@ -51,7 +52,7 @@ FAMILIES = {
 class Found:
     """What a rule calls for each finding of a subject."""
 
-    rule: Rule
+    rules: dict[str, Rule]
     subject: Checked
     findings: list[Finding]
 
@@ -60,6 +61,7 @@ class Found:
         message: str,
         item: Object | None = None,
         *,
+        fault: str = "",
         at: Position | None = None,
         severity: Severity | None = None,
         suggestion: str | None = None,
@@ -69,10 +71,14 @@ class Found:
     ) -> None:
         """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
 
+        A rule that tells faults apart says which it is, by its name; what nobody wants to hear of is passed over.
+
         Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is `certain` or differs in
         letter case alone.
         """
-        rule, subject = self.rule, self.subject
+        rule, subject = self.rules.get(fault), self.subject
+        if rule is None:
+            return
         if at is None and (item is not None or where.get("number") is not None):
             at = subject.position(item, **where)
         line, column, length = at if at is not None else (None, None, 1)
@@ -111,6 +117,7 @@ class Rule:
     `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
     version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
     at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's paths and muscles).
+    A rule that tells faults apart is a `group`: there is a rule for each `fault`, all with the same `check`.
     """
 
     code: str
@@ -121,6 +128,8 @@ class Rule:
     thresholds: tuple[Threshold, ...] = ()
     mends: Mends = ""
     about: str = "model"
+    fault: Fault | None = None
+    group: str = ""
 
     @property
     def family(self) -> str:
@@ -133,6 +142,8 @@ class Rule:
 
         The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends it.
         """
+        if self.fault is not None:
+            return self.fault.page(f"{self.code[:-2]} {self.group}")
         summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
         fence, *lines, end = example.splitlines()
         fails, mended = ("\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-")
@@ -144,7 +155,8 @@ class Rule:
     @property
     def summary(self) -> str:
         """The first line of the page."""
-        return self.page.partition("\n")[0].rstrip(".")
+        told = self.fault.summary if self.fault is not None else (self.check.__doc__ or "").partition("\n")[0]
+        return told.rstrip(".")
 
     def severity_in(self, version: int | None) -> Severity:
         """The severity of its findings in a document of a version; None stands for the current one."""
@@ -152,12 +164,17 @@ class Rule:
             return self.before[1]
         return self.severity
 
+    def is_called(self, word: str) -> bool:
+        """Whether `word` is this rule's code, the beginning of it, its name or that of its group."""
+        return bool(word) and (self.code.startswith(word.upper()) or word in (self.name, self.group))
+
     def matches(self, word: str) -> bool:
-        """Whether `word` is this rule's code, the beginning of it, its name or its family."""
-        return bool(word) and (self.code.startswith(word.upper()) or word in (self.name, self.family, "ALL"))
+        """Whether the rule is called so, or `word` is its family."""
+        return self.is_called(word) or word in (self.family, "ALL")
 
 
 _RULES: dict[str, Rule] = {}
+_GROUPS: dict[str, Rule] = {}
 
 
 def rule(
@@ -169,16 +186,31 @@ def rule(
     thresholds: tuple[Threshold, ...] = (),
     mends: Mends = "",
     about: str = "model",
+    frames: Mapping[str, str] | None = None,
 ) -> Callable[[Check], Check]:
-    """Register a function as the rule `code`; the other arguments are those of :class:`Rule`."""
+    """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
+
+    With `frames` it is a group: its docstring lists faults (:mod:`osimlite.lint.faults`), whose examples stand in them.
+    """
 
     def register(check: Check) -> Check:
-        if code in _RULES or any(known.name == name for known in _RULES.values()):
-            raise ValueError(f"rule {code} {name} is registered twice")
-        _RULES[code] = Rule(code, name, severity, check, before, thresholds, mends, about)
+        whole = Rule(code, name, severity, check, before, thresholds, mends, about)
+        if frames is None:
+            _add(_RULES, whole)
+            return check
+        _add(_GROUPS, whole)
+        for fault in faults_in(cleandoc(check.__doc__ or ""), frames):
+            own: Any = {"code": code + fault.number, "name": fault.name, "mends": fault.mends, "group": name}
+            _add(_RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own))
         return check
 
     return register
+
+
+def _add(table: dict[str, Rule], rule: Rule) -> None:
+    if any(known.code == rule.code or known.name == rule.name for known in (*_RULES.values(), *_GROUPS.values())):
+        raise ValueError(f"rule {rule.code} {rule.name} is registered twice")
+    table[rule.code] = rule
 
 
 @cache
@@ -187,6 +219,12 @@ def all_rules() -> tuple[Rule, ...]:
     for module in iter_modules(rules.__path__):
         import_module(f"{rules.__name__}.{module.name}")
     return tuple(_RULES[code] for code in sorted(_RULES))
+
+
+def groups() -> tuple[Rule, ...]:
+    """What rules with one beginning of their codes have in common, by code."""
+    all_rules()
+    return tuple(_GROUPS[code] for code in sorted(_GROUPS))
 
 
 def check_source(source: Source, config: Config | None = None) -> Report:
@@ -246,9 +284,12 @@ def run(subject: Checked, *, measure: bool = True) -> Report:
     measuring = [known for known in wanted if known.about == MEASURES]
     why_not = "" if not measuring else subject.unmeasured() if measure else "nobody asked"
     left_out = measuring if why_not else []
+    checks: dict[Check, dict[str, Rule]] = {}
     for known in wanted:
         if known not in left_out:
-            known.check(subject, Found(known, subject, findings))
+            checks.setdefault(known.check, {})[known.name if known.group else ""] = known
+    for check, told_apart in checks.items():
+        check(subject, Found(told_apart, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
@@ -260,14 +301,19 @@ def run(subject: Checked, *, measure: bool = True) -> Report:
     return Report(unique, unmeasured=[f"{subject.file or 'the model'}: {why_not}"] if why_not and measure else [])
 
 
+def _is_ignored(finding: Finding, comments: list[Suppression]) -> bool:
+    # Each comment notes that it was of use.
+    return any([comment.covers(finding, _RULES[finding.code].is_called) for comment in comments])
+
+
 def _not_ignored(
     subject: Checked, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
 ) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
-    kept = [finding for finding in findings if not any([comment.covers(finding) for comment in comments])]
+    kept = [finding for finding in findings if not _is_ignored(finding, comments)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):
-        found = Found(unused, subject, kept)
+        found = Found({"": unused}, subject, kept)
         for comment in comments:
             for code in comment.codes:
                 named = [known for known in all_rules() if known.matches(code)]

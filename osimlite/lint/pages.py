@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from osimlite.lint.engine import FAMILIES, Rule, all_rules
+from inspect import cleandoc
+
+from osimlite.lint.engine import FAMILIES, Rule, all_rules, groups
 
 _MENDS = {
     "": "none",
@@ -43,6 +45,12 @@ def page_of(rule: Rule) -> str:
     return "\n".join(rows)
 
 
+def group_page(group: Rule) -> str:
+    """What the rules of a group have in common, as Markdown."""
+    summary, what, why = cleandoc(group.check.__doc__ or "").split("\n\n")[:3]
+    return f"# {group.name} ({group.code})\n\n{summary}\n\n{what}\n\n{why}"
+
+
 def severity_of(rule: Rule) -> str:
     """``error; warning in files of a version before 30500``."""
     if rule.before is None:
@@ -63,7 +71,9 @@ def index() -> str:
         ]
         rows += [
             f"| {rule.code} | {rule.name} | {severity_of(rule)} | {_SHORT[rule.mends]} | {rule.summary} |"
-            for rule in all_rules()
+            if rule not in groups()
+            else f"| {rule.code} | {rule.name} | a group | | {rule.summary}: the codes that begin so |"
+            for rule in sorted((*all_rules(), *groups()), key=lambda rule: rule.code)
             if rule.code[4] == digit
         ]
     rows += ["", "## Thresholds", "", "Under `[tool.osimlite.thresholds]`:", ""]

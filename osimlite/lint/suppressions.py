@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from osimlite.document.source import Position, Source
@@ -24,11 +25,14 @@ class Suppression:
     last: int
     used: set[str] = field(default_factory=set)
 
-    def covers(self, finding: Finding) -> bool:
-        """Whether the finding is one of those the comment is about; it is noted as used then."""
+    def covers(self, finding: Finding, is_called: Callable[[str], bool]) -> bool:
+        """Whether the finding, of a rule that `is_called` some names, is one of those the comment is about.
+
+        It is noted as used then.
+        """
         if finding.line is None or not self.first <= finding.line <= self.last:
             return False
-        code = next((code for code in self.codes if finding.code.startswith(code) or finding.name == code), None)
+        code = next(filter(is_called, self.codes), None)
         if code is None:
             return False
         self.used.add(code)

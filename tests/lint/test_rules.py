@@ -10,8 +10,9 @@ from shutil import copy
 import pytest
 
 from osimlite.document.source import Source
-from osimlite.lint import Severity, validate
-from osimlite.lint.engine import FAMILIES, Rule, all_rules
+from osimlite.lint import Config, Severity, validate
+from osimlite.lint.baseline import without_baseline, write_baseline
+from osimlite.lint.engine import FAMILIES, Rule, all_rules, groups
 from osimlite.lint.pages import index, page_of
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -57,7 +58,7 @@ def test_a_page_has_its_headings_and_prose(rule):
     assert re.findall(r"^## (.*)$", rule.page, re.MULTILINE) == HEADINGS
     assert rule.page.splitlines()[0].endswith(".")
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", rule.name)
-    assert rule.code[4] in FAMILIES and re.fullmatch(r"OSIM\d{3}", rule.code)
+    assert rule.code[4] in FAMILIES and re.fullmatch(r"OSIM\d{3}(\d\d)?", rule.code)
 
 
 def example_file(rule: Rule, heading: str, folder: Path) -> Path:
@@ -68,6 +69,8 @@ def example_file(rule: Rule, heading: str, folder: Path) -> Path:
         # What setups name, and the tool that names a setup.
         for file in filter(Path.is_file, FIXTURES.iterdir()):
             copy(file, folder)
+        for file in (FIXTURES / rule.code).glob("tool.xml"):
+            (folder / file.name).write_text(file.read_text().replace("../", ""))
     path.write_bytes(example(rule, heading))
     return path
 
@@ -174,7 +177,7 @@ def test_a_tag_of_an_old_format_is_called_so(fragment, tag, words):
 
 
 def test_fixture_folders_belong_to_rules():
-    codes = {rule.code for rule in all_rules()}
+    codes = {rule.code for rule in (*all_rules(), *groups())}
     assert {path.name for path in FIXTURES.iterdir() if path.is_dir()} == codes
 
 
@@ -203,3 +206,64 @@ def test_a_namespace_does_not_hide_the_right_name(tag, nearest):
         <objects> <{tag} name="b"> <mass>1</mass> </{tag}> </objects></BodySet></Model></OpenSimDocument>"""
     (finding,) = validate(Source(text.encode()), select="OSIM102").findings
     assert (finding.suggestion, finding.line, finding.column) == (nearest, 2, 19)
+
+
+GROUPS = [pytest.param(group, id=group.code) for group in groups()]
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_the_code_and_the_name_of_a_group_mean_all_its_faults(group):
+    members = [rule for rule in all_rules() if rule.group == group.name]
+    assert len(members) > 5
+    assert [rule.code for rule in members] == [f"{group.code}{number:02d}" for number in range(1, len(members) + 1)]
+    for path in (FIXTURES / group.code).glob("fail-*"):
+        everything = checked(path, group)
+        assert len(everything.findings) == int(path.name.split("-")[1])
+        for word in (group.code, group.name):
+            assert validate(path, select=word).findings == everything.findings
+            assert str(validate(path, ignore=[word, MEASURED])) == "nothing found"
+        first = everything.findings[0]
+        assert first.code.startswith(group.code) and first.name != group.name
+        alone = [finding for finding in everything.findings if finding.code == first.code]
+        for word in (first.code, first.name):
+            assert validate(path, select=word).findings == alone
+    for path in (FIXTURES / group.code).glob("pass-*"):
+        assert str(checked(path, group)) == "nothing found", path.name
+
+
+@pytest.mark.parametrize("word", ["OSIM852", "tool-setting", "OSIM85206", "activation-exponent"])
+def test_a_comment_ignores_a_fault_or_its_group(word, tmp_path):
+    text = (FIXTURES / "OSIM852" / "fail-02-optimization.xml").read_text().replace("../", f"{FIXTURES}/")
+    path = tmp_path / "run.xml"
+    path.write_text(text.replace("<AnalyzeTool", f"<!-- osimlite: ignore {word} -->\n<AnalyzeTool", 1))
+    left = [finding.code for finding in validate(path, ignore=MEASURED).findings]
+    assert left == ([] if word in ("OSIM852", "tool-setting") else ["OSIM85205"])
+
+
+def test_a_baseline_of_before_the_faults_had_codes_still_counts(tmp_path):
+    path = FIXTURES / "OSIM852" / "fail-02-optimization.xml"
+    report = validate(path)
+    write_baseline(tmp_path / "old.json", report)
+    text = (tmp_path / "old.json").read_text()
+    (tmp_path / "old.json").write_text(re.sub(r"OSIM852\d\d", "OSIM852", text))
+    assert not without_baseline(tmp_path / "old.json", report).findings
+    (tmp_path / "old.json").write_text(re.sub(r"OSIM852\d\d", "OSIM853", text))
+    assert len(without_baseline(tmp_path / "old.json", report).findings) == 2
+
+
+def test_a_group_sets_the_severity_of_its_faults():
+    path = FIXTURES / "OSIM853" / "fail-02-pairs.xml"
+    for word in ("OSIM853", "scale-setting"):
+        found = validate(path, config=Config(severity={word: Severity.INFO})).findings
+        assert [str(finding.severity) for finding in found] == ["info", "info"]
+
+
+def test_a_group_has_a_page_with_its_rules(capsys):
+    from osimlite.cli import main
+
+    for word in ("OSIM853", "scale-setting"):
+        with pytest.raises(SystemExit):
+            main(["rule", word])
+        out = capsys.readouterr().out
+        assert out.startswith("# scale-setting (OSIM853)\n\nA setting of the scale tool")
+        assert "OSIM85307  marker-pair-count" in out and out.count("\nOSIM853") == 12

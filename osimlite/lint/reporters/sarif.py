@@ -32,12 +32,18 @@ def render(report: Report) -> str:
 def _rule(rule: Rule) -> dict[str, Any]:
     return {
         "id": rule.code,
-        "name": "".join(word.capitalize() for word in rule.name.split("-")),
+        "name": _joined(rule.name),
         "shortDescription": {"text": rule.summary},
         "help": {"text": rule.page, "markdown": rule.page},
         "defaultConfiguration": {"level": _LEVELS[rule.severity]},
         "properties": {"category": rule.family},
+        # What alerts of before were filed under.
+        **({"deprecatedIds": [rule.code[:-2]], "deprecatedNames": [_joined(rule.group)]} if rule.group else {}),
     }
+
+
+def _joined(name: str) -> str:
+    return "".join(word.capitalize() for word in name.split("-"))
 
 
 def _result(finding: Finding, index: int) -> dict[str, Any]:

@@ -26,7 +26,22 @@ _USUAL_WINDOW = 0.01
 """The time over which its controls are found, if nothing is said, s."""
 
 
-@rule("OSIM844", "time-outside-data", severity=WARNING, about="document")
+_WHOLE = '<{0} name="run">\n    <model_file>leg.osim</model_file>\n    {{}}\n    {1}\n</{0}>'
+_FRAMES = {
+    "ik": _WHOLE.format("InverseKinematicsTool", "<output_motion_file>ik.mot</output_motion_file>"),
+    "dynamics": _WHOLE.format("InverseDynamicsTool", "<coordinates_file>leg.mot</coordinates_file>"),
+    "any": _WHOLE.format("InverseDynamicsTool", "<time_range>0 0.05</time_range>"),
+    "control": _WHOLE.format(
+        "CMCTool",
+        "<desired_kinematics_file>leg.mot</desired_kinematics_file> <task_set_file>tasks.xml</task_set_file>",
+    ),
+}
+
+
+@rule(
+    "OSIM844", "time-outside-data", severity=WARNING, about="document",
+    frames={name: f"```setup\n{frame}\n```" for name, frame in _FRAMES.items()},
+)  # fmt: skip
 def time_outside_data(setup: Setup, found: Found) -> None:
     """A tool runs over times that its data do not have, or that make no sense.
 
@@ -37,25 +52,50 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     means to take all there is, and does not. Loads that end before the motion go on as their spline leaves them. Times
     in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
 
-    ```setup
-      <InverseDynamicsTool name="id">
-          <model_file>leg.osim</model_file>
-    -     <time_range>0 9</time_range>
-    +     <time_range>0 0.5</time_range>
-          <coordinates_file>leg.mot</coordinates_file>
-      </InverseDynamicsTool>
-    ```
+    01 time-count, error, in dynamics: A range of times has other than two. With less the tool fails, of more OpenSim
+    takes the first two.
+    - <time_range>0</time_range>
+    + <time_range>0 0.5</time_range>
+    02 few-rows, error, in any: A motion has less than six rows. OpenSim lays a spline through six at least.
+    - <coordinates_file>short.mot</coordinates_file>
+    + <coordinates_file>leg.mot</coordinates_file>
+    03 impossible-times, error, in dynamics: A tool or an analysis ends before it begins, or at no number. It fails, or
+    goes by other times.
+    - <time_range>0.5 0</time_range>
+    + <time_range>0 0.5</time_range>
+    04 too-short-for-control, error, in control: Computed muscle control has too little time. It needs 0.03 s for the
+    first states, and one window.
+    - <initial_time>0</initial_time> <final_time>0.02</final_time>
+    + <initial_time>0</initial_time> <final_time>0.5</final_time>
+    05 no-data-at-times, error, in dynamics: A tool runs wholly before or after its data. It fails or crashes.
+    - <time_range>5 6</time_range>
+    + <time_range>0 0.5</time_range>
+    06 stops-at-default, warning, in ik: A tool is given no end and its data go on. Inverse kinematics stops at 2 s:
+    OpenSim 4.6 means to take all there is, and does not.
+    - <marker_file>slow.trc</marker_file>
+    + <marker_file>slow.trc</marker_file> <time_range>0 2.5</time_range>
+    07 data-end-early, warning, in dynamics: The data end before the tool does. Some tools stop there without a word,
+    others go on as a spline does.
+    - <time_range>0 9</time_range>
+    + <time_range>0 0.5</time_range>
+    08 data-begin-late, warning, in dynamics: The data begin after the tool does. Some tools begin there without a word,
+    others before, as a spline does.
+    - <time_range>-1 0.5</time_range>
+    + <time_range>0 0.5</time_range>
     """
     for item in setup.having("time_range"):
         count = len(item.time_range)
         if count != 2 and getattr(item, "apply", True):
             fate, severity = ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
-            found(f"a range has two times, this one {count}: OpenSim {fate}", item, tag="time_range", severity=severity)
+            found(
+                f"a range has two times, this one {count}: OpenSim {fate}",
+                item, tag="time_range", severity=severity, fault="time-count",
+            )  # fmt: skip
     for item, tag, motion in motions(setup):
         if 0 < motion.rows.count < 6:
             found(
                 f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim lays a spline through six at least",
-                item, tag=tag, severity=ERROR,
+                item, tag=tag, fault="few-rows",
             )  # fmt: skip
     for item, tags, first, last in _ranges(setup):
         if any(number != number for number in (first, last)):
@@ -63,7 +103,10 @@ def time_outside_data(setup: Setup, found: Found) -> None:
                 ("takes all times", WARNING) if is_a(item, "IMUInverseKinematicsTool") else ("refuses it", ERROR)
             )
             tag = tags[0] if first != first else tags[-1]
-            found(f"a time of {called(item)} is no number: OpenSim {fate}", item, tag=tag, severity=severity)
+            found(
+                f"a time of {called(item)} is no number: OpenSim {fate}",
+                item, tag=tag, severity=severity, fault="impossible-times",
+            )  # fmt: skip
             continue
         if first > last or (first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")):
             # Nobody knows which of the two is wrong.
@@ -71,7 +114,7 @@ def time_outside_data(setup: Setup, found: Found) -> None:
             for tag in tags:
                 found(
                     f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim {fate}",
-                    item, tag=tag, severity=severity,
+                    item, tag=tag, severity=severity, fault="impossible-times",
                 )  # fmt: skip
             continue
         window = getattr(item, "cmc_time_window", math.nan)
@@ -79,7 +122,7 @@ def time_outside_data(setup: Setup, found: Found) -> None:
             found(
                 f"{called(item)} runs for {last - first:.4g} s and needs {_FIRST_STATES + window:g} s for its first "
                 "controls: OpenSim fails",
-                item, tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1], severity=ERROR,
+                item, tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1], fault="too-short-for-control",
             )  # fmt: skip
         for name, kind in _data_of(item):
             table = setup.table(name)
@@ -90,7 +133,7 @@ def time_outside_data(setup: Setup, found: Found) -> None:
             if first > span[1] + slack or last < span[0] - slack:
                 found(
                     f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
-                    item, tag=tags[0] if first > span[1] else tags[-1], severity=ERROR,
+                    item, tag=tags[0] if first > span[1] else tags[-1], fault="no-data-at-times",
                 )  # fmt: skip
                 continue
             specs = field_specs(type(item))
@@ -99,12 +142,18 @@ def time_outside_data(setup: Setup, found: Found) -> None:
                 found(
                     f"{called(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, and '{name}' goes on to "
                     f"{span[1]:g} s",
-                    item, tag=tags[-1],
+                    item, tag=tags[-1], fault="stops-at-default",
                 )  # fmt: skip
             if said[-1] and math.isfinite(last) and last > span[1] + slack:
-                found(f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}", item, tag=tags[-1])
+                found(
+                    f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}",
+                    item, tag=tags[-1], fault="data-end-early",
+                )  # fmt: skip
             if said[0] and math.isfinite(first) and first < span[0] - slack:
-                found(f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}", item, tag=tags[0])
+                found(
+                    f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}",
+                    item, tag=tags[0], fault="data-begin-late",
+                )  # fmt: skip
 
 
 def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:

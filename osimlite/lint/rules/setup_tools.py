@@ -1,4 +1,4 @@
-"""OSIM852 and OSIM853: settings of tools that cannot work, or do not what they seem to."""
+"""OSIM852: settings of tools that cannot work, or do not what they seem to."""
 
 from __future__ import annotations
 
@@ -7,35 +7,69 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.lint.diagnostic import Severity
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
-from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
+from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.tree import is_a
 from osimlite.text import listed
 
-_SETTINGS: tuple[tuple[str, str, Callable[[Any], bool], str, Severity], ...] = (
-    ("InverseKinematicsToolBase", "accuracy", lambda value: 0.01 < value < math.inf,
-     "the accuracy is {:g}: poses are hardly fitted at all", WARNING),
-    ("InverseKinematicsToolBase", "accuracy", lambda value: value == 0.0, "an accuracy of 0 is never reached", WARNING),
-    ("AbstractTool", "maximum_number_of_integrator_steps", lambda value: value < 10,
-     "the run ends after {} steps", WARNING),
-    ("Analysis", "step_interval", lambda value: value < 1, "a step interval of {}", WARNING),
-    ("PointKinematics", "point_name", lambda value: not value.strip(),
-     "results of a point without a name get no proper file", WARNING),
-    ("StaticOptimization", "use_model_force_set", lambda value: not value,
-     "without the forces of the model OpenSim crashes", ERROR),
-    ("StaticOptimization", "activation_exponent", lambda value: not value > 1.0,
-     "an exponent of {:g} leaves nothing to be made small", WARNING),
-    ("StaticOptimization", "optimizer_max_iterations", lambda value: value < 10,
-     "the optimizer stops after {} iterations", WARNING),
-    ("StaticOptimization", "optimizer_convergence_criterion", lambda value: value > 0.05,
-     "the optimizer stops at {:g}, far from its goal", WARNING),
+_SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
+    ("pose-accuracy", "InverseKinematicsToolBase", "accuracy", lambda value: 0.01 < value < math.inf,
+     "the accuracy is {:g}: poses are hardly fitted at all"),
+    ("pose-accuracy", "InverseKinematicsToolBase", "accuracy", lambda value: value == 0.0,
+     "an accuracy of 0 is never reached"),
+    ("few-integrator-steps", "AbstractTool", "maximum_number_of_integrator_steps", lambda value: value < 10,
+     "the run ends after {} steps"),
+    ("step-interval", "Analysis", "step_interval", lambda value: value < 1, "a step interval of {}"),
+    ("unnamed-point", "PointKinematics", "point_name", lambda value: not value.strip(),
+     "results of a point without a name get no proper file"),
+    ("without-model-forces", "StaticOptimization", "use_model_force_set", lambda value: not value,
+     "without the forces of the model OpenSim crashes"),
+    ("activation-exponent", "StaticOptimization", "activation_exponent", lambda value: not value > 1.0,
+     "an exponent of {:g} leaves nothing to be made small"),
+    ("few-optimizer-iterations", "StaticOptimization", "optimizer_max_iterations", lambda value: value < 10,
+     "the optimizer stops after {} iterations"),
+    ("loose-optimizer-convergence", "StaticOptimization", "optimizer_convergence_criterion", lambda value: value > 0.05,
+     "the optimizer stops at {:g}, far from its goal"),
 )  # fmt: skip
-"""Of the objects of a class, a property, whether its value is none to work with, and what is said of it then."""
+"""By fault the class and the property, whether its value is none to work with, and what is said of it then."""
 
 
-@rule("OSIM852", "tool-setting", severity=ERROR, mends="unsafe", about="document")
+def _tool(kind: str, *lines: str, model: str = "leg.osim") -> str:
+    inside = "".join(f"    {line}\n" for line in (f"<model_file>{model}</model_file>", *lines))
+    return f'```setup\n<{kind} name="run">\n{inside}</{kind}>\n```'
+
+
+def _analysis(start: str, end: str = "", model: str = "leg.osim") -> str:
+    inside = f"{start}\n                {{}}\n            {end}" if end else "{}"
+    objects = f"        <objects>\n            {inside}\n        </objects>"
+    analyses = f'<AnalysisSet name="analyses">\n{objects}\n    </AnalysisSet>'
+    settled = "<solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>"
+    return _tool("AnalyzeTool", "<coordinates_file>leg.mot</coordinates_file>", settled, analyses, model=model)
+
+
+_TRACKING = (
+    "<initial_time>0</initial_time>", "<final_time>0.5</final_time>",
+    "<desired_kinematics_file>leg.mot</desired_kinematics_file>", "<task_set_file>tasks.xml</task_set_file>",
+)  # fmt: skip
+_MARKERS = "<marker_file>leg.trc</marker_file>", "<output_motion_file>ik.mot</output_motion_file>"
+FRAMES = {
+    "ik": _tool("InverseKinematicsTool", "{}", *_MARKERS),
+    "forward": _tool("ForwardTool", "{}"),
+    "rra": _tool("RRATool", *_TRACKING, "{}", model="muscle.osim"),
+    "analyze": _tool("AnalyzeTool", "<coordinates_file>leg.mot</coordinates_file>", "{}"),
+    "analyses": _analysis("", model="muscle.osim"),
+    "optimization": _analysis('<StaticOptimization name="optimization">', "</StaticOptimization>"),
+    "kinematics": _analysis('<Kinematics name="kinematics">', "</Kinematics>"),
+    "point": _analysis('<PointKinematics name="point"> <body_name>shank</body_name>', "</PointKinematics>"),
+    "muscles": _analysis('<MuscleAnalysis name="muscles">', "</MuscleAnalysis>"),
+    "reaction": _analysis('<JointReaction name="loads"> <joint_names>hip knee</joint_names>', "</JointReaction>"),
+    "forces": '```setup\n<ForceSet name="forces">\n    <objects>\n        {}\n    </objects>\n</ForceSet>\n```',
+}
+"""What the examples of OSIM852 stand in."""
+
+
+@rule("OSIM852", "tool-setting", severity=ERROR, about="document", frames=FRAMES)
 def tool_setting(setup: Setup, found: Found) -> None:
     """A tool has a setting with which it cannot work.
 
@@ -47,90 +81,183 @@ def tool_setting(setup: Setup, found: Found) -> None:
 
     Some make OpenSim crash or run for ever, some give other results without a word.
 
-    ```setup
-      <InverseKinematicsTool name="ik">
-          <model_file>leg.osim</model_file>
-    -     <accuracy>0.5</accuracy>
-    +     <accuracy>1e-5</accuracy>
-          <marker_file>leg.trc</marker_file>
-          <output_motion_file>ik.mot</output_motion_file>
-      </InverseKinematicsTool>
-    ```
+    01 pose-accuracy, warning, in ik: The accuracy of inverse kinematics is above 0.01, or 0. Poses are hardly fitted,
+    or the search does not end.
+    - <accuracy>0.5</accuracy>
+    + <accuracy>1e-5</accuracy>
+    02 few-integrator-steps, warning, in forward: A tool may take less than 10 steps. The run ends before its time.
+    - <maximum_number_of_integrator_steps>5</maximum_number_of_integrator_steps>
+    + <maximum_number_of_integrator_steps>5000</maximum_number_of_integrator_steps>
+    03 step-interval, warning, in kinematics: A step interval is below 1. It says after how many steps there is a row.
+    - <step_interval>0</step_interval>
+    + <step_interval>1</step_interval>
+    04 unnamed-point, warning, in point: The kinematics of a point are asked for without a name of it. The files of the
+    results are called by that name.
+    - <point_name></point_name>
+    + <point_name>heel</point_name>
+    05 without-model-forces, error, in optimization: The forces of the model are to be left out. OpenSim crashes.
+    - <use_model_force_set>false</use_model_force_set>
+    + <use_model_force_set>true</use_model_force_set>
+    06 activation-exponent, warning, in optimization: The exponent of activations is 1 or less. Their sum is then no
+    measure that has one smallest value.
+    - <activation_exponent>1</activation_exponent>
+    + <activation_exponent>2</activation_exponent>
+    07 few-optimizer-iterations, warning, in optimization: The optimizer has under 10 iterations. It stops too early.
+    - <optimizer_max_iterations>5</optimizer_max_iterations>
+    + <optimizer_max_iterations>100</optimizer_max_iterations>
+    08 loose-optimizer-convergence, warning, in optimization: The optimizer may stop far from its goal. With a criterion
+    above 0.05 activations stay as they come.
+    - <optimizer_convergence_criterion>0.5</optimizer_convergence_criterion>
+    + <optimizer_convergence_criterion>1e-4</optimizer_convergence_criterion>
+    09 integrator-error-tolerance, error, in forward: The error tolerance of the integrator is not positive. It is never
+    met, and OpenSim runs for ever.
+    - <integrator_error_tolerance>0</integrator_error_tolerance>
+    + <integrator_error_tolerance>1e-5</integrator_error_tolerance>
+    10 no-residual-forces, error, in rra: Residual reduction is given no forces. It controls what force_set_files
+    have, and fails without them.
+      <replace_force_set>true</replace_force_set>
+    + <force_set_files>residuals.xml</force_set_files>
+    11 replaced-forces, warning, in analyze: The forces of the model are replaced. Its muscles are gone, and what is
+    computed is that of another model.
+    - <replace_force_set>true</replace_force_set>
+    + <replace_force_set>false</replace_force_set>
+      <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
+    12 muscles-left-in-model, error, in rra: Residual reduction leaves the muscles in the model. OpenSim crashes.
+      <force_set_files>residuals.xml</force_set_files>
+    - <replace_force_set>false</replace_force_set>
+    + <replace_force_set>true</replace_force_set>
+    13 no-adjusted-body, error, in rra: A center of mass is to be moved, of no body. OpenSim refuses the setup.
+      <force_set_files>residuals.xml</force_set_files> <replace_force_set>true</replace_force_set>
+      <adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>
+      <output_model_file>adjusted.osim</output_model_file>
+    + <adjusted_com_body>thigh</adjusted_com_body>
+    14 no-analysis, error, in analyze: An analyze tool has no analysis. OpenSim refuses it.
+    + <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
+    15 analysis-off, info, in kinematics: An analysis is off. It writes nothing.
+    - <on>false</on>
+    16 analyses-of-one-name, warning, in analyses: Two analyses have one name. They write to the same files.
+    - <Kinematics name="run"/> <Kinematics name="run"/>
+    + <Kinematics name="run"/> <Kinematics name="again"/>
+    17 unactuated-root, warning, in analyses: No actuator moves the coordinates between the model and ground. Static
+    optimization fails without residual actuators.
+    - <StaticOptimization name="optimization"/>
+    + <Kinematics name="kinematics"/>
+    18 nothing-analyzed, warning, in kinematics: An analysis names no body or coordinate. Nothing is written.
+    - <coordinates></coordinates>
+    + <coordinates>all</coordinates>
+    19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed at coordinates without equilibrium. Fibers
+    stay at their default lengths, of which the coordinates tell nothing.
+      <AnalysisSet name="analyses"> <objects> <MuscleAnalysis name="muscles"/> </objects> </AnalysisSet>
+    - <solve_for_equilibrium_for_auxiliary_states>false</solve_for_equilibrium_for_auxiliary_states>
+    + <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>
+    20 no-moment-arm-coordinate, error, in muscles: A muscle analysis names no coordinate for moment arms.
+    OpenSim fails.
+    - <moment_arm_coordinate_list></moment_arm_coordinate_list>
+    + <moment_arm_coordinate_list>all</moment_arm_coordinate_list>
+    21 reaction-on-neither, error, mends unsafe, in reaction: A joint reaction is asked for on neither child nor parent.
+    OpenSim knows these two words only, and refuses others.
+    - <apply_on_bodies>childs</apply_on_bodies>
+    + <apply_on_bodies>child</apply_on_bodies>
+    22 reaction-count, error, in reaction: Joints and the bodies that their reactions act on differ in number. OpenSim
+    takes none, one for all, or one for each, and refuses else.
+    - <apply_on_bodies>child parent child</apply_on_bodies>
+    + <apply_on_bodies>child parent</apply_on_bodies>
+    23 force-of-one-name, warning, in forces: A force that a tool adds is called as one of the model. It takes the place
+    of that.
+    - <CoordinateActuator name="knee_limit"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    + <CoordinateActuator name="reserve"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    24 force-off, info, in forces: A force of a set is off. It does not act.
+      <CoordinateActuator name="reserve">
+    - <appliesForce>false</appliesForce>
+      <coordinate>knee_angle</coordinate> </CoordinateActuator>
+    25 controller-off, info, in forward: A controller of a tool is off. What it would drive has no control.
+      <ControllerSet name="controllers"> <objects>
+    - <ControlSetController name="controls"> <enabled>false</enabled> </ControlSetController>
+      </objects> </ControllerSet>
     """
-    for of_class, tag, is_wrong, told, severity in _SETTINGS:
+    for fault, of_class, tag, is_wrong, told in _SETTINGS:
         for item in setup.named(of_class):
             value = getattr(item, tag)
             if is_wrong(value):
-                found(told.format(value), item, tag=tag, severity=severity)
+                found(told.format(value), item, fault=fault, tag=tag)
     for tool in setup.named("AbstractTool"):
         if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
             found(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
                 tool, tag="integrator_error_tolerance", severity=None if is_a(tool, "ForwardTool") else WARNING,
+                fault="integrator-error-tolerance",
             )  # fmt: skip
         if is_a(tool, "RRATool") and not tool.force_set_files:
             found(
-                f"{called(tool)} is given no forces that it could control: OpenSim fails", tool, tag="force_set_files"
-            )
+                f"{called(tool)} is given no forces that it could control: OpenSim fails",
+                tool, tag="force_set_files", fault="no-residual-forces",
+            )  # fmt: skip
         if tool.replace_force_set and not is_a(tool, "RRATool"):
             found(
                 "the forces of force_set_files replace those of the model: its muscles are gone",
-                tool, tag="replace_force_set", severity=WARNING,
+                tool, tag="replace_force_set", fault="replaced-forces",
             )  # fmt: skip
         if is_a(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
             found(
                 "the muscles of the model are left in it, and OpenSim crashes: the forces of force_set_files are to "
                 "replace them",
-                tool, tag="replace_force_set",
+                tool, tag="replace_force_set", fault="muscles-left-in-model",
             )  # fmt: skip
         if is_a(tool, "RRATool") and tool.adjust_com_to_reduce_residuals and not str(tool.adjusted_com_body).strip():
             found(
                 f"{called(tool)} is to move a center of mass, and adjusted_com_body names no body: OpenSim refuses it",
-                tool, tag="adjusted_com_body",
+                tool, tag="adjusted_com_body", fault="no-adjusted-body",
             )  # fmt: skip
         if is_a(tool, "AnalyzeTool") and not tool.analysis_set.objects:
-            found(f"{called(tool)} has no analysis: OpenSim refuses it", tool)
+            found(f"{called(tool)} has no analysis: OpenSim refuses it", tool, fault="no-analysis")
     names = Counter(item.name for item in setup.named("Analysis"))
     for analysis in setup.named("Analysis"):
         if not analysis.on:
-            found(f"{called(analysis)} is off", analysis, tag="on", severity=INFO)
+            found(f"{called(analysis)} is off", analysis, tag="on", fault="analysis-off")
         if names[analysis.name] > 1:
             names[analysis.name] = 0
             found(
-                f"two analyses are called '{analysis.name}', and write to the same files", analysis, attribute="name",
-                severity=WARNING,
+                f"two analyses are called '{analysis.name}', and write to the same files",
+                analysis, attribute="name", fault="analyses-of-one-name",
             )  # fmt: skip
         if is_a(analysis, "StaticOptimization"):
             carrying = _carried_by_none(setup)
             if carrying:
                 found(
-                    f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails", analysis,
-                    severity=WARNING,
+                    f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails",
+                    analysis, fault="unactuated-root",
                 )  # fmt: skip
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
-                found(f"{called(analysis)} names no {what}: nothing is written", analysis, tag=tag, severity=WARNING)
+                found(
+                    f"{called(analysis)} names no {what}: nothing is written",
+                    analysis, tag=tag, fault="nothing-analyzed",
+                )  # fmt: skip
         if is_a(analysis, "MuscleAnalysis") and analysis.on:
             for tool in setup.named("AnalyzeTool"):
                 if is_given(tool.coordinates_file) and not tool.solve_for_equilibrium_for_auxiliary_states:
                     found(
                         "coordinates tell nothing of fibers, which stay at their default lengths: "
                         "solve_for_equilibrium_for_auxiliary_states is false",
-                        tool, tag="solve_for_equilibrium_for_auxiliary_states", severity=WARNING,
+                        tool, tag="solve_for_equilibrium_for_auxiliary_states", fault="fibers-not-in-equilibrium",
                     )  # fmt: skip
         if is_a(analysis, "MuscleAnalysis") and not analysis.moment_arm_coordinate_list:
-            found("no coordinate for moment arms: OpenSim fails", analysis, tag="moment_arm_coordinate_list")
+            found(
+                "no coordinate for moment arms: OpenSim fails",
+                analysis, tag="moment_arm_coordinate_list", fault="no-moment-arm-coordinate",
+            )  # fmt: skip
         if is_a(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
                 if word.lower() not in ("child", "parent"):
                     found(
-                        f"'{word}' is neither child nor parent: OpenSim refuses it", analysis, tag="apply_on_bodies",
-                        word=word, suggestion=nearest_name(word, ["child", "parent"]),
+                        f"'{word}' is neither child nor parent: OpenSim refuses it",
+                        analysis, tag="apply_on_bodies", word=word,
+                        suggestion=nearest_name(word, ["child", "parent"]), fault="reaction-on-neither",
                     )  # fmt: skip
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
                 found(
                     f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
-                    analysis, tag="apply_on_bodies",
+                    analysis, tag="apply_on_bodies", fault="reaction-count",
                 )  # fmt: skip
     user = setup.tool[1] if setup.tool is not None else None
     if setup.tree is not None and getattr(user, "replace_force_set", True) is False:
@@ -138,16 +265,16 @@ def tool_setting(setup: Setup, found: Found) -> None:
         for force in (force for forces in setup.named("ForceSet") for force in forces.objects):
             if force.name in present:
                 found(
-                    f"the model has a force '{force.name}' already, whose place this one takes", force,
-                    attribute="name", severity=WARNING,
+                    f"the model has a force '{force.name}' already, whose place this one takes",
+                    force, attribute="name", fault="force-of-one-name",
                 )  # fmt: skip
     for forces in setup.named("ForceSet"):
         for force in members(forces, "Force"):
             if not force.appliesForce:
-                found(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
+                found(f"{called(force)} does not act", force, tag="appliesForce", fault="force-off")
     for controller in setup.named("Controller") if setup.tool is not None else ():
         if not controller.enabled:
-            found(f"{called(controller)} is off", controller, tag="enabled", severity=INFO)
+            found(f"{called(controller)} is off", controller, tag="enabled", fault="controller-off")
 
 
 def _carried_by_none(setup: Setup) -> list[str]:
@@ -166,84 +293,3 @@ def _carried_by_none(setup: Setup) -> list[str]:
     joints: Any = setup.tree.of_class("Joint").values()
     on_ground = (joint for joint in joints if str(joint.socket_parent_frame).rpartition("/")[2].startswith("ground"))
     return [item.name for joint in on_ground for item in joint.coordinates if not setup.is_bound(item.name)]
-
-
-@rule("OSIM853", "scale-setting", severity=ERROR, mends="both", about="document")
-def scale_setting(setup: Setup, found: Found) -> None:
-    """A setting of the scale tool has no effect, or makes it fail.
-
-    Looks at the order of scaling, at measurements without a pair of two different markers, at axes other than X, Y and
-    Z, at the mass, at steps that are left out, and at the times that are averaged.
-
-    A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
-    the body keeps its size.
-
-    ```setup
-      <MeasurementSet name="measurements">
-          <objects>
-              <Measurement name="thigh">
-                  <MarkerPairSet name="pairs">
-    -                 <objects> <MarkerPair name="first"> <markers>asis</markers> </MarkerPair> </objects>
-    +                 <objects> <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair> </objects>
-                  </MarkerPairSet>
-              </Measurement>
-          </objects>
-      </MeasurementSet>
-    ```
-    """
-    for tool in setup.named("ScaleTool"):
-        scaler = tool.model_scaler
-        if tool.mass == 0.0 or (tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution):
-            found(f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is", tool, tag="mass", severity=WARNING)
-    for scaler in setup.named("ModelScaler"):
-        if not scaler.apply:
-            found("the model is not scaled", scaler, tag="apply", severity=WARNING)
-            continue
-        for word in scaler.scaling_order:
-            if word not in ("measurements", "manualScale"):
-                found(
-                    f"'{word}' is no way of scaling: OpenSim refuses it", scaler, tag="scaling_order", word=word,
-                    suggestion=nearest_name(word, ["measurements", "manualScale"]),
-                )  # fmt: skip
-        measures = "measurements" in scaler.scaling_order
-        if scaler.scaling_order[:1] == ("manualScale",) and measures:
-            found(
-                "measurements come last and overwrite what is scaled by hand", scaler, tag="scaling_order",
-                severity=WARNING,
-            )  # fmt: skip
-        if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
-            found(
-                f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}", scaler, tag="marker_file",
-                severity=WARNING,
-            )  # fmt: skip
-    for measurement in setup.named("Measurement"):
-        if not measurement.apply:
-            continue
-        pairs = members(measurement.marker_pair_set, "MarkerPair")
-        if not pairs:
-            found(f"{called(measurement)} has no pair of markers: it measures nothing", measurement, severity=WARNING)
-        for pair in pairs:
-            if len(pair.markers) != 2:
-                found(f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes", pair, tag="markers")
-            elif pair.markers[0] == pair.markers[1]:
-                found(
-                    f"both markers of a pair are '{pair.markers[0]}': OpenSim leaves {called(measurement)} out", pair,
-                    tag="markers", severity=WARNING,
-                )  # fmt: skip
-    for scale in setup.named("BodyScale"):
-        for axis in scale.axes:
-            if axis not in ("X", "Y", "Z"):
-                found(
-                    f"'{axis}' is none of the axes X, Y and Z: OpenSim leaves it out", scale, tag="axes", word=axis,
-                    suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None,
-                )  # fmt: skip
-    for placer in setup.named("MarkerPlacer"):
-        if not placer.apply:
-            found("the markers are not placed, and the tool says that it failed", placer, tag="apply", severity=WARNING)
-        elif not is_given(placer.output_model_file):
-            found("the model with its markers placed is not written", placer, tag="output_model_file", severity=WARNING)
-        if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
-            found(
-                f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
-                placer, tag="time_range",
-            )  # fmt: skip

@@ -272,7 +272,28 @@ def _is_positive(text: str) -> bool:
         return False
 
 
-@rule("OSIM804", "column-label", severity=ERROR, mends="safe", about="table")
+_ROWS = "0.0→0.5→0.1\n0.1→0.6→0.1\n```"
+_STORAGE = f"```sto\nknee\nversion={{}}\nnRows=2\nnColumns=3\nendheader\n{{{{}}}}\n{_ROWS}"
+_MARKERS = """```trc
+PathFileType→4→(X/Y/Z)→walk.trc
+DataRate→CameraRate→NumFrames→NumMarkers→Units→OrigDataRate→OrigDataStartFrame→OrigNumFrames
+100→100→2→2→m→100→1→2
+{}
+→→X1→Y1→Z1→X2→Y2→Z2
+
+1→0.01→0.1→0.9→0.1→0.1→0.5→0.1
+2→0.02→0.1→0.9→0.1→0.1→0.5→0.1
+```"""
+_FRAMES = {
+    "old": _STORAGE.format(1),
+    "newer": _STORAGE.format(3),
+    "start": "```sto\nknee\nversion=1\nnRows=2\n{}\n```",
+    "header": "```sto\nknee\nversion=3\n{}\n```",
+    "markers": _MARKERS,
+}
+
+
+@rule("OSIM804", "column-label", severity=ERROR, about="table", frames=_FRAMES)
 def column_label(table: Table, found: Found) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
@@ -284,17 +305,45 @@ def column_label(table: Table, found: Found) -> None:
     takes no loads from them; of two markers with one name it refuses the file. A blank makes two labels of one, so that
     all that follow name the wrong columns.
 
-    ```sto
-      knee
-      version=1
-      nRows=2
-      nColumns=3
+    01 frame-and-time-label, error, mends safe, in markers: The columns of frame and time are called otherwise. OpenSim
+    refuses the file.
+    - Frame#→Times→asis→→→knee
+    + Frame#→Time→asis→→→knee
+    02 marker-label, error, in markers: A marker has no label, or one with a blank. Without one OpenSim refuses the
+    file, with a blank it is the name of no marker of a model.
+    - Frame#→Time→l asis→→→knee
+    + Frame#→Time→asis→→→knee
+    03 no-labels, error, in header: A table ends before its labels. OpenSim refuses the file.
       endheader
-    - time knee_angle knee_angle
-    + time knee_angle_r knee_angle_l
-      0.0 0.5 0.1
-      0.1 0.6 0.1
-    ```
+    + time→hip→knee
+    + 0.0→0.5→0.1
+    + 0.1→0.6→0.1
+    04 commas-between-labels, error, in start: Commas separate the columns of a storage file. OpenSim knows tabs and
+    blanks only, and refuses it.
+    - nColumns=1
+    + nColumns=3
+      endheader
+    - time,hip,knee
+    - 0.0,0.5,0.1
+    - 0.1,0.6,0.1
+    + time→hip→knee
+    + 0.0→0.5→0.1
+    + 0.1→0.6→0.1
+    05 no-time-column, error, mends safe, in old: The first column of a storage file is not called time. OpenSim refuses
+    the table.
+    - Time→hip→knee
+    + time→hip→knee
+    06 time-not-first, error, in old: The time is not in the first column. OpenSim takes what stands there for the time.
+    - hip→time→knee
+    + time→hip→knee
+    07 blanks-between-labels, warning, in newer: Blanks separate the labels of a table of version 2 or 3. Newer tools of
+    OpenSim's refuse it.
+    - time hip knee
+    + time→hip→knee
+    08 label-twice, warning, in old: Two columns have one label. By its name OpenSim finds the first one only; of
+    markers it refuses the file.
+    - time→knee→knee
+    + time→hip→knee
     """
     labels, header = table.labels, table.header
     if isinstance(header, MarkerHeader):
@@ -303,36 +352,44 @@ def column_label(table: Table, found: Found) -> None:
                 found(
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
                     at=word.at, suggestion=nearest(word.text, [right], cutoff=60), certain=True,
+                    fault="frame-and-time-label",
                 )  # fmt: skip
         cells = header.lines[3].split("\t") if header.lines[3:] else []
         empty = [place for place in range(2, len(cells) - 2, 3) if not cells[place].strip()]
         if empty and len(labels) < len(cells[2:]) // 3:
             found(
-                "a marker has no label: OpenSim refuses the file", at=Position(4, len("\t".join(cells[: empty[0]])) + 2)
-            )
+                "a marker has no label: OpenSim refuses the file",
+                at=Position(4, len("\t".join(cells[: empty[0]])) + 2), fault="marker-label",
+            )  # fmt: skip
         for label in labels:
             if " " in label.text:
-                found(f"the marker '{label.text}' has a blank in its name, which no marker of a model has", at=label.at)
+                found(
+                    f"the marker '{label.text}' has a blank in its name, which no marker of a model has",
+                    at=label.at, fault="marker-label",
+                )  # fmt: skip
     elif not labels:
         if header.end.text:
-            found("the table ends before its labels", at=header.end.at)
+            found("the table ends before its labels", at=header.end.at, fault="no-labels")
         return
     elif labels[0].text != "time":
         first, at = labels[0]
         near = "time" if first.lower() in ("time", "t", "times", "time(s)") else None
         if "," in first:
-            found("tabs or blanks separate the columns of a storage file, not commas: OpenSim refuses it", at=at)
+            found(
+                "tabs or blanks separate the columns of a storage file, not commas: OpenSim refuses it",
+                at=at, fault="commas-between-labels",
+            )  # fmt: skip
         elif all(label.text not in ("time", "range") for label in labels):
             found(
                 f"the first column is '{first}': OpenSim needs one called 'time'",
-                at=at, suggestion=near, certain=True,
+                at=at, suggestion=near, certain=True, fault="no-time-column",
             )  # fmt: skip
         else:
-            found(f"the first column is '{first}': OpenSim takes it for the time", at=at)
+            found(f"the first column is '{first}': OpenSim takes it for the time", at=at, fault="time-not-first")
     elif header.is_strict and labels[1:] and not header.has_tabs:
         found(
             f"blanks separate the columns of a table of version {header.form}: OpenSim's newer tools refuse it",
-            at=labels[1].at, severity=WARNING,
+            at=labels[1].at, fault="blanks-between-labels",
         )  # fmt: skip
     places: dict[str, list[Position]] = {}
     for label in labels:
@@ -341,5 +398,8 @@ def column_label(table: Table, found: Found) -> None:
         if again:
             fate = "refuses the file" if table.is_markers else "does not find this one by its name"
             more = f"; there are {counted(len(again) - 1, 'more column')} of this name" if again[1:] else ""
-            severity = None if table.is_markers else WARNING
-            found(f"a column is called '{name}' already: OpenSim {fate}{more}", at=again[0], severity=severity)
+            severity = ERROR if table.is_markers else None
+            found(
+                f"a column is called '{name}' already: OpenSim {fate}{more}",
+                at=again[0], severity=severity, fault="label-twice",
+            )  # fmt: skip

@@ -1,0 +1,74 @@
+"""The faults that one rule tells apart: each has a code, a name and a page of its own, so that it can be ignored alone.
+
+They stand in the docstring of the rule, behind what is said of all of them::
+
+    01 loose-accuracy, warning, in ik: Inverse kinematics hardly fits poses. It stops where the error is still large.
+    - <accuracy>0.5</accuracy>
+    + <accuracy>1e-5</accuracy>
+
+The code of a fault is that of its rule and two digits more, so that whatever names the rule (`--select`, a comment, a
+setting, a baseline) means all its faults. `ik` is the document around the lines of the example, and a fault that has
+mends says of what kind: ``error, mends safe, in ik``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from textwrap import indent
+from typing import NamedTuple
+
+_HEAD = re.compile(r"(\d\d) ([a-z-]+), (error|warning|info)(?:, mends (\w+))?, in (\w+): ")
+
+
+class Fault(NamedTuple):
+    """One fault as the docstring of its rule has it.
+
+    Attributes:
+        number: the end of its code.
+        name: by which it can be selected and ignored too.
+        severity: of its findings, unless one says otherwise.
+        mends: of what kind its mends are.
+        frame: the document around the example, in which a line with {} stands for that.
+        text: what it finds, as one sentence, and why that is bad.
+        lines: of the example, which begin with `-` if they fail, with `+` if they mend that.
+    """
+
+    number: str
+    name: str
+    severity: str
+    mends: str
+    frame: str
+    text: str
+    lines: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """What it finds."""
+        return self.text.partition(". ")[0].rstrip(".") + "."
+
+    def page(self, group: str) -> str:
+        """Its page; `group` is the code and the name of its rule."""
+        why = self.text.partition(". ")[2] or self.text
+        return (
+            f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is one of the group "
+            f"`{group}`.\n\n## Why is this bad\n{why}\n\n## Example\n{self._example('+')}\n\n"
+            f"## Use instead\n{self._example('-')}"
+        )
+
+    def _example(self, left_out: str) -> str:
+        lines = [line[2:] for line in self.lines if line[0] != left_out]
+        return re.sub(
+            r"^( *)\{\}\n", lambda at: indent("".join(f"{x}\n" for x in lines), at[1]), self.frame, flags=re.M
+        )
+
+
+def faults_in(docstring: str, frames: Mapping[str, str]) -> Iterator[Fault]:
+    """The faults that the docstring of a rule lists; `frames` are the documents of their examples by name."""
+    for part in re.split(r"^(?=\d\d )", docstring.split("\n\n", 3)[3], flags=re.MULTILINE)[1:]:
+        head = _HEAD.match(part)
+        assert head is not None, part
+        words = part[head.end() :].splitlines()
+        lines = [line for line in words if line[:2] in ("- ", "+ ", "  ")]
+        text = " ".join(line for line in words if line not in lines)
+        yield Fault(head[1], head[2], head[3], head[4] or "", frames[head[5]], text, tuple(lines))

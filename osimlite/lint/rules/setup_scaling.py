@@ -1,0 +1,179 @@
+"""OSIM853: settings of the scale tool that have no effect, or make it fail."""
+
+from __future__ import annotations
+
+from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
+from osimlite.lint.words import called, nearest_name
+
+_SCALING = """\
+<ScaleTool name="scale">
+    MASS
+    <GenericModelMaker> <model_file>leg.osim</model_file> </GenericModelMaker>
+    <ModelScaler>
+        SCALER
+        <MeasurementSet name="measurements"> <objects>
+            <Measurement name="thigh">
+                PAIRS
+                <BodyScaleSet name="scales"> <objects> AXES </objects> </BodyScaleSet>
+            </Measurement>
+        </objects> </MeasurementSet>
+        <time_range>0 0.5</time_range> <output_model_file>scaled.osim</output_model_file>
+    </ModelScaler>
+    <MarkerPlacer>
+        PLACER
+    </MarkerPlacer>
+</ScaleTool>"""
+_USUAL = {
+    "MASS": "<mass>70</mass>",
+    "SCALER": "<scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>",
+    "PAIRS": '<MarkerPairSet name="pairs"> <objects> <MarkerPair name="thigh"> <markers>asis knee_marker</markers> '
+    "</MarkerPair> </objects> </MarkerPairSet>",
+    "AXES": '<BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>',
+    "PLACER": "<marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range> "
+    "<output_model_file>placed.osim</output_model_file>",
+}
+
+
+def _scaling(part: str) -> str:
+    """A scale tool, one part of which is that of the example."""
+    text = _SCALING
+    for name, usual in _USUAL.items():
+        text = text.replace(name, "{}" if name == part else usual)
+    text = text.replace("<objects> {} </objects>", "<objects>\n                    {}\n                </objects>")
+    return f"```setup\n{text}\n```"
+
+
+@rule(
+    "OSIM853", "scale-setting", severity=ERROR, about="document",
+    frames={part.lower(): _scaling(part) for part in _USUAL},
+)  # fmt: skip
+def scale_setting(setup: Setup, found: Found) -> None:
+    """A setting of the scale tool has no effect, or makes it fail.
+
+    Looks at the order of scaling, at measurements without a pair of two different markers, at axes other than X, Y and
+    Z, at the mass, at steps that are left out, and at the times that are averaged.
+
+    A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
+    the body keeps its size.
+
+    01 mass-not-scaled, warning, in mass: The mass to scale to is not positive. OpenSim leaves the mass as it is.
+    - <mass>0</mass>
+    + <mass>70</mass>
+    02 model-not-scaled, warning, in scaler: The model scaler does not apply. The model is not scaled.
+    - <apply>false</apply>
+      <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+    03 unknown-scaling, error, mends unsafe, in scaler: The scaling order has a word for no way of scaling. OpenSim
+    knows measurements and manualScale, and refuses others.
+    - <scaling_order>measurement</scaling_order> <marker_file>leg.trc</marker_file>
+    + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+    04 manual-scale-overwritten, warning, in scaler: Measurements come after what is scaled by hand. They overwrite it.
+    - <scaling_order>manualScale measurements</scaling_order> <marker_file>leg.trc</marker_file>
+    + <scaling_order>measurements manualScale</scaling_order> <marker_file>leg.trc</marker_file>
+    05 measured-without-markers, warning, in scaler: A scaler measures and is given no markers. Nothing is measured.
+    - <scaling_order>measurements</scaling_order>
+    + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+    06 measurement-without-pair, warning, in pairs: A measurement has no pair of markers. It measures nothing.
+    - <MarkerPairSet name="pairs"/>
+    + <MarkerPairSet name="pairs"> <objects> <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair> </objects>
+    + </MarkerPairSet>
+    07 marker-pair-count, error, in pairs: A pair has other than two markers. OpenSim crashes.
+      <MarkerPairSet name="pairs"> <objects>
+    - <MarkerPair name="first"> <markers>asis</markers> </MarkerPair>
+    + <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair>
+      </objects> </MarkerPairSet>
+    08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. OpenSim leaves the measurement
+    out.
+      <MarkerPairSet name="pairs"> <objects>
+    - <MarkerPair name="first"> <markers>asis asis</markers> </MarkerPair>
+    + <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair>
+      </objects> </MarkerPairSet>
+    09 unknown-scale-axis, error, mends safe, in axes: A body is scaled along what is no axis. OpenSim leaves out what
+    is not X, Y or Z, without a word, and the body keeps its size.
+    - <BodyScale name="thigh"> <axes>X y</axes> </BodyScale>
+    + <BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>
+    10 markers-not-placed, warning, in placer: The marker placer does not apply. The tool says that it failed.
+    - <apply>false</apply>
+      <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
+      <output_model_file>placed.osim</output_model_file>
+    11 placed-model-not-written, warning, in placer: The model with its markers placed is not written. All that the tool
+    did is lost.
+      <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
+    + <output_model_file>placed.osim</output_model_file>
+    12 static-times, error, in placer: The times of the static trial are none to average over. OpenSim fails.
+      <marker_file>leg.trc</marker_file> <output_model_file>placed.osim</output_model_file>
+    - <time_range>0.5 0.5</time_range>
+    + <time_range>0 0.5</time_range>
+    """
+    for tool in setup.named("ScaleTool"):
+        scaler = tool.model_scaler
+        if tool.mass == 0.0 or (tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution):
+            found(
+                f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is", tool, tag="mass", fault="mass-not-scaled"
+            )
+    for scaler in setup.named("ModelScaler"):
+        if not scaler.apply:
+            found("the model is not scaled", scaler, tag="apply", fault="model-not-scaled")
+            continue
+        for word in scaler.scaling_order:
+            if word not in ("measurements", "manualScale"):
+                found(
+                    f"'{word}' is no way of scaling: OpenSim refuses it",
+                    scaler, tag="scaling_order", word=word,
+                    suggestion=nearest_name(word, ["measurements", "manualScale"]), fault="unknown-scaling",
+                )  # fmt: skip
+        measures = "measurements" in scaler.scaling_order
+        if scaler.scaling_order[:1] == ("manualScale",) and measures:
+            found(
+                "measurements come last and overwrite what is scaled by hand",
+                scaler, tag="scaling_order", fault="manual-scale-overwritten",
+            )  # fmt: skip
+        if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
+            found(
+                f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}",
+                scaler, tag="marker_file", fault="measured-without-markers",
+            )  # fmt: skip
+    for measurement in setup.named("Measurement"):
+        if not measurement.apply:
+            continue
+        pairs = members(measurement.marker_pair_set, "MarkerPair")
+        if not pairs:
+            found(
+                f"{called(measurement)} has no pair of markers: it measures nothing",
+                measurement, fault="measurement-without-pair",
+            )  # fmt: skip
+        for pair in pairs:
+            if len(pair.markers) != 2:
+                found(
+                    f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes",
+                    pair, tag="markers", fault="marker-pair-count",
+                )  # fmt: skip
+            elif pair.markers[0] == pair.markers[1]:
+                found(
+                    f"both markers of a pair are '{pair.markers[0]}': OpenSim leaves {called(measurement)} out",
+                    pair, tag="markers", fault="marker-paired-with-itself",
+                )  # fmt: skip
+    for scale in setup.named("BodyScale"):
+        for axis in scale.axes:
+            if axis not in ("X", "Y", "Z"):
+                found(
+                    f"'{axis}' is none of the axes X, Y and Z: OpenSim leaves it out",
+                    scale, tag="axes", word=axis,
+                    suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None, fault="unknown-scale-axis",
+                )  # fmt: skip
+    for placer in setup.named("MarkerPlacer"):
+        if not placer.apply:
+            found(
+                "the markers are not placed, and the tool says that it failed",
+                placer, tag="apply", fault="markers-not-placed",
+            )  # fmt: skip
+        elif not is_given(placer.output_model_file):
+            found(
+                "the model with its markers placed is not written",
+                placer, tag="output_model_file", fault="placed-model-not-written",
+            )  # fmt: skip
+        if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
+            found(
+                f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
+                placer, tag="time_range", fault="static-times",
+            )  # fmt: skip
