@@ -175,6 +175,7 @@ class Rule:
 
 _RULES: dict[str, Rule] = {}
 _GROUPS: dict[str, Rule] = {}
+_NAMES: set[str] = set()
 
 
 def rule(
@@ -208,8 +209,9 @@ def rule(
 
 
 def _add(table: dict[str, Rule], rule: Rule) -> None:
-    if any(known.code == rule.code or known.name == rule.name for known in (*_RULES.values(), *_GROUPS.values())):
+    if not _NAMES.isdisjoint((rule.code, rule.name)):
         raise ValueError(f"rule {rule.code} {rule.name} is registered twice")
+    _NAMES.update((rule.code, rule.name))
     table[rule.code] = rule
 
 

@@ -13,12 +13,8 @@ mends says of what kind: ``error, mends safe, in ik``.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from textwrap import indent
 from typing import NamedTuple
-
-_HEAD = re.compile(r"(\d\d) ([a-z-]+), (error|warning|info)(?:, mends (\w+))?, in (\w+): ")
 
 
 class Fault(NamedTuple):
@@ -58,17 +54,22 @@ class Fault(NamedTuple):
 
     def _example(self, left_out: str) -> str:
         lines = [line[2:] for line in self.lines if line[0] != left_out]
-        return re.sub(
-            r"^( *)\{\}\n", lambda at: indent("".join(f"{x}\n" for x in lines), at[1]), self.frame, flags=re.M
-        )
+        before, _, after = self.frame.partition("{}\n")
+        before, start, margin = before.rpartition("\n")
+        return before + start + "".join(f"{margin}{line}\n" for line in lines) + after
 
 
 def faults_in(docstring: str, frames: Mapping[str, str]) -> Iterator[Fault]:
     """The faults that the docstring of a rule lists; `frames` are the documents of their examples by name."""
-    for part in re.split(r"^(?=\d\d )", docstring.split("\n\n", 3)[3], flags=re.MULTILINE)[1:]:
-        head = _HEAD.match(part)
-        assert head is not None, part
-        words = part[head.end() :].splitlines()
-        lines = [line for line in words if line[:2] in ("- ", "+ ", "  ")]
-        text = " ".join(line for line in words if line not in lines)
-        yield Fault(head[1], head[2], head[3], head[4] or "", frames[head[5]], text, tuple(lines))
+    parts: list[tuple[str, list[str], list[str]]] = []
+    for line in docstring.split("\n\n", 3)[3].splitlines():
+        if line[:2].isdigit():
+            head, _, text = line.partition(": ")
+            parts.append((head, [text], []))
+        else:
+            _, words, lines = parts[-1]
+            (lines if line[:2] in ("- ", "+ ", "  ") else words).append(line)
+    for head, words, lines in parts:
+        name, severity, *mends, frame = head[3:].split(", ")
+        kind = mends[0].removeprefix("mends ") if mends else ""
+        yield Fault(head[:2], name, severity, kind, frames[frame.removeprefix("in ")], " ".join(words), tuple(lines))

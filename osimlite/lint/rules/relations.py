@@ -34,7 +34,7 @@ from osimlite.schema.functions import (
     Sine,
     StepFunction,
 )
-from osimlite.schema.muscles import Muscle
+from osimlite.schema.tree import is_a
 from osimlite.text import counted
 
 
@@ -107,7 +107,7 @@ def _curve(make: Callable[..., object]) -> _Relation:
         used = {name: getattr(curve, name) for name in type(curve).__annotations__}
         if not all(value is None or math.isfinite(value) for value in used.values()):
             return
-        overwritten = owner.overwritten if isinstance(owner, Muscle) else {}
+        overwritten = owner.overwritten if is_a(owner, "Muscle") else {}
         used |= {name: overwritten[name] for name in used.keys() & overwritten.keys()}
         try:
             make(*used.values())
