@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.lint.measures import Jump
-from osimlite.measuring.sweeps import Sweep, lengths
+from osimlite.measuring.sweeps import Sweep
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.kernels.paths import CONDITIONAL
@@ -29,12 +29,16 @@ class Suspect(NamedTuple):
         excess: by how much the length changes otherwise than next to the interval, m; infinite at a conditional point.
         usual: the change next to it, m.
         sweep: of a coordinate.
+        path: number of the path.
+        pose: number of the pose before the interval.
         ends: of the interval.
     """
 
     excess: float
     usual: float
     sweep: Sweep
+    path: int
+    pose: int
     ends: tuple[float, float]
 
 
@@ -42,67 +46,83 @@ def jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[Jump]:
     """The greatest jump of the length of each path that has one.
 
     They are looked for where conditional points come or go, and between values where a length changes otherwise than
-    next to them: there a jump can hardly be greater than the difference, so that what is less than a jump that was
-    found need not be looked at.
+    next to them: there a jump can hardly be greater than the difference.
     """
-    for place, (name, route) in enumerate(paths.routes.items()):
+    suspects = [suspect for sweep in looked_at for suspect in _suspects(paths, sweep)]
+    if not suspects:
+        return
+    values = _narrowed(paths, suspects)
+    sides = np.array([_beside(item, value) for item, value in zip(suspects, values, strict=True)])
+    sides = sides.reshape(2 * len(suspects), -1)
+    both = paths.system.lengths_of([item.path for item in suspects for _ in range(2)], sides)
+    sizes = np.abs(np.diff(both.reshape(-1, 2), axis=1))[:, 0].tolist()
+    greatest: dict[int, int] = {}
+    for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
+        suspect, values_of = suspects[k], suspects[k].sweep.values
+        known = sizes[greatest[suspect.path]] if suspect.path in greatest else LEAST
+        is_inside = values_of[0] + ASIDE < values[k] < values_of[-1] - ASIDE
+        if is_inside and sizes[k] > known and not suspect.excess < known:
+            greatest[suspect.path] = k
+    names = [*paths.routes]
+    for path, k in greatest.items():
+        sweep, name = suspects[k].sweep, names[path]
+        yield Jump(name, sizes[k], sweep.pose(values[k]), _changed(paths, name, sides[2 * k : 2 * k + 2]))
+
+
+def _suspects(paths: Paths, sweep: Sweep) -> Iterator[Suspect]:
+    changes = np.diff(sweep.lengths, axis=0)
+    usual = np.full_like(changes, np.nan)
+    if len(changes) > 2:
+        usual[1:-1] = 0.5 * changes[:-2] + 0.5 * changes[2:]
+        usual[0], usual[-1] = 2.0 * changes[1] - changes[2], 2.0 * changes[-2] - changes[-3]
+    excess, values = np.abs(changes - usual), sweep.values
+    for path, route in enumerate(paths.routes.values()):
         if not isinstance(route, ThroughPoints):
             continue
-        found: Jump | None = None
-        suspects = [suspect for sweep in looked_at for suspect in _suspects(sweep, place, route)]
-        for suspect in sorted(suspects, key=lambda item: -item.excess):
-            if found is not None and suspect.excess < found.size:
-                break
-            jump = _jump(suspect.sweep, place, name, route, _narrowed(suspect, place))
-            if jump is not None and (found is None or jump.size > found.size):
-                found = jump
-        if found is not None:
-            yield found
+        for point in route.points:
+            if point.kind == CONDITIONAL and point.coordinate == sweep.place:
+                for end in point.range:
+                    yield Suspect(inf, 0.0, sweep, path, 0, (end, end))
+        for k in np.flatnonzero(excess[:, path] > LEAST) if route.surfaces else ():
+            ends = float(values[k]), float(values[k + 1])
+            yield Suspect(float(excess[k, path]), float(usual[k, path]), sweep, path, int(k), ends)
 
 
-def _suspects(sweep: Sweep, place: int, route: ThroughPoints) -> Iterator[Suspect]:
-    for point in route.points:
-        if point.kind == CONDITIONAL and point.coordinate == sweep.place:
-            yield from (Suspect(inf, 0.0, sweep, (end, end)) for end in point.range)
-    changes = np.diff(sweep.lengths[:, place])
-    if route.surfaces and len(changes) > 2:
-        usual = np.convolve(changes, (0.5, 0.0, 0.5), "same")
-        usual[0], usual[-1] = 2.0 * changes[1] - changes[2], 2.0 * changes[-2] - changes[-3]
-        excess = np.abs(changes - usual)
-        for k in np.flatnonzero(excess > LEAST):
-            yield Suspect(float(excess[k]), float(usual[k]), sweep, (sweep.values[k], sweep.values[k + 1]))
-
-
-def _narrowed(suspect: Suspect, place: int) -> float:
-    """The value in an interval at which the length of a path changes most, besides the usual change."""
-    sweep, (low, high) = suspect.sweep, suspect.ends
-    if high - low <= ASIDE:
-        return low
-    rate = suspect.usual / (high - low)
-    before, after = (lengths(sweep.paths, sweep.at(end))[place] for end in suspect.ends)
-    while high - low > ASIDE:
+def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
+    """The value in each interval at which the length of the path changes most, besides the usual change."""
+    low, high = np.array([item.ends for item in suspects]).T
+    first, last, active = low, high, high - low > ASIDE
+    begin, end = (np.array([item.sweep.poses[item.pose + k] for item in suspects]) for k in (0, 1))
+    rate = np.array([item.usual for item in suspects]) / np.where(active, high - low, 1.0)
+    before, after = (np.array([item.sweep.lengths[item.pose + k, item.path] for item in suspects]) for k in (0, 1))
+    while places := np.flatnonzero(active).tolist():
         middle = 0.5 * (low + high)
-        here, smooth = lengths(sweep.paths, sweep.at(middle))[place], rate * (middle - low)
-        if abs(here - before - smooth) > abs(after - here - smooth):
-            high, after = middle, here
-        else:
-            low, before = middle, here
-    return 0.5 * (low + high)
+        part = (middle - first) / (last - first)
+        poses = (begin + part[:, None] * (end - begin))[places]
+        here = np.full(len(suspects), np.nan)
+        here[places] = paths.system.lengths_of([suspects[k].path for k in places], poses)
+        smooth = rate * (middle - low)
+        is_before = np.abs(here - before - smooth) > np.abs(after - here - smooth)
+        moves = active & is_before
+        high, after = np.where(moves, middle, high), np.where(moves, here, after)
+        moves = active & ~is_before
+        low, before = np.where(moves, middle, low), np.where(moves, here, before)
+        active = high - low > ASIDE
+    found: list[float] = np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
+    return found
 
 
-def _jump(sweep: Sweep, place: int, name: str, route: ThroughPoints, value: float) -> Jump | None:
-    if not sweep.values[0] + ASIDE < value < sweep.values[-1] - ASIDE:
-        return None
-    sides = [sweep.at(value + aside) for aside in (-ASIDE, ASIDE)]
-    before, after = (lengths(sweep.paths, q)[place] for q in sides)
-    if not abs(after - before) > LEAST:
-        return None
-    return Jump(name, abs(after - before), sweep.pose(value), _changed(sweep, name, route, sides))
+def _beside(suspect: Suspect, value: float) -> Array:
+    """The poses (2, n) on both sides of a value."""
+    beside = np.array([value - ASIDE, value + ASIDE])
+    return suspect.sweep.at(beside, suspect.sweep.before(beside))
 
 
-def _changed(sweep: Sweep, name: str, route: ThroughPoints, sides: list[Array]) -> tuple[str, ...]:
+def _changed(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:
     """Names of the points and surfaces that a path runs through on one side only."""
-    before, after = ({number for number, _ in sweep.paths.points(q)[name]} for q in sides)
+    route = paths.routes[name]
+    assert isinstance(route, ThroughPoints)
+    before, after = ({number for number, _ in paths.points(q)[name]} for q in sides)
     count = len(route.points)
     names = [
         route.points[k].name or f"point {k + 1}" if k < count else route.surfaces[(k - count) // 2].tangent.name

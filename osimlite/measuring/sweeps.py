@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from osimlite.errors import SimulationError
 from osimlite.lint.measures import Pose, Value
+from osimlite.multibody.kinematics import kinematics
 from osimlite.multibody.linear import stacked
 from osimlite.multibody.parts import CoordinateInfo
 from osimlite.multibody.spatial import Array
@@ -32,15 +33,15 @@ class Sweep:
         paths: whose lengths change.
         place: of the coordinate in the mechanism.
         poses: values of all coordinates (k, n), those of this one increasing; as far as constraints allow.
-        lengths: of all paths there (k, p), m.
         is_tied: whether a constraint moves others with the coordinate.
+        lengths: of all paths there (k, p), m.
     """
 
     paths: Paths
     place: int
     poses: Array
-    lengths: Array
     is_tied: bool
+    lengths: Array
 
     @property
     def values(self) -> Array:
@@ -61,26 +62,27 @@ class Sweep:
         """What people call the pose at a value of the coordinate."""
         return Pose((self.value(value),))
 
-    def at(self, value: float) -> Array:
-        """Values (n,) of all coordinates at one of this, along straight lines between the poses."""
-        k = min(max(int(np.searchsorted(self.values, value)), 1), len(self.values) - 1)
-        before, after = self.poses[k - 1 : k + 1]
-        part = (value - before[self.place]) / (after[self.place] - before[self.place])
-        between: Array = before + part * (after - before)
+    def at(self, values: Array, place: NDArray[np.intp]) -> Array:
+        """Values (k, n) of all coordinates where this one has a value, along straight lines between the poses.
+
+        Args:
+            values: of the coordinate (k,), rad or m.
+            place: numbers (k,) of the poses that the lines begin at.
+        """
+        before, after = self.poses[place], self.poses[place + 1]
+        part = (values - before[:, self.place]) / (after[:, self.place] - before[:, self.place])
+        between: Array = before + part[:, None] * (after - before)
         return between
 
-
-def lengths(paths: Paths, q: Array) -> Array:
-    """Lengths (p,) of all paths, m; NaN where they cannot be computed."""
-    try:
-        return np.array(list(paths.lengths(q).values()))
-    except SimulationError:
-        return np.full(len(paths.names), np.nan)
+    def before(self, values: Array) -> NDArray[np.intp]:
+        """Numbers (k,) of the poses before values of the coordinate."""
+        return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
 
 
-def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
+def sweeps(paths: Paths, start: Array) -> list[Sweep]:
     """A sweep of each coordinate that changes the length of a path."""
     are_tied, left = tied(paths, start), TIED_POSES
+    found: list[tuple[int, Array, bool]] = []
     for place, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
         if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
@@ -90,25 +92,31 @@ def sweeps(paths: Paths, start: Array) -> Iterator[Sweep]:
             continue
         left -= is_tied * TIED_VALUES
         poses = _poses(paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied)
-        rows = np.array([lengths(paths, q) for q in poses])
-        if len(rows) > 1 and np.nan_to_num(np.ptp(rows, axis=0)).max(initial=0.0) > STILL:
-            yield Sweep(paths, place, np.array(poses), rows, is_tied)
+        if len(poses) > 1:
+            found.append((place, poses, is_tied))
+    rows = paths.system.lengths(np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in found)]))
+    swept = []
+    for place, poses, is_tied in found:
+        own, rows = np.split(rows, [len(poses)])
+        swept.append(Sweep(paths, place, poses, is_tied, own))
+    return [sweep for sweep in swept if np.nan_to_num(np.ptp(sweep.lengths, axis=0)).max(initial=0.0) > STILL]
 
 
-def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> list[Array]:
+def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:
     """The poses with these values of a coordinate, from the default one to where constraints let it go no further."""
+    poses = np.tile(start, (len(values), 1))
+    poses[:, place] = values
+    if not is_tied:
+        return poses
+    found: list[Array] = []
     above = values >= start[place]
-    poses: list[Array] = []
-    for away in (values[above], values[~above][::-1]):
-        for value in away:
-            q = start.copy()
-            q[place] = value
+    for away in (poses[above], poses[~above][::-1]):
+        for q in away:
             try:
-                q = paths.mechanism.assemble(q, kept=(place,)) if is_tied else q
+                found.append(paths.mechanism.assemble(q, kept=(place,)))
             except SimulationError:
                 break
-            poses.append(q)
-    return sorted(poses, key=lambda q: float(q[place]))
+    return np.array(sorted(found, key=lambda q: float(q[place]))).reshape(-1, len(start))
 
 
 def tied(paths: Paths, start: Array) -> Array:
@@ -116,7 +124,7 @@ def tied(paths: Paths, start: Array) -> Array:
     constraints = paths.mechanism.constraints
     if not constraints:
         return np.zeros(len(start), dtype=bool)
-    state = paths.mechanism.at(start)
+    state = kinematics(paths.mechanism, start, np.zeros(len(start)), bodies=paths.mechanism.constrained)
     rows, _ = stacked([item.velocity_equations(state) for item in constraints])
     found: Array = np.abs(rows).max(axis=0) > 0.0
     return found

@@ -180,7 +180,7 @@ class _Search:
         )
 
     def _state(self, q: Array) -> Kinematics:
-        return kinematics(self.mechanism, q, np.zeros(len(q)), self.time)
+        return kinematics(self.mechanism, q, np.zeros(len(q)), self.time, bodies=self.mechanism.constrained)
 
     def _rows(self, state: Kinematics) -> Array:
         """Derivatives of the errors by the free coordinates (p, f)."""

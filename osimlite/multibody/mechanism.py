@@ -248,6 +248,11 @@ class Mechanism:
 
     # -------------------------------------------------------------------------------------------- dynamics
     @cached_property
+    def constrained(self) -> frozenset[int]:
+        """Indices of the bodies that constraints speak of."""
+        return frozenset(body for item in self.constraints for body in item.bodies) - {GROUND}
+
+    @cached_property
     def inertial(self) -> tuple[Array, Array, Array]:
         """Masses (b,), mass centres (b, 3) and inertias (b, 3, 3) of all bodies, as in `MassProperties`."""
         properties = [body.mass_properties for body in self.bodies]

@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from osimlite._lazy import shown_in_notebooks
-from osimlite.errors import SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.linear import shortest, stacked
-from osimlite.multibody.mechanism import GROUND, Values
+from osimlite.multibody.mechanism import Values
 from osimlite.multibody.spatial import Array
+from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.elements.items import Item, Places, Silent
 from osimlite.simulation.engines.linking import Code
-from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SPEED, SURFACE
+from osimlite.simulation.kernels.paths import LENGTH, SPEED
 from osimlite.simulation.kernels.projection import REDUNDANT
-from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
+from osimlite.simulation.path_system import MeasuredPath, PathSystem
 from osimlite.simulation.polylines import Course, Polylines
-from osimlite.simulation.states import StateVariable
-from osimlite.simulation.system import System
 
 ROUNDING = 1e-12
 """What is left of a moment arm, or a speed, of 0."""
@@ -65,6 +59,7 @@ class Paths:
         code: what runs the kernels; the best that is installed if left out.
 
     Attributes:
+        system: that computes them.
         names: component paths of their owners, in the order of the model.
         routes: what each runs through, in terms of the mechanism, by these names.
         mechanism: of the model.
@@ -73,24 +68,39 @@ class Paths:
     _repr_html_ = shown_in_notebooks("paths")
 
     def __init__(self, model: Model, wrapping: str = OPENSIM, code: Code | None = None) -> None:
-        self.mechanism = build_mechanism(model)
-        builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
-        owners = [
-            owner
-            for owner in builder.tree.components
-            if isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
-        ]
+        mechanism = build_mechanism(model)
+        builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
+        self._gather(builder, [owner for owner in builder.tree.components if _has_path(owner)], code)
+
+    def _gather(self, builder: ElementBuilder, owners: Sequence[Component], code: Code | None) -> None:
+        self.mechanism = builder.mechanism
         self.names = tuple(builder.path(owner) for owner in owners)
         self._coordinates = [info.path for info in self.mechanism.coordinates]
-        elements = [_Measured(name, PATH.read(builder, owner)) for name, owner in zip(self.names, owners, strict=True)]
+        pairs = zip(self.names, owners, strict=True)
+        elements = [MeasuredPath(name, PATH.read(builder, owner)) for name, owner in pairs]
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
         self.routes = {element.path: element.along for element in elements}
-        self._system = _System(self.mechanism.released(), Forces(tuple(elements)), code=code)
+        self.system = PathSystem(self.mechanism.released(), Forces(tuple(elements)), code=code)
+
+    def around_surfaces(self, model: Model, wrapping: str, code: Code | None = None) -> Paths:
+        """Those of the paths that have surfaces to wrap around, wrapped otherwise; the mechanism is shared.
+
+        Args:
+            model: whose paths these are.
+            wrapping: how they bend around surfaces.
+            code: what runs the kernels; the best that is installed if left out.
+        """
+        builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
+        routes = self.routes.items()
+        names = [name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces]
+        other = object.__new__(Paths)
+        other._gather(builder, [builder.tree.at(name) for name in names], code)
+        return other
 
     def lengths(self, q: Values) -> dict[str, float]:
         """Length of each path (m)."""
-        lengths = self._system.measured(self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH)
+        lengths = self.system.measured(self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH)
         return dict(zip(self.names, lengths.tolist(), strict=True))
 
     def speeds(self, q: Values, u: Values) -> dict[str, float]:
@@ -100,7 +110,7 @@ class Paths:
         rate of the length only where no point comes or goes, and where the path on a surface is the shortest. Along
         geodesics it is.
         """
-        speeds = self._system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
+        speeds = self.system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
         return dict(zip(self.names, speeds.tolist(), strict=True))
 
     def points(self, q: Values) -> dict[str, list[tuple[int, Array]]]:
@@ -109,14 +119,14 @@ class Paths:
         Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k and n + 2 k + 1.
         Along geodesics k counts the surfaces of its route, of which there is one for each piece that may be bent.
         """
-        return self._system.nodes(self.mechanism.values(q), self.routes)
+        return self.system.nodes(self.mechanism.values(q), self.routes)
 
     def lengths_on_surfaces(self, q: Values) -> dict[str, dict[str, float]]:
         """Length of each path through points on each of its surfaces, by their names (m); 0 where it passes by.
 
         NaN where OpenSim has the path wrap, finds no points for it, and goes straight through the surface.
         """
-        return self._system.on_surfaces(self.mechanism.values(q), self.routes)
+        return self.system.on_surfaces(self.mechanism.values(q), self.routes)
 
     def polylines(self, q: Values) -> dict[str, Array]:
         """Corners (k, 3) in ground (m) of each path, from end to end, round its surfaces.
@@ -145,7 +155,7 @@ class Paths:
         is its rate.
         """
         values = self.mechanism.values(q)
-        arms = self._system.pulled(values)
+        arms = self.system.pulled(values)
         arms[self._coupled] = arms[self._coupled] @ self.coupling(values)
         return {
             name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if not abs(arm) <= ROUNDING}
@@ -161,8 +171,7 @@ class Paths:
         constraints = self.mechanism.constraints
         if not constraints:
             return np.eye(len(q))
-        bodies = {body for item in constraints for body in item.bodies} - {GROUND}
-        state = kinematics(self.mechanism, q, np.zeros(len(q)), bodies=bodies)
+        state = kinematics(self.mechanism, q, np.zeros(len(q)), bodies=self.mechanism.constrained)
         locks = {item.coordinate: item for item in constraints if isinstance(item, Lock)}
         coupling = _coupled(constraints, state, [place for place in range(len(q)) if place not in locks])
         for place, lock in locks.items():
@@ -182,91 +191,6 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
     return coupling
 
 
-@dataclass(frozen=True)
-class _Measured(Silent):
-    """A path as an element that is measured and does not pull.
-
-    Attributes:
-        path: of its owner.
-        along: the path itself.
-    """
-
-    path: str
-    along: Along
-    states: tuple[StateVariable, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """The path of its owner."""
-        return self.path
-
-    def items(self, places: Places) -> list[Item]:
-        """Its parts, of which the path is no part of another item."""
-        *parts, last = self.along.items(places)
-        return [*parts, replace(last, is_part=False)]
-
-
-class _System(System):
-    """Paths and the mechanism that they move with, all of whose coordinates are free."""
-
-    entries = ("evaluate", "pull_each")
-
-    def measured(self, q: Array, u: Array, what: int) -> Array:
-        """Length or speed of each path (p,)."""
-        self._evaluated(q, u)
-        return self._w[[items[-1][0] + what for items in self._items]]
-
-    def pulled(self, q: Array) -> Array:
-        """The generalized forces (p, n) of a tension of 1 N along each path."""
-        self._evaluated(q, np.zeros(len(q)))
-        forces = np.zeros((len(self._items), len(self.order)))
-        self.program.code.entry("pull_each")(self.program.ints, self.numbers, self._w, self._y, self._f, forces)
-        found = np.zeros((len(self._items), len(q)))
-        found[:, self.order] = forces
-        return found
-
-    def nodes(self, q: Array, routes: Mapping[str, Along]) -> dict[str, list[tuple[int, Array]]]:
-        """The nodes that each path through points runs through."""
-        self._evaluated(q, np.zeros(len(q)))
-        found = {}
-        for (name, route), items in zip(routes.items(), self._items, strict=True):
-            if isinstance(route, ThroughPoints):
-                record = self._w[items[-1][0] :]
-                order = record[ORDER : ORDER + int(record[COUNT])].astype(int)
-                work = record[ORDER + len(route.points) + 2 * len(route.surfaces) :]
-                found[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
-        return found
-
-    def on_surfaces(self, q: Array, routes: Mapping[str, Along]) -> dict[str, dict[str, float]]:
-        """The lengths of each path on its surfaces, see :meth:`Paths.lengths_on_surfaces`."""
-        through = [
-            (name, route, [place for place, _ in items])
-            for (name, route), items in zip(routes.items(), self._items, strict=True)
-            if isinstance(route, ThroughPoints) and route.surfaces
-        ]
-        for _, _, (_, *laws, _) in through:
-            # What the law of a surface says of a piece stays where it is until it is asked again.
-            self._w[[place + SURFACE_LENGTH for place in laws]] = 0.0
-        self._evaluated(q, np.zeros(len(q)))
-        found: dict[str, dict[str, float]] = {}
-        for name, route, (_, *laws, path) in through:
-            size, law = len(route.points) + 2 * len(route.surfaces), iter(laws)
-            order = self._w[path + ORDER :][: int(self._w[path + COUNT])]
-            found[name] = {}
-            for second, surface in zip(range(len(route.points) + 1, size, 2), route.surfaces, strict=True):
-                # Of a piece that goes straight on, 0 or NaN.
-                length = 0.0 * self._w[next(law) + SURFACE_LENGTH] if surface.law else 0.0
-                if second in order:
-                    length = self._w[path + ORDER + size + NODE_WORK * second + SURFACE]
-                found[name][surface.tangent.name] = float(length)
-        return found
-
-    def _evaluated(self, q: Array, u: Array) -> None:
-        y = self.state.pack(q.tolist(), u.tolist())
-        try:
-            status = self.realize(0.0, y, layout.FORCE_STAGE)
-        except (ArithmeticError, ValueError) as failure:
-            # Kernels as Python raise what machine code computes as no number.
-            raise SimulationError(f"the paths cannot be computed: {failure}") from failure
-        if status != layout.OK:
-            raise self.refusal(status, 0.0, y)
+def _has_path(owner: Component) -> bool:
+    # To ask an object for what it does not have is dear: the answer says what it has.
+    return "geometry_path" in type(owner).model_fields and isinstance(owner.geometry_path, AbstractGeometryPath)

@@ -231,7 +231,8 @@ class ElementBuilder:
 
     def check(self, component: Any, numbers: Sequence[float]) -> None:
         """Raise a ModelError if a number is not finite."""
-        if not all(isfinite(number) for number in numbers):
+        # A sum is finite only of finite numbers; that of great ones may be infinite.
+        if not (isfinite(sum(numbers)) or all(map(isfinite, numbers))):
             raise ModelError(f"'{self.path(component)}' has a parameter that is not a finite number; give one")
 
     def unsupported(self, force: Any, why: str = "") -> UnsupportedError:

@@ -131,7 +131,7 @@ class Numbers(Parameter):
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
         """The numbers."""
-        values = tuple(float(value) for value in self.of(builder, force))
+        values = tuple(map(float, self.of(builder, force)))
         builder.check(force, values)
         return values
 

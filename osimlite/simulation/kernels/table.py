@@ -65,6 +65,7 @@ LAW_MODULES = {
     "straight_path": "paths",
     "pull_points": "paths",
     "pull_each": "paths",
+    "watch": "poses",
     "wrapped_path": "path_wraps",
     "geodesic_path": "geodesic_paths",
 }

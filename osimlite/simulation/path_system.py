@@ -1,0 +1,198 @@
+"""Paths as a system of their own: nothing pulls, and lengths are found in one state or in many at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.errors import SimulationError
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.elements.geometries.path import Path as Along
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.elements.items import Item, Places, Silent
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
+from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
+from osimlite.simulation.states import StateVariable
+from osimlite.simulation.system import System
+
+ALL = -1
+"""In place of a path: all of them."""
+
+
+@dataclass(frozen=True)
+class MeasuredPath(Silent):
+    """A path as an element that is measured and does not pull.
+
+    Attributes:
+        path: of its owner.
+        along: the path itself.
+    """
+
+    path: str
+    along: Along
+    states: tuple[StateVariable, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The path of its owner."""
+        return self.path
+
+    def items(self, places: Places) -> list[Item]:
+        """Its parts, of which the path is no part of another item."""
+        *parts, last = self.along.items(places)
+        return [*parts, replace(last, is_part=False)]
+
+
+class _OnSurface(NamedTuple):
+    """Where the work vector says how long a path is on one of its surfaces.
+
+    Attributes:
+        path: of the owner.
+        surface: its name.
+        node: number of the second tangent point.
+        order: places of the number of nodes, and of the nodes in their order.
+        length: place of the length before that node, and what the law of the surface says of a piece; -1 without one.
+    """
+
+    path: str
+    surface: str
+    node: int
+    order: tuple[int, ...]
+    length: tuple[int, int]
+
+
+class PathSystem(System):
+    """Paths and the mechanism that they move with, all of whose coordinates are free."""
+
+    entries = ("evaluate", "watch")
+
+    def measured(self, q: Array, u: Array, what: int) -> Array:
+        """Length or speed of each path (p,)."""
+        self._evaluated(q, u)
+        return self._w[[items[-1][0] + what for items in self._items]]
+
+    def pulled(self, q: Array) -> Array:
+        """The generalized forces (p, n) of a tension of 1 N along each path."""
+        self._evaluated(q, np.zeros(len(q)))
+        forces = np.zeros((len(self._items), len(self.order)))
+        self.program.code.entry("pull_each")(self.program.ints, self.numbers, self._w, self._y, self._f, forces)
+        found = np.zeros((len(self._items), len(q)))
+        found[:, self.order] = forces
+        return found
+
+    def nodes(self, q: Array, routes: Mapping[str, Along]) -> dict[str, list[tuple[int, Array]]]:
+        """The nodes that each path through points runs through."""
+        self._evaluated(q, np.zeros(len(q)))
+        found = {}
+        for (name, route), items in zip(routes.items(), self._items, strict=True):
+            if isinstance(route, ThroughPoints):
+                record = self._w[items[-1][0] :]
+                order = record[ORDER : ORDER + int(record[COUNT])].astype(int)
+                work = record[ORDER + len(route.points) + 2 * len(route.surfaces) :]
+                found[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
+        return found
+
+    def on_surfaces(self, q: Array, routes: Mapping[str, Along]) -> dict[str, dict[str, float]]:
+        """The lengths of each path on its surfaces, see :meth:`Paths.lengths_on_surfaces`."""
+        parts = [*self._surfaces(routes)]
+        # What the law of a surface says of a piece stays where it is until it is asked again.
+        self._w[[part.length[1] for part in parts if part.length[1] >= 0]] = 0.0
+        self._evaluated(q, np.zeros(len(q)))
+        found: dict[str, dict[str, float]] = {}
+        for part in parts:
+            (length,) = self._length_on(part, lambda places: self._w[None, list(places)])
+            found.setdefault(part.path, {})[part.surface] = float(length)
+        return found
+
+    def all_on_surfaces(self, poses: Array, routes: Mapping[str, Along]) -> Iterator[tuple[str, str, Array]]:
+        """Owner and surface with the lengths (k,) of the one on the other in poses (k, n).
+
+        NaN as in :meth:`Paths.lengths_on_surfaces`; 0 in a pose in which paths cannot be computed.
+        """
+        parts = [*self._surfaces(routes)]
+        wanted = sorted({place for part in parts for place in (*part.order, *part.length) if place >= 0})
+        column = {place: k for k, place in enumerate(wanted)}
+        rows = self.watched(poses, wanted, cleared=[part.length[1] for part in parts if part.length[1] >= 0])
+        for part in parts:
+            lengths = self._length_on(part, lambda places: rows[:, [column[place] for place in places]])
+            yield part.path, part.surface, np.where(np.isnan(rows[:, column[part.order[0]]]), 0.0, lengths)
+
+    def _surfaces(self, routes: Mapping[str, Along]) -> Iterator[_OnSurface]:
+        for (name, route), items in zip(routes.items(), self._items, strict=True):
+            if isinstance(route, ThroughPoints):
+                *_, (path, _) = items
+                laws, points = iter([place for place, _ in items[1:-1]]), len(route.points)
+                size = points + 2 * len(route.surfaces)
+                order = path + COUNT, *range(path + ORDER, path + ORDER + size)
+                for second, surface in zip(range(points + 1, size, 2), route.surfaces, strict=True):
+                    law = next(laws) + SURFACE_LENGTH if surface.law else -1
+                    length = path + ORDER + size + NODE_WORK * second + SURFACE
+                    yield _OnSurface(name, surface.tangent.name, second, order, (length, law))
+
+    @staticmethod
+    def _length_on(part: _OnSurface, columns: Callable[[Sequence[int]], Array]) -> Array:
+        count, order = np.split(columns(part.order), [1], axis=1)
+        is_on = ((order == part.node) & (np.arange(order.shape[1]) < count)).any(axis=1)
+        length, said = part.length
+        # Of a piece that goes straight on, 0 or NaN.
+        passed: Array = 0.0 * columns([said])[:, 0] if said >= 0 else np.zeros(len(order))
+        return np.where(is_on, columns([length])[:, 0], passed)
+
+    def lengths(self, poses: Array) -> Array:
+        """Lengths (k, p) of all paths in poses (k, n), m; NaN in one in which they cannot be computed."""
+        return self.watched(poses, [items[-1][0] + LENGTH for items in self._items])
+
+    def lengths_of(self, paths: Sequence[int], poses: Array) -> Array:
+        """Length (k,) of one path, by number, in each of poses (k, n), m; NaN where it cannot be computed."""
+        column = {path: k for k, path in enumerate(dict.fromkeys(paths))}
+        found = self.watched(poses, [self._items[path][-1][0] + LENGTH for path in column], paths)
+        of_each: Array = found[range(len(found)), [column[path] for path in paths]]
+        return of_each
+
+    def watched(
+        self, poses: Array, places: Sequence[int], paths: Sequence[int] | None = None, cleared: Sequence[int] = ()
+    ) -> Array:
+        """What stands at some places of the work vector in poses.
+
+        Args:
+            poses: values of all coordinates (k, n).
+            places: of the work vector (m,).
+            paths: for each pose the only path that is computed; all if left out.
+            cleared: places that are 0 before each pose.
+
+        Returns:
+            Numbers (k, m); NaN in a pose in which the paths cannot be computed.
+        """
+        states, found = np.zeros((len(poses), len(self._y))), np.empty((len(poses), len(places)))
+        states[:, : len(self.order)] = poses[:, self.order]
+        asked = np.full(len(poses), ALL) if paths is None else paths
+        head = np.array([len(places), len(cleared), *places, *cleared], dtype=np.int64)
+        self._watch(states, head, np.array(asked, dtype=np.int64), found)
+        return found
+
+    def _watch(self, states: Array, head: NDArray[np.int64], asked: NDArray[np.int64], found: Array) -> None:
+        parts = self.program.ints, self.numbers, self._w, self._y, self._f, len(states)
+        try:
+            self._run(self.program.code.entry("watch"), *parts, states, np.concatenate((head, asked)), found)
+        except (ArithmeticError, ValueError):
+            # Kernels as Python raise what machine code computes as no number.
+            if len(states) < 2:
+                found[:] = np.nan
+                return
+            for k in range(len(states)):
+                self._watch(states[[k]], head, asked[[k]], found[k : k + 1])
+
+    def _evaluated(self, q: Array, u: Array) -> None:
+        y = self.state.pack(q.tolist(), u.tolist())
+        try:
+            status = self.realize(0.0, y, layout.FORCE_STAGE)
+        except (ArithmeticError, ValueError) as failure:
+            # Kernels as Python raise what machine code computes as no number.
+            raise SimulationError(f"the paths cannot be computed: {failure}") from failure
+        if status != layout.OK:
+            raise self.refusal(status, 0.0, y)
