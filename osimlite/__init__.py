@@ -1,9 +1,9 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
-``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, the errors, and every component
-class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that importing
-osimlite costs nothing.
+``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
+``FrameSolver``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are
+imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from osimlite.document.reader import read_any as read_document
     from osimlite.document.reader import read_text as read_text
     from osimlite.errors import OsimliteError as OsimliteError
+    from osimlite.fitting.frame_solver import FrameSolver as FrameSolver
+    from osimlite.fitting.inverse_kinematics import inverse_kinematics as inverse_kinematics
     from osimlite.lint import validate as validate
     from osimlite.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
@@ -32,9 +34,11 @@ if TYPE_CHECKING:
 
     # When the program runs, `__getattr__` makes the list, of the component classes too.
     __all__ = [
+        "FrameSolver",
         "Model",
         "OsimliteError",
         "classes_in",
+        "inverse_kinematics",
         "mechanism",
         "muscle_curves",
         "paths",
@@ -57,6 +61,8 @@ _FUNCTIONS = {
     "write": "osimlite.document.printer",
     "to_text": "osimlite.document.printer",
     "validate": "osimlite.lint",
+    "FrameSolver": "osimlite.fitting.frame_solver",
+    "inverse_kinematics": "osimlite.fitting.inverse_kinematics",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",

@@ -21,6 +21,7 @@ LAW_MODULES = {
     "adams": "multistep",
     "bdf": "multistep",
     "rosenbrock": "rosenbrock",
+    "fit_frames": "pose_fit",
     "set_controls": "controls",
     "contact_places": "places",
     "place_ball": "ball_joint",

@@ -1,0 +1,233 @@
+"""What a fit of poses becomes: integers, numbers and room for the kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
+from osimlite.simulation.elements.items import Places
+from osimlite.simulation.kernels import layout as at
+from osimlite.simulation.kernels import pose_record as fit
+from osimlite.simulation.kernels.functions import function_table
+from osimlite.simulation.kernels.least_squares import factor_room
+from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.kernels.pose_fit import POSES
+from osimlite.simulation.system import System
+
+SCAN = 2001
+"""In how many places a coupler is looked at to find where what depends on it is in its range."""
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A point of a body whose place is measured.
+
+    Attributes:
+        station: body and point.
+        weight: how much its squared distance counts beside those of others.
+    """
+
+    station: StationPlacement
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A frame of a body whose rotation is measured, and how much the squared angle counts (1/rad²)."""
+
+    frame: FramePlacement
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A coordinate, by its place in the mechanism, that is to have a value, and how much the square counts."""
+
+    coordinate: int
+    weight: float = 1.0
+
+
+def substituted(constraints: Sequence[Constraint], fixed: set[int]) -> tuple[list[Coupler], list[Constraint]]:
+    """Couplers whose coordinate each gives, in an order in which all that one goes by is known; and the rest.
+
+    Args:
+        constraints: all.
+        fixed: coordinates whose values are given.
+    """
+    couplers: list[Coupler] = []
+    others: list[Constraint] = []
+    pending: list[Coupler] = []
+    depend: set[int] = set()
+    for item in constraints:
+        if isinstance(item, Coupler) and item.dependent not in fixed | depend:
+            pending.append(item)
+            depend.add(item.dependent)
+        else:
+            others.append(item)
+    while pending:
+        known = [item for item in pending if not depend & set(item.independent)]
+        if not known:
+            # They go round in circles; without one of them the others may not.
+            first = pending.pop(0)
+            others.append(first)
+            depend.discard(first.dependent)
+            continue
+        couplers += known
+        depend -= {item.dependent for item in known}
+        pending = [item for item in pending if item not in known]
+    return couplers, others
+
+
+class FitLayout:
+    """The integers, numbers and work of a fit."""
+
+    def __init__(
+        self,
+        system: System,
+        places: Places,
+        markers: Sequence[Marker],
+        sensors: Sequence[Sensor],
+        goals: Sequence[Goal],
+        held: Sequence[int],
+        couplers: Sequence[Coupler],
+    ) -> None:
+        s, size = system.structure, len(system.order)
+        links, equations = int(s[at.LINKS]), 0
+        if s[at.CONSTRAINED]:
+            equations = int(s[s[at.CONSTRAINED] + at.POSITIONS])
+        ints, numbers = [0] * fit.FIT_HEAD, list[float]()
+        self._listed(ints, fit.MARKERS, fit.MARKER_AT, list(self._markers(places, markers, numbers)))
+        self._listed(ints, fit.SENSORS, fit.SENSOR_AT, list(self._sensors(places, sensors, numbers)))
+        numbers += [goal.weight for goal in goals]
+        self._listed(ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals])
+        self._listed(ints, fit.HELD, fit.HELD_AT, [places.freedom(place) for place in held])
+        ints[fit.RANGES_AT] = len(numbers)
+        for low, high in ranges(system.mechanism, system.order, couplers):
+            numbers += low, high
+        records = []
+        for coupler in couplers:
+            records.append(len(ints))
+            arguments = [places.freedom(place) for place in coupler.independent]
+            ints += [places.freedom(coupler.dependent), len(numbers), len(arguments), *arguments]
+            numbers += [places.locked_value(place) for place in coupler.independent]
+            numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
+        self._listed(ints, fit.COUPLERS, fit.COUPLER_AT, records)
+        self._axes(ints, s, system.numbers, links)
+        ints[fit.RESOLVED_AT] = len(ints)
+        known = dict.fromkeys(map(places.freedom, held), fit.GIVEN)
+        known |= {places.freedom(item.dependent): fit.DEPENDENT for item in couplers}
+        ints += [known.get(k, fit.VARIABLE) for k in range(size)]
+        ints[fit.FREE_AT] = len(ints)
+        ints += [0] * size
+        room = 2 * size + factor_room(equations, size) + 2 * equations + 3 * size * size + 4 * size
+        lengths = {
+            fit.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held),
+            fit.WEIGHTS: len(markers) + len(sensors) + len(goals),
+            fit.SLOPE: size,
+            fit.STIFFNESS: size * size,
+            fit.BEND: size * size,
+            fit.TURNED: 9 * links,
+            fit.ROWS: equations * size,
+            fit.ERRORS: equations,
+            fit.ROOM: max(room, 2 * size + max([len(item.independent) for item in couplers], default=0)),
+            fit.HISTORY: 2 + (POSES + 2) * size,
+            fit.TRIAL: 2 * size,
+            fit.STEP: size,
+            fit.CURVES: (size * size + equations) * (equations > 0),
+            fit.PATTERN: len(markers) + len(sensors) + len(goals) + 1,
+        }
+        work = 0
+        for place, length in lengths.items():
+            ints[place] = work
+            work += length
+        self.ints = np.array(ints, dtype=np.int64)
+        self.numbers, self.work = np.array(numbers, dtype=float), np.zeros(work)
+
+    @staticmethod
+    def _listed(ints: list[int], count: int, place: int, items: Sequence[int]) -> None:
+        ints[count], ints[place] = len(items), len(ints)
+        ints += items
+
+    @staticmethod
+    def _markers(places: Places, markers: Sequence[Marker], numbers: list[float]) -> Iterator[int]:
+        for marker in markers:
+            link, point = places.station(marker.station.body, marker.station.location.tolist())
+            numbers += [*point, marker.weight]
+            yield link
+
+    @staticmethod
+    def _sensors(places: Places, sensors: Sequence[Sensor], numbers: list[float]) -> Iterator[int]:
+        for sensor in sensors:
+            link, own = places.placement(sensor.frame.body)
+            numbers += [*(own @ sensor.frame.transform)[:3, :3].ravel().tolist(), sensor.weight]
+            yield link
+
+    @staticmethod
+    def _axes(ints: list[int], s: Ints, numbers: Floats, links: int) -> None:
+        """The axes of each link, in the order in which they carry one another."""
+        first, axes, balls = [0], list[tuple[int, int]](), list[int]()
+        for link in range(links):
+            record = s[s[at.LINK_AT] + at.LINK_INTS * link :]
+            for operation in range(record[at.FIRST_OPERATION], record[at.END_OPERATION]):
+                j = s[s[at.OPERATION_AT] + at.OPERATION_INTS * operation :]
+                parts = [-1]
+                if j[at.MOTION] in (at.BALL, at.BALL_BACK):
+                    balls.append(int(j[at.ARGUMENTS]))
+                    parts = [0, 1, 2]
+                    if numbers[j[at.EXTRA] : j[at.EXTRA] + 3].any():
+                        parts = [3, 4, 5, *parts]
+                    if j[at.MOTION] == at.BALL_BACK:
+                        parts.reverse()
+                axes += [(operation, part) for part in parts]
+            first.append(len(axes))
+        ints[fit.AXES_AT] = len(ints)
+        ints += [*first, *(number for axis in axes for number in axis)]
+        FitLayout._listed(ints, fit.BALLS, fit.BALL_AT, balls)
+
+
+def ranges(mechanism: Mechanism, order: Sequence[int], couplers: Sequence[Coupler]) -> Iterator[tuple[float, float]]:
+    """Ends between which each degree of freedom stays: those of its range if it is clamped.
+
+    Where a clamped coordinate depends on one other, the other stays where the range allows it to be.
+    """
+    ends = {
+        place: info.range if info.clamped else (-np.inf, np.inf) for place, info in enumerate(mechanism.coordinates)
+    }
+    for coupler in reversed(couplers):
+        low, high = ends[coupler.dependent]
+        if len(coupler.independent) == 1 and (low > -np.inf or high < np.inf):
+            (other,) = coupler.independent
+            ends[other] = _allowed(coupler, mechanism.coordinates[other].default_value, ends[other], low, high)
+    yield from (ends[place] for place in order)
+
+
+def _allowed(coupler: Coupler, start: float, ends: tuple[float, float], low: float, high: float) -> tuple[float, float]:
+    """The interval around a place in which what a coupler gives is in a range, within ends."""
+
+    def is_inside(place: float) -> bool:
+        value = coupler.function.evaluate(np.array((place,)))[0]
+        return low - 1e-12 <= value <= high + 1e-12
+
+    start = min(max(start, ends[0]), ends[1])
+    if not is_inside(start):
+        return ends
+    found = []
+    for end, side in zip(ends, (-1.0, 1.0), strict=True):
+        furthest = end if np.isfinite(end) else start + side * 2.0 * np.pi
+        scan = np.linspace(start, furthest, SCAN)
+        outside = next((k for k, place in enumerate(scan.tolist()) if not is_inside(place)), None)
+        if outside is None:
+            found.append(end)
+            continue
+        inner, outer = float(scan[outside - 1]), float(scan[outside])
+        while abs(outer - inner) > 1e-15 * (1.0 + abs(inner)):
+            middle = 0.5 * (inner + outer)
+            if middle in (inner, outer):
+                break
+            inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
+        found.append(inner)
+    return found[0], found[1]

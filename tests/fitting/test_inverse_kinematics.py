@@ -1,0 +1,202 @@
+"""Inverse kinematics from files and arrays: against converged reference motions, and what hostile data become."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import DocumentError, OsimliteError, SettingError
+from osimlite.fitting.marker_data import MarkerData, read_trc
+from osimlite.simulation.files.trc import write_trc
+
+MARKERS = ("one", "two", "three", "four")
+POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1, 0.1)))
+
+
+def free_body() -> osimlite.Model:
+    """A body with four markers."""
+    model = osimlite.Model(name="one")
+    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model.add(body)
+    model.add(osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    for name, point in zip(MARKERS, POINTS.tolist(), strict=True):
+        model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=tuple(point)))
+    return model
+
+
+def motion(count: int = 20) -> Any:
+    """Poses (t, 6)."""
+    t = np.linspace(0.0, 1.0, count)[:, None]
+    return 0.4 * np.sin(3.0 * t + np.arange(6.0))
+
+
+def positions(values: Any) -> Any:
+    """Where the markers are (t, 4, 3)."""
+    mechanism = osimlite.mechanism(free_body())
+    return np.array([[mechanism.at(q).point(0, point) for point in POINTS] for q in values])
+
+
+def as_arrays(places: Any) -> dict[str, Any]:
+    """By name."""
+    return {name: places[:, number] for number, name in enumerate(MARKERS)}
+
+
+def unpacked(folder: Path, name: str, to: Path) -> Path:
+    """A file out of its .gz."""
+    path = to / name
+    path.write_bytes(gzip.decompress((folder / f"{name}.gz").read_bytes()))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("case", "model", "trial", "setup"),
+    [
+        ("ik_gait10", "gait10_subject01", "subject01_walk.trc", "walk_Setup_IK.xml"),
+        ("ik_id_gait2354", "gait2354_subject01_simbody", "subject01_walk1.trc", "subject01_Setup_IK.xml"),
+    ],
+)
+def test_walks_are_the_converged_ones(
+    case: str, model: str, trial: str, setup: str, shared: Path, tmp_path: Path
+) -> None:
+    """Two gait models with their weights and goals, against another solver's minima, converged to 1e-10 rad."""
+    reference = shared / "oracle" / "tools" / "reference"
+    human = osimlite.read(unpacked(reference / "models", f"{model}.osim", tmp_path))
+    tasks: Any = osimlite.read_document(reference / case / setup).ik_task_set.objects
+    weights = {task.name: task.weight for task in tasks if type(task).__name__ == "IKMarkerTask" and task.apply}
+    goals = {task.name: task.weight for task in tasks if type(task).__name__ == "IKCoordinateTask" and task.apply}
+    data = read_trc(unpacked(reference / case, trial, tmp_path))
+    known = {name: weight for name, weight in weights.items() if any(m.name == name for m in human.components())}
+    rest = {name: 0.0 for name in data.names if name not in known and any(m.name == name for m in human.components())}
+    converged = np.load(reference / case / "converged.npz")
+    times = converged["t"]
+    found = osimlite.inverse_kinematics(
+        human, data, weights=known | rest, coordinates=goals, start=times[0], end=times[-1]
+    )
+    assert list(found.coordinates) == converged["names"].tolist()
+    assert found.values == pytest.approx(converged["q_si"], abs=2e-9)
+    assert not found.unsettled and found.steps.mean() < 5.0
+
+
+def test_files_and_arrays_are_the_same(tmp_path: Path) -> None:
+    """Metres and millimetres; the errors are those of the markers."""
+    values = motion()
+    places = positions(values)
+    times = np.linspace(0.0, 1.0, len(values)).tolist()
+    model = free_body()
+    found = [osimlite.inverse_kinematics(model, as_arrays(places), times=times)]
+    for unit, factor in (("m", 1.0), ("mm", 1000.0)):
+        path = tmp_path / f"{unit}.trc"
+        write_trc(path, times, MARKERS, (factor * places).reshape(len(values), -1).tolist(), units=unit)
+        found.append(osimlite.inverse_kinematics(model, path))
+    for result in found:
+        assert result.values == pytest.approx(values, abs=1e-8)
+        assert result.marker_errors == pytest.approx(np.zeros((len(values), 4)), abs=1e-9)
+    frame = found[0].to_frame()
+    assert list(frame.columns) == list(found[0].coordinates) and len(frame) == len(values)
+    assert found[0].to_xarray()["marker_error"].shape == (len(values), 4)
+
+
+def test_the_frame_solver_finds_the_same_poses() -> None:
+    """One frame at a time, with gaps; it begins anew when told."""
+    places = positions(motion())
+    places[7, :2] = np.nan
+    model = free_body()
+    whole = osimlite.inverse_kinematics(model, as_arrays(places))
+    solver = osimlite.FrameSolver(model, markers=list(MARKERS))
+    assert np.array([solver.step(frame) for frame in places]) == pytest.approx(whole.values, abs=1e-12)
+    assert solver.places == pytest.approx(whole.places[-1], abs=1e-12)
+    solver.reset()
+    assert solver.step(places[0]) == pytest.approx(whole.values[0], abs=1e-9)
+    with pytest.raises(SettingError, match="4 markers are as many rows of 3 numbers; got 3 × 3"):
+        solver.step(places[0, :3])
+    with pytest.raises(SettingError, match="no marker 'tree'; did you mean 'three'"):
+        osimlite.FrameSolver(model, markers=["tree"])
+
+
+def test_a_gap_is_bridged_by_what_is_seen() -> None:
+    """Where three markers of four are seen nothing is lost, and a frozen or swapped marker is an error to be seen."""
+    values = motion()
+    places = positions(values)
+    places[5:9, 2] = np.nan
+    found = osimlite.inverse_kinematics(free_body(), as_arrays(places))
+    assert found.values == pytest.approx(values, abs=1e-8)
+    assert np.isnan(found.marker_errors[5:9, 2]).all()
+    assert found.summary["partly_unseen"] == {"three": 0.2}
+    swapped = positions(values)
+    swapped[10, [0, 1]] = swapped[10, [1, 0]]
+    found = osimlite.inverse_kinematics(free_body(), as_arrays(swapped))
+    assert found.summary["worst_time"] == 10.0
+    assert np.delete(found.values, 10, 0) == pytest.approx(np.delete(values, 10, 0), abs=1e-7)
+
+
+def test_weights_count() -> None:
+    """A marker of weight 0 is reported and does not pull."""
+    places = positions(motion(3))
+    places[:, 3] += 1.0
+    found = osimlite.inverse_kinematics(free_body(), as_arrays(places), weights={"four": 0.0})
+    assert found.values == pytest.approx(motion(3), abs=1e-8)
+    assert found.marker_errors[:, 3] == pytest.approx(np.full(3, np.sqrt(3.0)), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda t: t.replace("PathFileType", "Path"), "it is no marker file"),
+        (lambda t: t.replace("\tm\t", "\tfeet\t"), r":3: the markers are in 'feet'; Units is one of m, mm"),
+        (lambda t: t.replace("one\t", "two\t"), "two markers are called two"),
+        (lambda t: "".join(t.splitlines(keepends=True)[:6]), "markers but no frames"),
+        (lambda t: t.replace("\n2\t0.5", "\n2\t-0.5"), "frame 2 does not come after"),
+        (lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\tgap"), r":8: 'gap.*' in column 3 is no number"),
+        (lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\t1\t1\t"), r":8: the row has more than the 14 cells"),
+    ],
+)
+def test_damaged_files_are_told(change: Any, sentence: str, tmp_path: Path) -> None:
+    """One sentence, with the file and the line."""
+    path = tmp_path / "trial.trc"
+    write_trc(path, [0.0, 0.5, 1.0], MARKERS, positions(motion(3)).reshape(3, -1).tolist())
+    path.write_text(change(path.read_text()))
+    with pytest.raises(DocumentError, match=sentence):
+        osimlite.inverse_kinematics(free_body(), path)
+
+
+def test_what_cannot_be_fitted_is_told() -> None:
+    """Names and times that are not there."""
+    places = as_arrays(positions(motion(3)))
+    model = free_body()
+    with pytest.raises(OsimliteError, match=r"no marker of the data \(hip\) is one of the model"):
+        osimlite.inverse_kinematics(model, {"hip": places["one"]})
+    with pytest.raises(SettingError, match="no marker 'fore'; did you mean 'four'"):
+        osimlite.inverse_kinematics(model, places, weights={"fore": 1.0})
+    with pytest.raises(SettingError, match="is no weight"):
+        osimlite.inverse_kinematics(model, places, weights={"one": -1.0})
+    with pytest.raises(SettingError, match="no frame lies between 7 and 9 s"):
+        osimlite.inverse_kinematics(model, places, start=7.0, end=9.0)
+    with pytest.raises(SettingError, match="as many as all others"):
+        osimlite.inverse_kinematics(model, {"one": places["one"], "two": places["two"][:1]})
+    with pytest.raises(OsimliteError, match="no coordinate"):
+        osimlite.inverse_kinematics(model, places, coordinates={"knee": 1.0})
+
+
+def test_one_marker_at_ten_hertz_is_followed() -> None:
+    """The pose moves no further than the marker asks for."""
+    places = positions(motion(10))
+    found = osimlite.inverse_kinematics(free_body(), {"one": places[:, 0]})
+    assert found.marker_errors.max() < 1e-7
+    assert np.abs(np.diff(found.values, axis=0)).max() < 1.0
+
+
+def test_markers_of_a_table(tmp_path: Path) -> None:
+    """OpenSim's own table of model markers is taken as data."""
+    from osimlite.simulation.files.storage import write_sto
+
+    places = positions(motion(4))
+    path = tmp_path / "markers.sto"
+    columns = [f"{name}{end}" for name in MARKERS for end in ("_tx", "_ty", "_tz")]
+    write_sto(path, "markers", [0.0, 0.1, 0.2, 0.3], columns, places.reshape(4, -1).tolist())
+    assert MarkerData.of(path).names == MARKERS
+    assert osimlite.inverse_kinematics(free_body(), path).values == pytest.approx(motion(4), abs=1e-8)

@@ -1,0 +1,263 @@
+"""Poses that fit best: derivatives of their cost, that they are minima, constraints, ranges, and what is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import osimlite
+from osimlite import Body, FreeJoint, Model, PhysicalOffsetFrame, PinJoint
+from osimlite.errors import SimulationError
+from osimlite.fitting.pose_fit import PoseFit
+from osimlite.fitting.pose_layout import Goal, Marker, Sensor
+from osimlite.multibody import functions as f
+from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
+from osimlite.multibody.spatial import rotation_xyz, transform
+from osimlite.simulation.engines.linking import COMPILED, PYTHON
+from osimlite.simulation.kernels import pose_cost, pose_record
+from osimlite.simulation.kernels.pose_fit import weigh
+from tests.multibody.strategies import Case, cases, constraint_of
+
+ROUND = "ConstantCurvatureJoint"
+"""Its functions of several coordinates are bent, which Newton's matrix leaves out."""
+
+
+def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) -> list[Marker]:
+    """Some markers on every body."""
+    return [
+        Marker(StationPlacement(body, rng.uniform(-0.3, 0.3, 3)), float(rng.uniform(0.2, 5.0)))
+        for body in range(len(mechanism.bodies))
+        for _ in range(each)
+    ]
+
+
+def places_at(mechanism: Mechanism, markers: list[Marker], q: Any) -> Any:
+    """Where the markers are (m, 3)."""
+    state = mechanism.at(q)
+    return np.array([state.point(*marker.station) for marker in markers])
+
+
+def cost_of(mechanism: Mechanism, markers: list[Marker], measured: Any, q: Any) -> float:
+    """What OpenSim minimises."""
+    weights = np.array([marker.weight for marker in markers]) * np.isfinite(measured).all(axis=1)
+    squares = np.sum((places_at(mechanism, markers, q) - np.nan_to_num(measured)) ** 2, axis=1)
+    return float(0.5 * weights @ squares / weights.sum())
+
+
+def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
+    """Cost, gradient and second derivative at a pose, in the order of the fit."""
+    system, shape = fit._system, fit._shape
+    size = len(fit.order)
+    m = pose_record.Fit(
+        system.program.ints, system.numbers, system._w, np.zeros(2 * size), shape.ints, shape.numbers, shape.work
+    )
+    m.v[m.p[pose_record.MEASURED] :][: fit.width] = frame
+    assert weigh(m)
+    y = np.zeros(2 * size)
+    y[:size] = q[fit.order]
+    value = pose_cost.cost(m, y)
+    stiffness, bend = (
+        m.v[m.p[part] :][: size * size].reshape(size, size) for part in (pose_record.STIFFNESS, pose_record.BEND)
+    )
+    return value, m.v[m.p[pose_record.SLOPE] :][:size].copy(), stiffness + bend
+
+
+@given(cases(max_bodies=4), st.integers(0, 99))
+@settings(max_examples=25)
+def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
+    """Gradient and second derivative against differences, with markers, a goal and a marker that is not seen."""
+    mechanism, rng = case.mechanism, np.random.default_rng(seed)
+    if not mechanism.coordinates:
+        return
+    markers = markers_of(mechanism, rng, 2)
+    fit = PoseFit(mechanism, markers, goals=[Goal(0, 0.3)], code=PYTHON)
+    measured = places_at(mechanism, markers, case.q) + rng.normal(0.0, 0.1, (len(markers), 3))
+    measured[-1, 1] = np.nan
+    frame = [*measured.ravel(), 0.2]
+    value, slope, second = derivatives(fit, frame, case.q)
+    assert value == pytest.approx(
+        cost_of(mechanism, markers, measured, case.q) + 0.15 * (case.q[0] - 0.2) ** 2, rel=1e-12
+    )
+    for number, place in enumerate(fit.order):
+        step = np.zeros(len(case.q))
+        step[place] = 1e-5
+        ahead, behind = (derivatives(fit, frame, case.q + sign * step) for sign in (1.0, -1.0))
+        assert slope[number] == pytest.approx((ahead[0] - behind[0]) / 2e-5, abs=2e-9)
+        if not any(body.mobilizer.joint_type == ROUND for body in mechanism.bodies):
+            assert second[number] == pytest.approx((ahead[1] - behind[1]) / 2e-5, abs=2e-8)
+
+
+@given(cases(max_bodies=4), st.integers(0, 99), st.sampled_from(["", "coupler", "point", "distance", "line", "weld"]))
+@settings(max_examples=40)
+def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, kind: str) -> None:
+    """No direction that the constraints leave free leads down."""
+    mechanism, rng = case.mechanism, np.random.default_rng(seed)
+    if not mechanism.coordinates or (kind and len(mechanism.bodies) < 2):
+        return
+    if kind:
+        mechanism = replace(mechanism, constraints=(constraint_of(kind, mechanism, rng),))
+    try:
+        start = mechanism.assemble(0.3 * case.q)
+    except SimulationError:
+        return
+    markers = markers_of(mechanism, rng)
+    measured = places_at(mechanism, markers, start) + rng.normal(0.0, 0.02, (len(markers), 3))
+    fit = PoseFit(mechanism, markers)
+    try:
+        poses = fit.fit(measured.reshape(1, -1), q=start)
+    except SimulationError:
+        assert kind not in ("", "coupler")
+        return
+    assert not poses.unsettled
+    q = poses.values[0]
+    assert poses.costs[0] == pytest.approx(cost_of(mechanism, markers, measured, q), rel=1e-9, abs=1e-18)
+    assert poses.costs[0] <= cost_of(mechanism, markers, measured, start) * (1.0 + 1e-12)
+    assert poses.places[0] == pytest.approx(places_at(mechanism, markers, q), abs=1e-12)
+    state = mechanism.at(q)
+    rows = np.zeros((0, len(q)))
+    for item in mechanism.constraints:
+        assert np.abs(item.position_errors(state)).max(initial=0.0) < 1e-9
+        count = len(item.position_errors(state))
+        rows = np.vstack([rows, item.velocity_equations(state)[0][:count] @ np.linalg.inv(mechanism.rate_matrix(q))])
+    slope = np.array(
+        [
+            (cost_of(mechanism, markers, measured, q + e) - cost_of(mechanism, markers, measured, q - e)) / 2e-6
+            for e in 1e-6 * np.eye(len(q))
+        ]
+    )
+    across = np.linalg.lstsq(rows.T, slope, rcond=1e-10)[0] if len(rows) else np.zeros(0)
+    assert slope - rows.T @ across == pytest.approx(0.0, abs=3e-8)
+
+
+def test_python_and_machine_code_find_the_same_poses() -> None:
+    """The kernels are the same functions."""
+    case = _free_body()
+    markers = markers_of(case, np.random.default_rng(1))
+    rng = np.random.default_rng(2)
+    motion = [places_at(case, markers, 0.3 * np.sin(0.1 * t + np.arange(6))) for t in range(4)]
+    frames = np.array(motion).reshape(4, -1) + rng.normal(0.0, 0.01, (4, 3 * len(markers)))
+    found = [PoseFit(case, markers, code=code).fit(frames, q=np.zeros(6)).values for code in (COMPILED, PYTHON)]
+    assert found[0] == pytest.approx(found[1], abs=1e-10)
+
+
+def _free_body() -> Mechanism:
+    """One free body."""
+    model = Model(name="one")
+    body = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model.add(body)
+    model.add(FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    return osimlite.mechanism(model)
+
+
+def _pendulum(**changes: Any) -> Mechanism:
+    """Two pins a metre apart, the second with changes of its coordinate."""
+    model = Model(name="two")
+    last: Any = model.ground
+    for number in range(2):
+        body = Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        model.add(body)
+        model.add(PinJoint(name=f"j{number}", socket_parent_frame=last, socket_child_frame=body))
+        last = model.add(
+            PhysicalOffsetFrame(name=f"end{number}", socket_parent=f"/bodyset/b{number}", translation=(1.0, 0.0, 0.0))
+        )
+    mechanism = osimlite.mechanism(model)
+    infos = (mechanism.coordinates[0], replace(mechanism.coordinates[1], **changes))
+    return replace(mechanism, coordinates=infos)
+
+
+ARM = [Marker(StationPlacement(1, np.array(point))) for point in ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0))]
+
+
+def test_a_clamped_coordinate_stays_in_its_range() -> None:
+    """And the other one is where it is best beside that."""
+    free, clamped = _pendulum(), _pendulum(clamped=True, range=(-0.5, 0.25))
+    markers = [*ARM, Marker(StationPlacement(0, np.array((1.0, 0.0, 0.0))))]
+    measured = places_at(free, markers, np.array((0.3, 0.9))).reshape(1, -1)
+    assert PoseFit(free, markers).fit(measured).values[0] == pytest.approx((0.3, 0.9), abs=1e-9)
+    poses = PoseFit(clamped, markers).fit(measured)
+    assert poses.values[0, 1] == 0.25 and 0.3 < poses.values[0, 0] < 0.9
+    ahead, here, behind = (
+        cost_of(free, markers, measured.reshape(-1, 3), poses.values[0] + (step, 0.0)) for step in (1e-4, 0.0, -1e-4)
+    )
+    assert here < min(ahead, behind)
+
+
+def test_a_range_of_what_depends_bounds_what_it_depends_on() -> None:
+    """A coupler's coordinate is clamped: the other one stops where it reaches its end."""
+    mechanism = _pendulum(clamped=True, range=(-0.4, 0.4))
+    mechanism = replace(mechanism, constraints=(Coupler(1, (0,), f.Linear(2.0, 0.1)),))
+    measured = places_at(_pendulum(), ARM, np.array((0.5, 1.1))).reshape(1, -1)
+    assert PoseFit(mechanism, ARM).fit(measured).values[0] == pytest.approx((0.15, 0.4), abs=1e-9)
+
+
+def test_locked_and_prescribed_coordinates_are_held() -> None:
+    """At the default, and at the function of time."""
+    measured = places_at(_pendulum(), ARM, np.array((0.3, 0.9))).reshape(1, -1)
+    locked = PoseFit(_pendulum(locked=True, default_value=0.7), ARM).fit(measured)
+    assert locked.values[0, 1] == 0.7
+    driven = PoseFit(_pendulum(prescribed=f.Linear(1.0, 0.2)), ARM).fit(np.repeat(measured, 2, 0), [0.0, 0.5])
+    assert driven.values[:, 1] == pytest.approx((0.2, 0.7), abs=1e-12)
+
+
+def test_goals_pull_coordinates() -> None:
+    """A goal of a locked coordinate does nothing; NaN is no goal."""
+    mechanism = _pendulum()
+    measured = places_at(mechanism, ARM, np.array((0.3, 0.9))).reshape(-1)
+    fit = PoseFit(mechanism, ARM, goals=[Goal(1, 1e6)])
+    values = fit.fit(np.array([[*measured, 0.1], [*measured, np.nan]])).values
+    assert values[0, 1] == pytest.approx(0.1, abs=1e-5) and values[1] == pytest.approx((0.3, 0.9), abs=1e-9)
+    held = PoseFit(_pendulum(locked=True, default_value=0.7), ARM, goals=[Goal(1, 1e6)])
+    assert held.fit(np.array([[*measured, 0.1]])).values[0, 1] == 0.7
+
+
+def test_what_is_not_seen_leaves_the_pose_as_it_was() -> None:
+    """Nothing seen: the pose before. One marker: the nearest pose that fits it."""
+    mechanism = _free_body()
+    markers = markers_of(mechanism, np.random.default_rng(0))
+    pose = np.array((0.3, -0.2, 0.1, 0.5, 0.6, 0.7))
+    places = places_at(mechanism, markers, pose).reshape(1, -1)
+    frames = np.repeat(places, 4, axis=0)
+    frames[1] = np.nan
+    frames[2, 3:] = np.nan
+    frames[2, :3] += 0.01
+    poses = PoseFit(mechanism, markers).fit(frames, q=np.zeros(6))
+    assert poses.unseen == (1,)
+    assert poses.values[[0, 1, 3]] == pytest.approx(np.tile(pose, (3, 1)), abs=1e-8)
+    assert poses.places[2, 0] == pytest.approx(frames[2, :3], abs=1e-7)
+    assert np.abs(poses.values[2] - pose).max() < 0.05
+
+
+def test_nothing_seen_from_the_beginning_is_the_start() -> None:
+    """All frames are empty."""
+    poses = PoseFit(_free_body(), markers_of(_free_body(), np.random.default_rng(0))).fit(
+        np.full((3, 9), np.nan), q=np.arange(6.0)
+    )
+    assert poses.unseen == (0, 1, 2) and (poses.values == np.arange(6.0)).all()
+
+
+@pytest.mark.parametrize("far", [0.0, 1.5, 3.0])
+def test_sensors_turn_bodies(far: float) -> None:
+    """Rotations are fitted exactly where that is possible, from near and from far."""
+    mechanism = _free_body()
+    frame = transform(rotation_xyz(np.array((0.2, 0.5, -0.3))), (0.1, 0.0, 0.0))
+    pose = np.array((0.4 + far, 0.3, 0.2, 0.0, 0.0, 0.0))
+    wanted = mechanism.at(pose).rotations[0] @ frame[:3, :3]
+    fit = PoseFit(mechanism, [], [Sensor(FramePlacement(0, frame))])
+    poses = fit.fit(wanted.reshape(1, -1), q=np.zeros(6))
+    assert poses.costs[0] == pytest.approx(0.0, abs=1e-16)
+    assert mechanism.at(poses.values[0]).rotations[0] @ frame[:3, :3] == pytest.approx(wanted, abs=1e-8)
+
+
+def test_a_jump_is_followed() -> None:
+    """Positions that leap from one frame to the next are fitted in each of them."""
+    mechanism = _free_body()
+    markers = markers_of(mechanism, np.random.default_rng(3))
+    poses = np.array([(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), (0.9, 0.5, -0.4, 2.0, 3.0, -4.0), (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)])
+    frames = np.array([places_at(mechanism, markers, q) for q in poses]).reshape(3, -1)
+    assert PoseFit(mechanism, markers).fit(frames, q=np.zeros(6)).values == pytest.approx(poses, abs=1e-8)
